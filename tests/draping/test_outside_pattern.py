@@ -165,6 +165,38 @@ def test_the_seams_of_another_programs_file_stand_in_a_table(tmp_path: Path):
         OutsideJob.read(file, sewing=table, body="EU 38")
 
 
+@pytest.mark.parametrize(
+    ("header", "text", "scale"), [(1, "", 0.0254), (5, "", 0.01), (0, "Units: English", 0.0254), (0, "", 1e-3)]
+)
+def test_cad_files_of_other_habits_are_read(header: int, text: str, scale: float, tmp_path: Path):
+    """Boundaries of lines, an arc and a spline on a layer of their own, no names of pieces, several units, an arrow's block."""
+    document = ezdxf.new("R2010")
+    document.header["$INSUNITS"] = header
+    document.blocks.new("ARROW").add_lwpolyline([(0, 0), (1, 0), (0, 1)], close=True)
+    width, high = 0.4 / scale, 0.3 / scale
+    for name in ("A1", "A2"):
+        block = document.blocks.new(name)
+        on = {"layer": "CUT"}
+        block.add_line((0, 0), (width, 0), dxfattribs=on)
+        block.add_line((width, high), (width, 0), dxfattribs=on)
+        block.add_spline(fit_points=[(width, high), (width / 2, 1.1 * high), (0, high)], dxfattribs=on)
+        block.add_line((0, high), (0, 1e-7 * width), dxfattribs=on)
+        block.add_line((width / 4, 0), (width / 4, high / 2), dxfattribs={"layer": "GRAIN"})
+        block.add_circle((width / 2, high / 2), width / 50, dxfattribs={"layer": "HOLES"})
+        document.modelspace().add_blockref(name, (0, 0))
+    if text:
+        document.modelspace().add_text(text)
+    file = tmp_path / "cad.dxf"
+    document.saveas(file)
+    found = read_dxf(file)
+    assert [piece.name for piece in found.pieces[""]] == ["A1", "A2"]
+    for piece in found.pieces[""]:
+        lengths = [edge.length for edge in piece.edges]
+        assert len(lengths) == 4
+        assert lengths[:2] == pytest.approx([0.4, 0.3], abs=1e-6)
+        assert 0.4 < lengths[2] < 0.41
+
+
 def test_a_tube_is_put_around_the_body():
     body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
     pattern = tube(0.475, 0.25)  # a little tight, so that it stays on the hips
@@ -188,6 +220,18 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(Garment(name="rag", pieces={"": list(pattern.pieces[""])}), body, fabric=worn.cloth.fabric)
     with pytest.raises(InputError, match=r"has no designed surface; name a body"):
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
+
+
+def test_a_tube_that_nothing_holds_falls_off():
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    with pytest.raises(InputError, match=r"falls off: nothing on the body holds the garment"):
+        drape_pattern(
+            tube(0.6, 0.25),
+            body,
+            fabric=warpflat.find_fabric("woven"),
+            placement=Placement(spacing=0.04),
+            device=DEVICE,
+        )
 
 
 def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):

@@ -10,11 +10,10 @@ from warpflat.kernels.drape import (
     Bending,
     Contact,
     Motion,
-    advance_drape,
     evaluate_cloth,
     evaluate_curvature,
-    watch_power,
 )
+from warpflat.kernels.drape_steps import advance_drape, watch_power
 
 from warpflat.core.launch import launch_each
 from warpflat.fabric.fabric import Fabric

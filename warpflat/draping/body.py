@@ -8,7 +8,7 @@ import warp as wp
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.export.geometry import area_vectors, vertex_normals
-from warpflat.kernels.drape import find_planes
+from warpflat.kernels.drape_contact import find_planes
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["Body"]

@@ -16,20 +16,9 @@ from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.fabric.fabric import Fabric
-from warpflat.kernels.drape import (
-    Bending,
-    Contact,
-    Motion,
-    anchor_friction,
-    carry_contact,
-    evaluate_cloth,
-    evaluate_curvature,
-    find_planes,
-    gather_drape,
-    load_contact,
-    stiffen_cloth,
-    stiffen_contact,
-)
+from warpflat.kernels.drape import Bending, Contact, Motion, evaluate_cloth, evaluate_curvature, gather_drape
+from warpflat.kernels.drape_contact import anchor_friction, carry_contact, find_planes, load_contact
+from warpflat.kernels.drape_stiffness import stiffen_cloth, stiffen_contact
 from warpflat.kernels.membrane import Cloth
 from warpflat.model.membrane import make_cloth
 from warpflat.solver.quasi_newton import Point, Solve
@@ -66,12 +55,15 @@ class DrapeEnergy:
         evaluate_cells: launches of the cells' forces and the moments.
         planes: launches that find the body's planes, none without a body.
         weight: #V [N].
+        is_held: whether any vertex is.
     """
 
     def __init__(self, cloth: SewnCloth, body: Body | None, options: DrapeOptions, held: BoolArray) -> None:
         """Build the cells, the bending and the pattern of the stiffness; the contact is that of `load_contact`."""
         self.device = device = wp.get_device("cpu") if body is None else body.device
         self._count = count = len(cloth.designed)
+        self.is_held = bool(held.any())
+        self._start, self._longest = cloth.designed, np.inf
         self._ground = float(cloth.designed[:, 1].mean())
         corner, _, gradient, area = cloth.cells()
         laplacian, stiffness = cloth.laplacian()
@@ -138,8 +130,14 @@ class DrapeEnergy:
     def _each(self, kernel: wp.Kernel, inputs: list[object]) -> None:
         launch_each(kernel, self._count, inputs, [], device=self.device, least=512)
 
+    def bound(self, start: FloatArray, longest: float) -> None:
+        """Let no vertex go farther than some way [m] from #V by 3 places [m]: the energy is infinite beyond."""
+        self._start, self._longest = start, longest
+
     def at(self, positions: FloatArray) -> WornPoint:
         """Evaluate the cloth at #V by 3 places [m]."""
+        if np.abs(positions - self._start).max() > self._longest:
+            return WornPoint(positions=positions, energy=np.inf, force=np.zeros_like(positions))
         self.motion.position.assign(positions)
         self._evaluate.launch()
         energy = float(self._cell_energy.numpy().sum() + self._energy.numpy().sum())

@@ -49,7 +49,7 @@ def drape(
         the drape; `converged` is False if it met the step limit before it was at rest.
 
     Raises:
-        InputError: no piece, pieces of different cloths, half pieces, mirrored faces, or an unknown line.
+        InputError: no piece, pieces of different cloths, half pieces, mirrored faces, an unknown line, or nothing holds the garment.
     """
     cloth = sew_cloth(garment)
     where = wp.get_device(device)
@@ -64,6 +64,7 @@ def drape(
         cloth, solid, options=options, held=held, callback=callback,
         observer=lambda places: frames.append(places.astype(np.float32)),
     )  # fmt: skip
+    worn.check_held()
     sources = tuple(source for piece in _pieces(garment) for source in piece.surface.sources)
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),

@@ -77,7 +77,8 @@ def drape_pattern(
         The drape, and notes.
 
     Raises:
-        InputError: the pattern has no seams or no such size, a piece cannot be meshed or placed, or an edge is unknown.
+        InputError: the pattern has no seams or no such size, a piece cannot be meshed or placed, an edge is unknown, or nothing
+            holds the garment.
     """
     placement, options = placement or Placement(), options or DrapeOptions()
     chosen = pattern.sample if placement.size is None else placement.size
@@ -108,6 +109,7 @@ def drape_pattern(
         cloth, solid, options=options, held=held, callback=callback,
         observer=lambda places: frames.append(places.astype(np.float32)),
     )  # fmt: skip
+    worn.check_held()
     if not lifted:
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid

@@ -18,6 +18,7 @@ from warpflat.export.letters import all_letters
 from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import DrawnView, View, make_facets
+from warpflat.surface.connectivity import join_labels
 
 __all__ = ["body_around", "draw_scale", "seen_from", "write_drape_picture"]
 
@@ -25,6 +26,8 @@ _VIEWS = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _SKIN = (0.80, 0.79, 0.77)
 # The body is drawn this much smaller [m], so that cloth that lies on it is seen; and so much of it beyond the cloth.
 _SHRUNK, _BEYOND = 0.003, 0.10
+# A part of the body with a smaller share of the largest part's triangles is not drawn.
+_SCRAP = 0.1
 _TALLEST, _TOP, _BOTTOM, _BAR = 5.2, 0.75, 0.25, 1.2
 
 
@@ -100,7 +103,12 @@ def body_around(drape: Drape) -> tuple[FloatArray, IntArray, int]:
     across = body.vertices[body.triangles][:, :, 0].mean(axis=1)
     beside = (across > x[:, 0].min() - _BEYOND) & (across < x[:, 0].max() + _BEYOND)
     near = beside & (height > x[:, 1].min() - _BEYOND) & (height < x[:, 1].max() + _BEYOND)
-    triangles = np.column_stack([body.triangles[near] + len(x), np.full(int(near.sum()), -1)])
+    kept = body.triangles[near]
+    # Nor are scraps of hands of use that hang in the air.
+    label = join_labels(len(body.vertices), kept[:, :2].ravel(), kept[:, 1:].ravel())[kept[:, 0]]
+    count = np.bincount(label)
+    kept = kept[count[label] >= _SCRAP * count.max()] if len(kept) else kept
+    triangles = np.column_stack([kept + len(x), np.full(len(kept), -1)])
     faces = np.concatenate([drape.cloth.faces, triangles]).astype(np.int32)
     return np.concatenate([x, inner]), faces, len(drape.cloth.faces)
 

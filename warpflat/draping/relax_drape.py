@@ -21,12 +21,13 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.errors import InputError
 from warpflat.core.launch import Sequence, record
 from warpflat.draping.body import Body
 from warpflat.draping.drape_energy import DrapeEnergy
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.kernels.drape import advance_drape, watch_power
+from warpflat.kernels.drape_steps import advance_drape, watch_power
 from warpflat.kernels.reduce import sum_blocks
 from warpflat.solver.quasi_newton import Descent
 
@@ -42,12 +43,18 @@ _MASS_SCALE = 2.0
 _WORST = 100.0
 # Steps of dynamic relaxation at the start: they bring the cloth out of the body and find what it presses on.
 _FIRST_STEPS = 300
+# No vertex goes farther than this in a round [m]: planes and metric are those of its start.
+_LONGEST_ROUND = 0.1
+# A garment that is held by nothing and whose top has sunk by this much has left its place on the body [m].
+_FALLEN = 0.4
 # Rounds of the augmented Lagrangian, after which dynamic relaxation goes on alone, and steps of L-BFGS in each.
-_MOST_ROUNDS, _STEPS_PER_ROUND = 40, 40
+_MOST_ROUNDS, _STEPS_PER_ROUND = 80, 40
 # Tension that is added to the factor [N/m]. Cloth without tension has next to no stiffness across its plane: steps would be too long.
 _PULL = 10.0
 # A round ends when the mean force is at most this share of what is allowed; dynamic relaxation takes over from so many times that.
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
+# It goes on while a hundred steps of it leave less than this share.
+_EASES = 0.8
 _BLOCKS = 64
 
 
@@ -60,6 +67,7 @@ class DrapedCloth:
         pressing: #V, normal force on the body [N].
         residual: mean force that is left over a vertex's mean weight.
         converged: whether the cloth is at rest.
+        fell_off: whether it was given up because nothing on the body holds it.
         steps: of dynamic relaxation.
         rounds: of minimisation between them.
         seconds: wall clock.
@@ -69,9 +77,22 @@ class DrapedCloth:
     pressing: FloatArray
     residual: float
     converged: bool
+    fell_off: bool
     steps: int
     rounds: int
     seconds: float
+
+    def check_held(self) -> None:
+        """Refuse cloth that has fallen off.
+
+        Raises:
+            InputError: it has.
+        """
+        if self.fell_off:
+            raise InputError(
+                f"falls off: nothing on the body holds the garment, its top has sunk by over {_FALLEN:g} m; "
+                "make it narrower there, or name in [drape] a line that stays: hold = [...]"
+            )
 
 
 class _DynamicRelaxation:
@@ -148,7 +169,7 @@ def relax_drape(
         observer: called with the places (#V by 3 [m]) at the start and at every check.
 
     Returns:
-        the cloth; `converged` is False if it met the step limit before it was at rest.
+        the cloth; `converged` is False if it met the step limit before it was at rest, or fell off.
     """
     began, options = time.perf_counter(), options or DrapeOptions()
     start = cloth.designed if start is None else start
@@ -158,25 +179,31 @@ def relax_drape(
     steps, rounds, residual, converged = 0, 0, np.inf, False
     observe = observer or (lambda _: None)
     observe(start)
-    while steps < options.max_steps and not converged:
-        if steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS:
+    lowest = -np.inf if energy.is_held else float(start[:, 1].max()) - _FALLEN
+    fell_off = eases = False
+    while steps < options.max_steps and not (converged or fell_off):
+        if steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS and not eases:
             if rounds == 0:
                 energy.load_contact()
             rounds += 1
             left = _minimise(energy, options.tolerance)
             observe(energy.motion.position.numpy())
-            if left > _NEARLY_AT_REST * options.tolerance:
+            fell_off = float(energy.motion.position.numpy()[:, 1].max()) < lowest
+            if fell_off or left > _NEARLY_AT_REST * options.tolerance:
                 continue
+        before = residual if eases else np.inf
         relaxation.run(_STEPS_PER_CHECK)
         steps += _STEPS_PER_CHECK
         residual, worst = relaxation.check()
+        # Dynamic relaxation goes on by itself as long as it serves.
+        eases = residual < _EASES * before
         observe(energy.motion.position.numpy())
         converged = steps > _STEPS_PER_CHECK and residual <= options.tolerance and worst <= _WORST * options.tolerance
         if callback is not None:
             callback(steps, residual)
     return DrapedCloth(
         positions=energy.motion.position.numpy().copy(), pressing=relaxation.pressing.numpy().copy(),
-        residual=residual, converged=converged, steps=steps, rounds=rounds,
+        residual=residual, converged=converged, fell_off=fell_off, steps=steps, rounds=rounds,
         seconds=time.perf_counter() - began,
     )  # fmt: skip
 
@@ -193,6 +220,7 @@ def _minimise(energy: DrapeEnergy, tolerance: float) -> float:
     """
     x = energy.motion.position.numpy().copy()
     energy.factor(x, _PULL)
+    energy.bound(x, _LONGEST_ROUND)
     descent, weight = Descent(energy, energy.at(x)), float(energy.weight.mean())
 
     def left() -> float:

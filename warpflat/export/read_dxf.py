@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
@@ -22,6 +23,10 @@ __all__ = ["outermost", "read_dxf"]
 # Curves are flattened to within this [m].
 _FLAT = 2e-5
 _METRES = {"METRIC": 1e-3, "ENGLISH": 0.0254}
+# The header's $INSUNITS, where no text names the units: inches, feet, millimetres, centimetres, metres.
+_METRES_OF_HEADER = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0}
+# Ends of lines that are nearer to each other than this share of the drawing meet.
+_MEET = 1e-5
 
 
 @dataclass
@@ -35,15 +40,26 @@ class _Block:
     def closed(self, layer: str) -> list[FloatArray]:
         return [points for points, closed in self.lines.get(layer, []) if closed]
 
+    def loops(self, layer: str) -> list[FloatArray]:
+        """Return the closed lines of a layer, and those that its open lines form together (#P by 2 each)."""
+        return self.closed(layer) or _joined([points for points, _ in self.lines.get(layer, [])])
+
+    def all_loops(self) -> list[FloatArray]:
+        """Return the closed lines of all layers; boundary and sewing line hide what lies inside."""
+        return [points for layer in self.lines for points in self.loops(layer)]
+
     def value(self, key: str) -> str:
-        return next((text.partition(":")[2].strip() for _, text, _ in self.texts if text.startswith(f"{key}:")), "")
+        """Return what stands behind a key such as "PIECE NAME", in whichever case."""
+        found = (text.partition(":") for _, text, _ in self.texts)
+        return next((value.strip() for name, _, value in found if name.strip().upper() == key), "")
 
 
 def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) -> Garment:
     """Read the pieces of a pattern; the seams too, where the file names them as the package does.
 
     A block is a piece. Its sewing line is on layer 14, its boundary on layer 1, its grain on layer 7. In a file without such
-    blocks every closed line of the drawing is a piece.
+    layers the outermost closed line of a block is its boundary; without blocks every closed line of the drawing is a piece. A line
+    may be made of several lines, arcs and splines. Units are those of the text UNITS, of the header, or else millimetres.
 
     Args:
         path: of the file.
@@ -65,17 +81,19 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         raise InputError(f"{path}: cannot be read as DXF ({str(error)[:80]})") from None
     space = document.modelspace()
     style = _collect(space)
-    metres = _METRES.get(style.value("UNITS").upper(), 1e-3)
     blocks = [(block.name, _collect(block)) for block in document.blocks if not block.name.startswith("*")]
+    units = next((text for text in (each.value("UNITS") for _, each in [("", style), *blocks]) if text), "")
+    metres = _METRES.get(units.upper(), _METRES_OF_HEADER.get(document.header.get("$INSUNITS", 0), 1e-3))
     pieces, words = list[Piece](), dict[tuple[str, str], list[tuple[str, str, str]]]()
-    for name, block in blocks:
-        if block.closed("1") or block.closed("14"):
-            pieces.append(_piece(name, block, metres, allowance, words, f"{path}: {name}"))
+    # Other programs draw on layers of their own; a block that is not in the drawing, such as an arrow, is no piece then.
+    inserted = {entity.dxf.name for entity in space if entity.dxftype() == "INSERT"}
+    named = [row for row in blocks if row[1].loops("1") or row[1].closed("14")]
+    for name, block in named or [row for row in blocks if row[0] in inserted and row[1].all_loops()]:
+        pieces.append(_piece(name, block, metres, allowance, words, f"{path}: {name}"))
     if not pieces:
-        loops = [points for layer in style.lines for points in style.closed(layer)]
         pieces = [
             Piece(name=f"piece_{n}", edges=split_outline(inset(ring * metres, allowance or 0.0, f"{path}: piece_{n}")))
-            for n, ring in enumerate(outermost(loops), start=1)
+            for n, ring in enumerate(outermost(style.all_loops()), start=1)
         ]
     if not pieces:
         raise InputError(f"{path}: has no closed line; a piece is a closed line on layer 1 of a block")
@@ -102,6 +120,24 @@ def outermost(loops: Iterable[FloatArray]) -> list[FloatArray]:
         if not any(other.contains(polygon.representative_point()) for _, other in found):
             found.append((ring, polygon))
     return [ring for ring, _ in found]
+
+
+def _joined(lines: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return the closed lines that open lines form whose ends meet."""
+    import shapely
+
+    if not lines:
+        return []
+    ends = np.concatenate([line[[0, -1]] for line in lines])
+    step = _MEET * max(float(np.ptp(ends, axis=0).max()), 1e-9)
+    # Ends that meet get the same place: the first of them.
+    first = cKDTree(ends).query_ball_point(ends, step)
+    place = ends[[min(near) for near in first]].reshape(len(lines), 2, 2)
+    strings = [
+        shapely.LineString(np.concatenate([place[k, :1], line[1:-1], place[k, 1:]])) for k, line in enumerate(lines)
+    ]
+    rings = shapely.get_parts(shapely.polygonize(strings))
+    return [np.array(ring.exterior.coords)[:-1] for ring in rings]
 
 
 def _collect(space: Any) -> _Block:
@@ -199,7 +235,9 @@ def _edges_without_names(block: _Block, metres: float, allowance: float | None, 
     if sewing:
         parts = [(f"edge_{n}", "seam", points * metres) for n, (points, _) in enumerate(sewing, start=1)]
         return chain_edges(parts, where)
-    ring = max(block.closed("1"), key=len) * metres
+    ring = (outermost(block.loops("1") or block.all_loops()) or [np.zeros((0, 2))])[0] * metres
+    if not len(ring):
+        raise InputError(f"{where}: its outline has no area; a boundary is a closed line on layer 1")
     corners = np.array(block.points.get("2", [])).reshape(-1, 2) * metres
     if allowance:
         return split_outline(inset(ring, allowance, where))

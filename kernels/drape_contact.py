@@ -1,0 +1,121 @@
+"""Contact of draped cloth with a body: its planes, and the forces of body and friction that rounds of an augmented Lagrangian carry."""
+
+import warp as wp
+
+from .drape import TINY, Bending, Contact, Motion, gather
+from .indices import natural
+
+wp.set_module_options({"enable_backward": False})
+
+# Distance from its plane at which a vertex rests on the body [m].
+TOUCH = wp.constant(wp.float64(1.0e-6))
+
+
+@wp.kernel
+def find_planes(
+    mesh: wp.uint64,
+    body_normal: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3d),
+    reach: wp.float32,
+    first: int,
+    # outputs
+    centre: wp.array(dtype=wp.vec3d),
+    normal: wp.array(dtype=wp.vec3d),
+):
+    """Find the body's plane at each vertex: the nearest place of its surface and the interpolated normal there.
+
+    A sign is not asked for, as it is arbitrary at distance zero.
+
+    mesh: the body. body_normal: its normals at its vertices. position: #V [m]. reach: longest distance [m]. centre: #V [m].
+    normal: #V, zero where the body is out of reach.
+    """
+    i = natural(wp.tid() + first)
+    p = position[i]
+    query = wp.mesh_query_point_no_sign(mesh, wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2])), reach)
+    normal[i] = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    if query.result:
+        face = 3 * query.face
+        indices = wp.mesh_get(mesh).indices
+        place = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+        n = wp.normalize(
+            query.u * body_normal[indices[face]]
+            + query.v * body_normal[indices[face + 1]]
+            + (1.0 - query.u - query.v) * body_normal[indices[face + 2]]
+        )
+        centre[i] = wp.vec3d(wp.float64(place[0]), wp.float64(place[1]), wp.float64(place[2]))
+        normal[i] = wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2]))
+
+
+@wp.kernel
+def load_contact(
+    motion: Motion,
+    contact: Contact,
+    offset: wp.array(dtype=wp.int32),
+    entry: wp.array(dtype=wp.int32),
+    cell_force: wp.array(dtype=wp.vec3d),
+    bending: Bending,
+    moment: wp.array(dtype=wp.vec3d),
+    first: int,
+):
+    """Set the forces of body and friction to what they can carry of the forces on cloth that dynamic relaxation has brought there.
+
+    motion, offset, entry, cell_force, moment: as of `gather_drape`. contact: pressed and rubbed are set.
+    """
+    i = natural(wp.tid() + first)
+    f = gather(i, offset, entry, cell_force, bending, moment)
+    f[1] = f[1] - motion.weight[i]
+    n = contact.normal[i]
+    push = wp.float64(0.0)
+    if wp.dot(n, n) > wp.float64(0.5) and wp.dot(motion.position[i] - contact.centre[i], n) < TOUCH:
+        push = wp.max(-wp.dot(f, n), push)
+    contact.pressed[i] = push
+    contact.rubbed[i] = -f
+
+
+@wp.func
+def friction_force(x: wp.vec3d, n: wp.vec3d, anchor: wp.vec3d, grip: wp.float64, most: wp.float64):
+    """Return the force of friction: a spring to the anchor in the plane, at most `most` [N]."""
+    off = anchor - x
+    off = off - n * wp.dot(off, n)
+    return off * wp.min(grip, most / wp.max(wp.length(off), TINY))
+
+
+@wp.kernel
+def carry_contact(motion: Motion, contact: Contact, first: int):
+    """Take over the forces of body and friction at the present places, and put back on its plane what presses on it.
+
+    This is the update of the augmented Lagrangian: where the body pushed by its depth, it then pushes at no depth.
+
+    motion: of which position is moved. contact: pressed and rubbed are set.
+    """
+    i = natural(wp.tid() + first)
+    zero = wp.float64(0.0)
+    n = contact.normal[i]
+    if wp.dot(n, n) < wp.float64(0.5):
+        contact.pressed[i] = zero
+        return
+    x = motion.position[i]
+    depth = wp.dot(contact.centre[i] - x, n)
+    push = wp.max(contact.pressed[i] + contact.skin[i] * depth, zero)
+    contact.rubbed[i] = friction_force(x, n, contact.anchor[i], contact.grip[i], contact.most[i])
+    contact.pressed[i] = push
+    if push > zero and motion.fixed[i] == wp.int8(0):
+        motion.position[i] = x + n * depth
+
+
+@wp.kernel
+def anchor_friction(motion: Motion, contact: Contact, first: int):
+    """Put the anchors of friction where its force is what was rubbed, within Coulomb's bound and in the present plane.
+
+    motion: of which position counts. contact: pressed, most and anchor are set.
+    """
+    i = natural(wp.tid() + first)
+    n = contact.normal[i]
+    if wp.dot(n, n) < wp.float64(0.5):
+        contact.pressed[i] = wp.float64(0.0)
+    most = contact.friction * contact.pressed[i]
+    f = contact.rubbed[i]
+    f = f - n * wp.dot(f, n)
+    f = f * wp.min(wp.float64(1.0), most / wp.max(wp.length(f), TINY))
+    contact.most[i] = most
+    contact.anchor[i] = motion.position[i] + f / contact.grip[i]

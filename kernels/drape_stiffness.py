@@ -1,0 +1,146 @@
+"""Stiffness of draped cloth: second derivatives of the energies of membrane, contact and friction, without what is negative."""
+
+import warp as wp
+
+from .drape import TINY, Contact, Motion
+from .indices import natural
+from .membrane import Cloth, beyond_hooke, sheared_threads, stretched_sheet
+
+wp.set_module_options({"enable_backward": False})
+
+# What holds a vertex that may not move [N/m].
+HELD = wp.constant(wp.float64(1.0e6))
+
+
+@wp.func
+def sheet_slopes(e: wp.vec2d, cloth: Cloth):
+    """Return the second derivatives of W by e_warp, by e_weft, and by both [N/m]."""
+    zero = wp.float64(0.0)
+    one = wp.float64(1.0)
+    a = cloth.c_warp
+    b = cloth.c_weft
+    both = cloth.c_cross
+    if cloth.c_warp * e[0] + cloth.c_cross * e[1] < zero or cloth.c_weft * e[1] + cloth.c_cross * e[0] < zero:
+        f = cloth.compression
+        a = f * a + (one - f) * wp.where(e[0] > zero, cloth.k_warp, zero)
+        b = f * b + (one - f) * wp.where(e[1] > zero, cloth.k_weft, zero)
+        both = f * both
+    a += beyond_hooke(e[0], cloth.k_warp, cloth.strain_warp, cloth.tension_warp)[2]
+    b += beyond_hooke(e[1], cloth.k_weft, cloth.strain_weft, cloth.tension_weft)[2]
+    return wp.vec3d(a, b, both)
+
+
+@wp.func
+def corner_gradient(g: wp.vec4d, k: int):
+    """Return the gradient of the weight of corner k along warp and weft, by those of corners 1 and 2 [1/m]."""
+    if k == 1:
+        return wp.vec2d(g[0], g[1])
+    if k == 2:
+        return wp.vec2d(g[2], g[3])
+    return wp.vec2d(-g[0] - g[2], -g[1] - g[3])
+
+
+@wp.kernel
+def stiffen_cloth(
+    position: wp.array(dtype=wp.vec3d),
+    corner: wp.array(dtype=wp.vec3i),
+    gradient: wp.array(dtype=wp.vec4d),
+    area: wp.array(dtype=wp.float64),
+    cloth: Cloth,
+    pull: wp.float64,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.mat33d),
+):
+    """Compute the second derivatives of each cell's energy by its corners, without what is negative.
+
+    Of the stress, as a symmetric 2 by 2 matrix, the part under tension stiffens the cell across its threads.
+
+    position, corner, gradient, area: as of `evaluate_cloth`. stiffness: 9 #C, of corners 00, 01, 02, 10, ... [N/m].
+    """
+    c = natural(wp.tid() + first)
+    at = corner[c]
+    g = gradient[c]
+    zero = wp.float64(0.0)
+    one = wp.float64(1.0)
+    half = wp.float64(0.5)
+    origin = position[natural(at[0])]
+    d1 = position[natural(at[1])] - origin
+    d2 = position[natural(at[2])] - origin
+    warp = d1 * g[0] + d2 * g[2]
+    weft = d1 * g[1] + d2 * g[3]
+    length_warp = wp.max(wp.length(warp), TINY)
+    length_weft = wp.max(wp.length(weft), TINY)
+    e = wp.vec2d(length_warp - one, length_weft - one)
+    law = stretched_sheet(e, cloth)
+    shear = sheared_threads(wp.dot(warp, weft), cloth)
+    slope = sheet_slopes(e, cloth)
+    # The part of the stress [[a, tau], [tau, b]] that pulls.
+    a = law[0] / length_warp
+    b = law[1] / length_weft
+    middle = half * (a + b)
+    radius = wp.max(wp.sqrt(half * half * (a - b) * (a - b) + shear[0] * shear[0]), TINY)
+    high = wp.abs(middle + radius)
+    low = wp.abs(middle - radius)
+    across = half * (high - low) / radius
+    mean = half * (high + low)
+    a_pull = mean + across * half * (a - b)
+    b_pull = mean - across * half * (a - b)
+    tau_pull = across * shear[0]
+    u = warp / length_warp
+    v = weft / length_weft
+    unit = wp.identity(n=3, dtype=wp.float64)
+    of_warp = (
+        wp.outer(u, u) * wp.max(slope[0] - a_pull, zero) + unit * (a_pull + pull) + wp.outer(weft, weft) * shear[2]
+    )
+    of_weft = (
+        wp.outer(v, v) * wp.max(slope[1] - b_pull, zero) + unit * (b_pull + pull) + wp.outer(warp, warp) * shear[2]
+    )
+    of_both = wp.outer(u, v) * slope[2] + unit * tau_pull + wp.outer(weft, warp) * shear[2]
+    for k in range(9):
+        i = k / 3
+        j = k % 3
+        along_i = corner_gradient(g, i)
+        along_j = corner_gradient(g, j)
+        stiffness[natural(9 * c + k)] = (
+            of_warp * (along_i[0] * along_j[0])
+            + of_weft * (along_i[1] * along_j[1])
+            + of_both * (along_i[0] * along_j[1])
+            + wp.transpose(of_both) * (along_i[1] * along_j[0])
+        ) * area[c]
+
+
+@wp.kernel
+def stiffen_contact(
+    motion: Motion,
+    contact: Contact,
+    least: wp.float64,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.mat33d),
+):
+    """Compute the second derivatives of the energy of contact and friction at each vertex, with a least stiffness everywhere.
+
+    motion: of which position and fixed count. least: [N/m]. stiffness: #V [N/m].
+    """
+    i = natural(wp.tid() + first)
+    zero = wp.float64(0.0)
+    unit = wp.identity(n=3, dtype=wp.float64)
+    total = unit * least
+    n = contact.normal[i]
+    x = motion.position[i]
+    if wp.dot(n, n) > wp.float64(0.5):
+        beside = unit - wp.outer(n, n)
+        if contact.pressed[i] + contact.skin[i] * wp.dot(contact.centre[i] - x, n) > zero:
+            total += wp.outer(n, n) * contact.skin[i]
+        most = contact.most[i]
+        if most > zero:
+            off = beside * (x - contact.anchor[i])
+            way = wp.length(off)
+            if contact.grip[i] * way <= most:
+                total += beside * contact.grip[i]
+            else:
+                total += (beside - wp.outer(off, off) / (way * way)) * (most / way)
+    if motion.fixed[i] != wp.int8(0):
+        total += unit * HELD
+    stiffness[i] = total
