@@ -76,7 +76,7 @@ PARTS = {
     "marker": ("garment.pattern_files:_marker",),
     "drape": ("scene.drape:write_drape",),
     "film for the page": ("review.page:pack_frames",),
-    "review": ("review.page:write_review",),
+    "review": ("review.page:write_review", "review.page:pack_pictures"),
     "metrics, hashes": ("core.manifest:remove_stale",),
     "waiting": ("core.beside:Beside.result",),
     "report": ("cli.run:report_run",),

@@ -17,7 +17,7 @@ import pytest
 
 import warpflat
 from warpflat.cli.main import main
-from warpflat.core import atomic_files as atomic
+from warpflat.core import hidden_files
 from warpflat.core.atomic_files import atomic_path, output_folder, prepare_folder, remove_file
 from warpflat.core.errors import InputError
 from warpflat.core.json_file import write_json
@@ -278,7 +278,7 @@ def test_a_folder_that_takes_the_place_of_a_file_meanwhile_stays(tmp_path: Path)
 def test_what_a_hidden_folder_lists_of_other_places_is_left_alone(tmp_path: Path, listed: str):
     out = _filled(tmp_path / "out")
     (tmp_path / "users.txt").write_text("mine")
-    left = out / f".run-warpflat-{atomic._machine()}-4194999-01234567"
+    left = out / f".run-warpflat-{hidden_files._machine()}-4194999-01234567"
     (left / "aside").mkdir(parents=True)
     (left / "fresh.json").write_text(listed)
     prepare_folder(out)
@@ -338,18 +338,18 @@ def test_an_interruption_anywhere_leaves_nothing_behind(
         if not _interrupted(lambda: action(_filled(out)), number, watched):
             break
         gc.collect()
-        atomic._clear_all()  # as at the end of the process
+        hidden_files._clear_all()  # as at the end of the process
         left = files(out)
         assert left in (BEFORE, AFTER) or set(left) == {*BEFORE, "frames.usdc"}, number
         assert set(os.listdir(out)) == set(left), number
-        assert not atomic._unfinished
+        assert not hidden_files._unfinished
     assert number > 100
     # A folder that was made for it goes, too.
     fresh = tmp_path / "other" / "out"
     for number in range(0, 200, 5):
         if _interrupted(lambda: _change_fresh(fresh), number, ("atomic.py", "contextlib.py")):
             gc.collect()
-            atomic._clear_all()
+            hidden_files._clear_all()
             assert not (tmp_path / "other").exists(), number
 
 

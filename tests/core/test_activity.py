@@ -31,6 +31,9 @@ def test_a_run_reports_what_it_does_besides_steps(tmp_path: Path, monkeypatch: p
     Path("block.toml").write_text(
         "form = 'a_line_skirt'\n[mannequin]\nsize = 'EU 38'\n[marker]\nwidth = 1.5\nseconds = 1\n[output]\nframes = 0\n"
     )
+    monkeypatch.setattr(
+        "warpflat.core.beside.thread_count", lambda: 1
+    )  # of what a process beside does nothing is heard
     heard: list[str] = []
     with activity_listener(heard.append):
         assert main(["run", "block.toml", "--quiet"]) == 0

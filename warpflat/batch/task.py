@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.batch.plan import Task
-from warpflat.core.atomic_files import output_folder, remove_unfinished
+from warpflat.core.atomic_files import output_folder
 from warpflat.core.errors import InputError
+from warpflat.core.hidden_files import remove_unfinished
 from warpflat.core.json_file import write_json
 from warpflat.core.text import one_line
 

@@ -8,24 +8,17 @@ This is also the one place that sees to it that no file is replaced from which a
 
 from __future__ import annotations
 
-import atexit
 import errno
-import functools
-import hashlib
 import json
 import os
-import platform
-import re
-import shutil
-import time
-import uuid
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
 from warpflat.core.errors import InputError, expect
 from warpflat.core.file_names import check_file_name
+from warpflat.core.hidden_files import ASIDE, FRESH, NEW, clear_hidden, hidden_name, is_unfinished, remove_unfinished
 from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_replace
 from warpflat.core.replace_file import is_open_elsewhere, replace_file
 
@@ -41,14 +34,8 @@ __all__ = [
     "output_folder",
     "prepare_folder",
     "remove_file",
-    "remove_unfinished",
     "require_writable",
 ]
-
-# .NAME-warpflat-MACHINE-PROCESS-RANDOM.SUFFIX
-_HIDDEN = re.compile(r"\..*-warpflat-(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{8}(\.\w+)?")
-# After so long without a change nobody writes it any more, on whichever machine [s].
-_ABANDONED = 24 * 3600.0
 
 
 def file_in(folder: Path, name: str, ending: str) -> Path:
@@ -67,88 +54,11 @@ def hidden_file(final: Path) -> Iterator[Path]:
     It lies beside `final`, or in the hidden folder of the run to which that belongs.
     """
     run = _run_into(final.parent)
-    path = _hidden(final if run is None else run.new / final.name)
+    path = hidden_name(final if run is None else run.new / final.name)
     try:
         yield path
     finally:
-        _clear(path)
-
-
-# Hidden files and folders that this process has made or is about to make, and the folders that go with each if nothing is left in them.
-_unfinished: dict[Path, Sequence[Path]] = {}
-
-
-def _hidden(final: Path, made: Sequence[Path] = ()) -> Path:
-    """Return a fresh hidden name beside `final`, which is remembered before a file of that name exists."""
-    mark = f"warpflat-{_machine()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"
-    path = final.absolute().with_name(f".{final.stem}-{mark}{final.suffix}")
-    _unfinished[path] = made
-    return path
-
-
-def _clear(path: Path) -> None:
-    """Remove a hidden file, or a hidden folder once the files kept in it are back in their places."""
-    with suppress(OSError):
-        if path.is_dir():
-            _put_back(path)
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
-    if not os.path.lexists(path):
-        for each in _unfinished.get(path, ()):
-            with suppress(OSError):  # it holds files, or could not be made
-                each.rmdir()
-        _unfinished.pop(path, None)
-
-
-@atexit.register
-def _clear_all() -> None:
-    """Remove the hidden files that an interruption has left."""
-    for path in list(_unfinished):
-        if f"-{os.getpid()}-" in path.name:  # not in a child, by whom the parent's are known too
-            _clear(path)
-
-
-def remove_unfinished(folder: Path) -> None:
-    """Remove the hidden files of killed runs, and put back the files that they had moved aside.
-
-    A run was killed if its process is gone, or if it is another machine's and a day has passed.
-    """
-    with suppress(OSError):
-        for path in folder.iterdir():
-            found = _HIDDEN.fullmatch(path.name)
-            if found and not path.is_symlink() and _is_abandoned(path, found["machine"], int(found["process"])):
-                _clear(path)
-
-
-def _is_abandoned(path: Path, machine: str, process: int) -> bool:
-    if os.name == "posix" and machine == _machine():
-        return not _is_running(process)
-    try:
-        latest = max(each.lstat().st_mtime for each in (path, *path.rglob("*")))
-        return time.time() - latest > _ABANDONED
-    except OSError:
-        return False
-
-
-def _is_running(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        return True  # somebody else's
-    return True
-
-
-@functools.cache
-def _machine() -> str:
-    """Return eight digits for the machine since its last start, and the container: within them a process number is unique."""
-    known = [platform.node()]
-    with suppress(OSError):
-        known.append(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii"))
-        known.append(os.readlink("/proc/self/ns/pid"))
-    return hashlib.sha256("\n".join(known).encode(errors="replace")).hexdigest()[:8]
+        clear_hidden(path)
 
 
 def require_writable(final: str | os.PathLike[str]) -> None:
@@ -218,7 +128,7 @@ class _Run:
     def __init__(self, folder: Path, hidden: Path) -> None:
         self.folder = folder
         self.hidden = hidden
-        self.new = hidden / _NEW
+        self.new = hidden / NEW
         self.names: dict[str, None] = {}
         self.removed: dict[str, None] = {}
         self._expected: set[str] = set()
@@ -262,12 +172,12 @@ class _Run:
         if not self.names:
             return
         self.refuse_inputs((*self.names, *self.removed))
-        aside = self.hidden / _ASIDE
+        aside = self.hidden / ASIDE
         fresh = [name for name in self.names if not os.path.lexists(self.folder / name)]
         name = ""
         try:
             aside.mkdir()
-            (self.hidden / _FRESH).write_text(json.dumps(fresh), encoding="utf-8")
+            (self.hidden / FRESH).write_text(json.dumps(fresh), encoding="utf-8")
             for name in self.removed:
                 with suppress(FileNotFoundError):
                     replace_file(self.folder / name, aside / name)
@@ -277,10 +187,8 @@ class _Run:
         except OSError as error:
             raise _cannot_write(self.folder / name, error) from error
         # From here on the new files are those of the folder, whatever happens to what is hidden.
-        (self.hidden / _FRESH).unlink()
+        (self.hidden / FRESH).unlink()
 
-
-_NEW, _ASIDE, _FRESH = "new", "aside", "fresh.json"
 
 _runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
 
@@ -292,7 +200,7 @@ def _run_into(folder: Path) -> _Run | None:
 
 def _going_on() -> tuple[_Run, ...]:
     """Return the runs that write at present."""
-    return tuple(run for run in _runs.get() if run.hidden in _unfinished)
+    return tuple(run for run in _runs.get() if is_unfinished(run.hidden))
 
 
 def _keep_aside(final: Path, aside: Path) -> None:
@@ -305,33 +213,6 @@ def _keep_aside(final: Path, aside: Path) -> None:
         os.link(final, aside, follow_symlinks=False)
     except (OSError, NotImplementedError):
         replace_file(final, aside)
-
-
-def _put_back(hidden: Path) -> None:
-    """Undo an unfinished exchange of files; to do it twice does no harm."""
-    try:
-        fresh = json.loads((hidden / _FRESH).read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError, RecursionError):
-        return  # it was not begun, or is complete
-    folder = hidden.parent
-    # Only plain names are followed: the list may have been put there by anybody.
-    listed = [name for name in fresh if isinstance(name, str)] if isinstance(fresh, list) else []
-    for name in listed:
-        plain = Path(name).name == name and name not in ("", "..")
-        if plain and not (hidden / _NEW / name).exists():
-            (folder / name).unlink(missing_ok=True)
-    in_the_way: OSError | None = None
-    for path in (hidden / _ASIDE).iterdir():
-        final = folder / path.name
-        if final.exists() and path.samefile(final):
-            continue  # it was not replaced; one that is open could not be moved, either
-        try:
-            replace_file(path, final)
-        except OSError as error:
-            in_the_way = error
-    if in_the_way is not None:
-        raise in_the_way
-    (hidden / _FRESH).unlink()
 
 
 @contextmanager
@@ -361,7 +242,7 @@ def output_folder(
         yield folder
         return
     made = _missing(folder)
-    run = _Run(folder, _hidden(folder / "run", made))
+    run = _Run(folder, hidden_name(folder / "run", made))
     before = _going_on()
     try:
         prepare_folder(folder)
@@ -380,7 +261,7 @@ def output_folder(
         try:
             _runs.set(before)
         finally:
-            _clear(run.hidden)
+            clear_hidden(run.hidden)
 
 
 def expect_files(folder: Path, files: Iterable[str]) -> None:

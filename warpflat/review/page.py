@@ -17,7 +17,7 @@ from warpflat.core.errors import InputError
 from warpflat.review.film import open_film, pack_film
 from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
 
-__all__ = ["pack_frames", "read_run", "review_folder", "write_review"]
+__all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
 
 # Nothing on the page may ask for anything from elsewhere, nor from the disk.
 _POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
@@ -75,6 +75,11 @@ def pack_frames(folder: Path) -> dict[str, Any] | None:
     return pack_film(open_film(latest_file(folder / "frames.usdc")))
 
 
+def pack_pictures(folder: Path, files: Sequence[str]) -> dict[str, str]:
+    """Pack the pictures among the files of a folder for the page; return them by name."""
+    return {file: _image(latest_file(folder / file)) for file in files if _is_shown(file)}
+
+
 def write_review(
     folder: Path,
     metrics: Mapping[str, Any],
@@ -82,6 +87,7 @@ def write_review(
     *,
     name: str,
     film: Callable[[], Mapping[str, Any] | None] | None = None,
+    pictures: Mapping[str, str] | None = None,
 ) -> str:
     """Write `review.html` and return its name.
 
@@ -91,6 +97,7 @@ def write_review(
         files: what the run has written, by name.
         name: of the run.
         film: gives what `pack_frames` has made of this folder, if it was called before.
+        pictures: of :func:`pack_pictures`, those that were packed before.
 
     Raises:
         InputError: a file cannot be read as what it is, or the page cannot be written.
@@ -98,7 +105,7 @@ def write_review(
     report_activity("writing the review page")
     path = folder / "review.html"
     try:
-        page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)))
+        page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)), pictures or {})
     except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
         raise InputError(f"{folder}: a file of the run is damaged ({error}); run the scene again") from error
     with atomic_path(path) as temporary:
@@ -112,6 +119,7 @@ def _page(
     files: Sequence[str],
     name: str,
     packed_film: Callable[[], Mapping[str, Any] | None],
+    pictures: Mapping[str, str],
 ) -> str:
     film, packed = "", None
     if "frames.usdc" in files:
@@ -127,7 +135,7 @@ def _page(
         ("Cuts and darts", ledger_table(metrics)),
         ("Seams", seam_table(metrics)),
         ("Body", size_table(metrics)),
-        ("Pictures", _pictures(folder, files)),
+        ("Pictures", _pictures(folder, files, pictures)),
         ("Pattern", _drawings(folder, files)),
         ("Notes", "<ul>" + "".join(f"<li>{escape(note)}</li>" for note in notes) + "</ul>" if notes else ""),
         ("Files", "<ul>" + "".join(f"<li>{escape(file)}</li>" for file in sorted(files)) + "</ul>"),
@@ -162,10 +170,14 @@ def _film_section(film: Mapping[str, Any]) -> str:
     )
 
 
-def _pictures(folder: Path, files: Sequence[str]) -> str:
-    found = [file for file in files if file.endswith(".png") and file != "contact_sheet.png"]
-    found.sort(key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
-    return "".join(f'<img alt="{escape(file)}" src="{_image(latest_file(folder / file))}">' for file in found)
+def _is_shown(file: str) -> bool:
+    return file.endswith(".png") and file != "contact_sheet.png"
+
+
+def _pictures(folder: Path, files: Sequence[str], packed: Mapping[str, str]) -> str:
+    shown = {**pack_pictures(folder, [file for file in files if file not in packed]), **packed}
+    order = sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
+    return "".join(f'<img alt="{escape(file)}" src="{shown[file]}">' for file in order)
 
 
 def _worn(folder: Path, files: Sequence[str]) -> str:
@@ -190,7 +202,7 @@ def _drawings(folder: Path, files: Sequence[str]) -> str:
 
 def _image(path: Path) -> str:
     """Return a picture as text: as WebP where that is smaller."""
-    from PIL import Image
+    from PIL import Image, WebPImagePlugin  # noqa: F401 (without the latter Pillow loads the plug-ins of all formats)
 
     own = path.read_bytes()
     best, kind, small = own, "png", io.BytesIO()

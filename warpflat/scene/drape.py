@@ -36,10 +36,10 @@ def write_drape(
     Raises:
         InputError: an unknown line, or the folder cannot be written.
     """
-    from warpflat.draping.write import write_drape_files
-
     if scene.settings.drape is None:
         return {}, []
+    from warpflat.draping.write import write_drape_files
+
     draped = drape_scene(scene, garment, device=device)
     output = scene.settings.output
     files = write_drape_files(draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted)

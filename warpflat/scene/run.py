@@ -73,10 +73,13 @@ def run_scene(
     with output_folder(out, files_of_run(scene), sources=sources) as folder:
         require_own_metrics(folder)
         if scene.settings.mannequin is not None:
-            from warpflat.scene.form_shaping import settle_shape
             from warpflat.scene.run_garment import run_garment
 
-            scene, notes = settle_shape(scene, device=device)
+            notes: tuple[str, ...] = ()
+            if scene.settings.auto_cut is not None or scene.settings.shape == "auto":
+                from warpflat.scene.form_shaping import settle_shape
+
+                scene, notes = settle_shape(scene, device=device)
             result = run_garment(scene, folder, on_progress=on_progress, device=device)
             return replace(result, notes=(*notes, *result.notes))
         return _run_surface(scene, folder, on_progress=on_progress, device=device, cuts=cuts)

@@ -37,7 +37,7 @@ from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fab
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
-from warpflat.scene.write import SceneResult, packed_film, review_files
+from warpflat.scene.write import SceneResult, packed_film, packed_pictures, review_files
 
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
 
@@ -331,12 +331,13 @@ def _finish(
     files = [*pictures.result(), *draped[1], "metrics.json"]
     if FrameSchedule(settings.output).wanted:
         files.append("frames.usdc")
+    images = packed_pictures(scene, out, files)  # while the pattern is written
     written = pattern.result()
     measured |= {**_metrics_of_sizes(graded), **draped[0], **written.metrics}
     if settings.mannequin is not None:
         measured["mannequin"] = {**measured["mannequin"], "table": settings.mannequin.model_dump(exclude_defaults=True)}
     files += written.files
-    files += [*review_files(scene, measured, out, tuple(files), film)]
+    files += [*review_files(scene, measured, out, tuple(files), film, images)]
     metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *written.notes, *name_notes, *manifest_notes)

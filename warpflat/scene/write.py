@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from warpflat.garment.pattern_files import WrittenPattern
     from warpflat.scene.load import Scene
 
-__all__ = ["SceneResult", "packed_film", "review_files", "write_pieces", "write_surface"]
+__all__ = ["SceneResult", "packed_film", "packed_pictures", "review_files", "write_pieces", "write_surface"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,9 +91,10 @@ def write_surface(
     files = [*files, *pictures.result(), "metrics.json"]
     if frames:
         files.append("frames.usdc")
+    images = packed_pictures(scene, folder, files)  # while the pattern is written
     drawn = pattern.result()
     measured = {**run_metrics(entries, pieces[0].network.device, more), **drawn.metrics}
-    files += [*drawn.files, *review_files(scene, measured, folder, (*files, *drawn.files), film)]
+    files += [*drawn.files, *review_files(scene, measured, folder, (*files, *drawn.files), film, images)]
     metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files)
     name_notes = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
     notes = (*notes, *drawn.notes, *name_notes, *manifest_notes)
@@ -110,8 +111,23 @@ def packed_film(scene: Scene, folder: Path) -> Mapping[str, Any] | None:
     return pack_frames(folder)
 
 
+def packed_pictures(scene: Scene, folder: Path, files: Sequence[str]) -> Mapping[str, str]:
+    """Return the pictures among the files that have been written, packed for `review.html` if the scene wants it."""
+    output = scene.settings.output
+    if not (output.picture and output.review):
+        return {}
+    from warpflat.review.page import pack_pictures
+
+    return pack_pictures(folder, files)
+
+
 def review_files(
-    scene: Scene, metrics: Mapping[str, Any], folder: Path, files: Sequence[str], film: Mapping[str, Any] | None
+    scene: Scene,
+    metrics: Mapping[str, Any],
+    folder: Path,
+    files: Sequence[str],
+    film: Mapping[str, Any] | None,
+    pictures: Mapping[str, str],
 ) -> list[str]:
     """Write `review.html` if the scene wants it, and return its name in a list.
 
@@ -121,10 +137,11 @@ def review_files(
         folder: in which all else has been written.
         files: that all else, by name.
         film: of :func:`packed_film`.
+        pictures: of :func:`packed_pictures`.
     """
     output = scene.settings.output
     if not (output.picture and output.review):
         return []
     from warpflat.review.page import write_review
 
-    return [write_review(folder, metrics, files, name=scene.name, film=lambda: film)]
+    return [write_review(folder, metrics, files, name=scene.name, film=lambda: film, pictures=pictures)]
