@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError
 from warpflat.flattening.datum import choose_and_name_datum, choose_datum
-from warpflat.flattening.develop import develop, flat_layout, geodesic_layout, profile_layout, winds_twice
+from warpflat.flattening.develop import develop, flat_layout, geodesic_layout, profile_layout
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.surface.cells import make_cells
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.half_edges import mesh_edges
+from warpflat.surface.injective import winds_twice
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.band import line_along_band
 from warpflat.surface.paths.lines import line_from_indices

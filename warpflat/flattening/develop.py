@@ -23,6 +23,7 @@ from warpflat.surface.cells import CellArrays, make_cells
 from warpflat.surface.connectivity import border_of, coincident_vertices, euler_characteristic, non_manifold_vertices
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges, half_edges_of, opposite_half_edges
+from warpflat.surface.injective import winds_twice
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.geodesic import signed_distance_and_station
 from warpflat.surface.triangles import corner_triangles, triangulate
@@ -37,7 +38,6 @@ __all__ = [
     "geodesic_layout",
     "profile_layout",
     "turn_upright",
-    "winds_twice",
 ]
 
 
@@ -209,31 +209,6 @@ def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
         return np.empty(0, dtype=np.int64)
     corner, _, weight = corner_triangles(cells.faces)
     return np.flatnonzero(signed_cell_areas(corner, positions) * weight <= _LEAST_AREA * cells.area)
-
-
-def winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:
-    """Return whether the faces wind more than once around an inner vertex, or by more than a full turn around a border vertex.
-
-    Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
-    """
-    corner, _, weight = corner_triangles(cells.faces)
-    # Around an inner vertex, once is one corner through which a ray to the right passes.
-    in_question = np.zeros(len(positions), dtype=bool)
-    in_question[border_of(surface)] = True
-    y, triangle = np.take(positions[:, 1], corner.T), weight == 1.0
-    passed = np.zeros(len(positions), dtype=np.int64)
-    for k in range(3):
-        passes = (y[k - 2] < y[k]) & (y[k - 1] >= y[k])
-        passed += np.bincount(corner[passes if k == 1 else passes & triangle, k], minlength=len(passed))
-    in_question |= passed > 1
-    turn = np.zeros(len(positions))
-    for k in range(3):
-        rows = np.flatnonzero(in_question[corner[:, k]] if k == 1 else in_question[corner[:, k]] & triangle)
-        p = positions[np.roll(corner[rows], -k, axis=1)]
-        u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-        angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.einsum("ij,ij->i", u, v))
-        turn += np.bincount(corner[rows, k], angle, minlength=len(turn))
-    return bool((turn > 2 * np.pi + 1e-6).any())
 
 
 def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:

@@ -17,20 +17,13 @@ from warpflat.flattening.develop import (
     geodesic_layout,
     profile_layout,
     turn_upright,
-    winds_twice,
 )
+from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.cells import make_cells
-from warpflat.surface.injective import is_injective
-from warpflat.surface.laplacian import factor_pays, laplacian_of
+from warpflat.surface.laplacian import factor_pays
 from warpflat.surface.mesh import Surface
 
 __all__ = ["choose_start", "given_start"]
-
-# A cell of less than this share of its area counts as mirrored.
-_LEAST_AREA = 0.01
-# As-rigid iterations end with one that moves the piece by no more than this share of its size, or after so many.
-_SMALL_STEP = 1e-3
-_MOST_STEPS = 20
 
 
 def choose_start(surface: Surface, datum: IntArray) -> Development:
@@ -49,11 +42,11 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
     ):
         return develop(surface, datum)
     first = _geodesic(surface, datum)
-    rigid = None if first is None else _as_rigid(surface, first)
+    rigid = None if first is None else as_rigid_layout(surface, first)
     if rigid is not None:
         return Development(positions=turn_upright(rigid, datum), method="geodesic", as_rigid=True, mended=True)
     development = develop(surface, datum)
-    rigid = _as_rigid(surface, development.positions)
+    rigid = as_rigid_layout(surface, development.positions)
     if rigid is None:
         return development
     return replace(development, positions=turn_upright(rigid, datum), as_rigid=True, mended=True)
@@ -67,26 +60,6 @@ def _geodesic(surface: Surface, datum: IntArray) -> FloatArray | None:
     whole, index = closed
     positions = geodesic_layout(whole, index[datum])
     return None if positions is None else positions[index]
-
-
-def _as_rigid(surface: Surface, positions: FloatArray) -> FloatArray | None:
-    """Return what as-rigid iterations make of a layout: none of its cells mirrored; None where that fails.
-
-    Once a layout is injective, they end before one that is not.
-    """
-    cells, laplacian = make_cells(surface), laplacian_of(surface)
-    size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
-    found, apart = None, False
-    for _ in range(_MOST_STEPS):
-        before, positions = positions, laplacian.as_rigid_step(positions)
-        if cells.least_shares(positions).min() > _LEAST_AREA:
-            lies_over_itself = not is_injective(surface, positions)
-            if apart and lies_over_itself:
-                break
-            found, apart = positions, not lies_over_itself
-        if np.sqrt(np.mean((positions - before) ** 2)) <= _SMALL_STEP * size:
-            break
-    return None if found is None or (not apart and winds_twice(surface, cells, found)) else found
 
 
 def given_start(surface: Surface, datum: IntArray, start: ArrayLike) -> Development:

@@ -204,20 +204,23 @@ def _misfits(
     if len(outside) == 0:
         return ()
     part = components(surface.faces[outside])
-    order, begin = counting_sort(part.astype(np.int32), int(part.max()) + 1)
-    found = []
-    for faces in np.split(outside[order], begin[1:-1]):
-        worst = faces[np.argmax(excess[faces])]
-        on_warp = abs(warp[worst]) >= abs(weft[worst])
-        found.append(
-            Misfit(
-                surface=surface,
-                faces=faces.astype(np.int32),
-                area=float(area[faces].sum()),
-                worst=float(warp[worst] if on_warp else weft[worst]),
-                limit=limit,
-                thread="warp" if on_warp else "weft",
-                vertex=int(surface.faces[worst, 0]),
-            )
+    count = int(part.max()) + 1
+    order, begin = counting_sort(part.astype(np.int32), count)
+    faces = outside[order].astype(np.int32)
+    regions = np.bincount(part, area[outside], minlength=count)
+    # Of each region the face of the largest excess, and of several the first.
+    worst = outside[np.lexsort((-excess[outside], part))[begin[:-1]]]
+    on_warp = np.abs(warp[worst]) >= np.abs(weft[worst])
+    strain = np.where(on_warp, warp[worst], weft[worst])
+    return tuple(
+        Misfit(
+            surface=surface,
+            faces=faces[begin[k] : begin[k + 1]],
+            area=float(regions[k]),
+            worst=float(strain[k]),
+            limit=limit,
+            thread="warp" if on_warp[k] else "weft",
+            vertex=int(surface.faces[worst[k], 0]),
         )
-    return tuple(sorted(found, key=lambda misfit: -misfit.area))
+        for k in np.argsort(-regions, kind="stable").tolist()
+    )

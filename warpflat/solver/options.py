@@ -20,9 +20,10 @@ class RelaxOptions:
 
     Attributes:
         time_step: h [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
-        energy_left, outline_left_mm: L-BFGS, with or without contact, ends when by estimate (`warpflat.solver.remainder`) at most this
-            share of the energy is still to be released, and no point of the outline will move by more than so many millimetres. With 0,
-            or where one of the tolerances below is stricter than its default, it ends by the tolerances alone.
+        energy_left, outline_left_mm: L-BFGS, with or without contact, and cycles on triangles end when by estimate
+            (`warpflat.solver.remainder`) at most this share of the energy is still to be released, and no point of the outline will move by
+            more than so many millimetres. With 0, or where one of the tolerances below is stricter than its default, they end by the
+            tolerances alone.
         energy_tolerance: eq. (11): relative change of the energy per step.
         residual_tolerance: largest force on a vertex over the mean force of the springs. After Gauss-Newton steps
             (`warpflat.solver.gauss_newton`) a piece also counts as at rest when its forces could release next to no

@@ -187,7 +187,7 @@ def euler_characteristic(faces: ArrayLike) -> int:
 
     It is 2 - 2 (handles) - (border loops) for one connected, orientable surface."""
     he = half_edges(faces)
-    return len(np.unique(he.tail)) - len(he.edges) + len(four_columns(faces))
+    return int(np.count_nonzero(np.bincount(he.tail))) - len(he.edges) + len(four_columns(faces))
 
 
 def orient(faces: ArrayLike) -> tuple[IntArray, int]:

@@ -15,6 +15,7 @@ from warpflat.core.launch import launch_each
 from warpflat.core.polyline import nearest_on_polyline, segment_lengths
 from warpflat.kernels.unfold import measure_triangles
 from warpflat.surface.mesh import Surface, once_per_surface
+from warpflat.surface.multilevel_preconditioner import multilevel_preconditioner
 from warpflat.surface.triangles import corner_triangles
 
 __all__ = [
@@ -33,6 +34,8 @@ __all__ = [
 # Relative tolerance of the diffusion, and the number of iterations after which it is solved directly, as slivers may need.
 _TOLERANCE = 1e-12
 _MOST_ITERATIONS = 1000
+# Surfaces of more vertices are smoothed with a preconditioner of several levels.
+_LARGE = 50_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,14 +215,21 @@ def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: fl
     if len(used) < count:
         system = system[used][:, used]
     # Heat does not spread far in one step, so a few dozen iterations suffice, where a factorisation would grow faster than the mesh.
+    # Where an edge is a small part of the length, sums over cubes save two thirds of them.
     first = energy[used] / area[used]
+    edge = float(np.sqrt(triangle_area.mean()))
+    inverse = (
+        diags_array(1.0 / system.diagonal())
+        if len(used) < _LARGE
+        else multilevel_preconditioner(system, surface.vertices[used], edge)
+    )
     solved, left = cg(
         system,
         energy[used],
         x0=first,
         rtol=_TOLERANCE,
         maxiter=_MOST_ITERATIONS,
-        M=diags_array(1.0 / system.diagonal()),
+        M=inverse,
     )
     smooth = np.zeros(count)
     smooth[used] = solved if left == 0 else spsolve(system.tocsc(), energy[used])

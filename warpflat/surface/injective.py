@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IndexArray, IntArray
-from warpflat.surface.cells import make_cells
-from warpflat.surface.connectivity import coincident_vertices, components_of
+from warpflat.surface.cells import CellArrays, make_cells
+from warpflat.surface.connectivity import border_of, coincident_vertices, components_of
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface
+from warpflat.surface.triangles import corner_triangles
 
 __all__ = [
     "BorderEdges",
@@ -26,6 +27,7 @@ __all__ = [
     "is_wound_once",
     "near_edges",
     "overlap_area",
+    "winds_twice",
 ]
 
 # The direction in which a line sweeps across border edges: aslant, since sides of pieces are upright or level.
@@ -247,3 +249,28 @@ def _area_beyond_first(tail: FloatArray, head: FloatArray) -> float:
     upwards, downwards = (tail[:, 1] <= y) & (y < head[:, 1]), (head[:, 1] <= y) & (y < tail[:, 1])
     winding = (upwards & left).sum(axis=1) - (downwards & ~left).sum(axis=1)
     return float(shapely.area(parts) @ np.maximum(winding - 1, 0))
+
+
+def winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:
+    """Return whether the faces wind more than once around an inner vertex, or by more than a full turn around a border vertex.
+
+    Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
+    """
+    corner, _, weight = corner_triangles(cells.faces)
+    # Around an inner vertex, once is one corner through which a ray to the right passes.
+    in_question = np.zeros(len(positions), dtype=bool)
+    in_question[border_of(surface)] = True
+    y, triangle = np.take(positions[:, 1], corner.T), weight == 1.0
+    passed = np.zeros(len(positions), dtype=np.int64)
+    for k in range(3):
+        passes = (y[k - 2] < y[k]) & (y[k - 1] >= y[k])
+        passed += np.bincount(corner[passes if k == 1 else passes & triangle, k], minlength=len(passed))
+    in_question |= passed > 1
+    turn = np.zeros(len(positions))
+    for k in range(3):
+        rows = np.flatnonzero(in_question[corner[:, k]] if k == 1 else in_question[corner[:, k]] & triangle)
+        p = positions[np.roll(corner[rows], -k, axis=1)]
+        u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+        angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.einsum("ij,ij->i", u, v))
+        turn += np.bincount(corner[rows, k], angle, minlength=len(turn))
+    return bool((turn > 2 * np.pi + 1e-6).any())

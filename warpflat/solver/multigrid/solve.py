@@ -17,7 +17,7 @@ next finer one (`warpflat.solver.multigrid.coarsen`). A cycle (full approximatio
 
 Nested iteration gives the start: the coarsest level is relaxed first, and each finer one starts from the coarser one's
 layout. The minimum is that of the fine level alone. The tolerances are those of `relax`, with a step's work as the
-unit.
+unit. On triangles a piece is also at rest when by estimate little is left (`warpflat.solver.remainder`).
 
 Where cycles make too little progress on triangle meshes, another method finishes: Gauss-Newton steps in soft cloth
 (`warpflat.solver.gauss_newton`), plain steps with a membrane.
@@ -46,6 +46,8 @@ from warpflat.solver.multigrid.levels import ENERGY_WORK, FORCE_WORK, Levels
 from warpflat.solver.multigrid.nested_iteration import nested_iteration
 from warpflat.solver.relax import Watch, relax
 from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.remainder import CycleRemainder, Remainder
+from warpflat.surface.injective import border_edges_of
 
 __all__ = ["multigrid_pays", "relax_multilevel"]
 
@@ -67,8 +69,10 @@ _RENEWALS = 8
 
 @dataclass(kw_only=True)
 class _PieceProgress:
-    """The progress of one piece: whether its cycles gain too little to go on, and its acceleration."""
+    """The progress of one piece: whether its cycles gain too little to go on, its acceleration, and what is left to relax."""
 
+    estimate: CycleRemainder
+    left: Remainder = field(default_factory=Remainder)
     gains_little: bool = False
     acceleration: SubspaceAcceleration = field(default_factory=SubspaceAcceleration)
 
@@ -105,15 +109,28 @@ class _CycledPieces:
         after_step = None if each_step is None else lambda: self.notify(each_step)
         if self.levels.is_outdated and self.renewals < _RENEWALS:
             self.levels, self.renewals = Levels(state), self.renewals + 1
-        work = state.work_units
+        work, before = state.work_units, state.positions()
+        for piece, own in zip(self.progress, state.vertex_ranges, strict=True):
+            piece.estimate.begin(before[own])
+        del before
         accelerated_cycle(self.levels, [piece.acceleration for piece in self.progress], after_step)
         state.hold_grain()
         self.levels.update_matrices()
         state.evaluate_at_rest()
         state.work_units += FORCE_WORK + ENERGY_WORK
         status = state.check_convergence(state.work_units - work)
+        if not self.levels.is_lattice:
+            self._end_where_little_is_left()
         for number, piece in enumerate(self.progress):
             piece.gains_little = least_gain is not None and status.gain[number] <= least_gain * status.potential[number]
+
+    def _end_where_little_is_left(self) -> None:
+        """Count pieces as at rest whose next cycles would change next to nothing; a residual force alone ends far too late."""
+        state, layout = self.state, self.state.positions()
+        for number, (piece, own) in enumerate(zip(self.progress, state.vertex_ranges, strict=True)):
+            gain, energy = float(state.status.gain[number]), float(state.status.potential[number])
+            piece.left = piece.estimate.add(gain, energy, layout[own])
+            state.status.at_rest[number] |= piece.left.is_small(state.options)
 
     def notify(self, call: Watch | None) -> None:
         """Pass the state and its last check to a callback, if there is one."""
@@ -176,7 +193,7 @@ def relax_multilevel(
     if len(levels.sizes) == 1:
         outcome = relax(state, watch=watch, each_step=each_step)
         return replace(outcome, notes=(f"relaxed by plain steps alone: {_NO_LEVEL}",))
-    pieces = _CycledPieces(state=state, levels=levels, progress=[_PieceProgress() for _ in state.vertex_ranges])
+    pieces = _CycledPieces(state=state, levels=levels, progress=_progress_of(state.network.pieces))
     if nested and not from_cascade:
         nested_iteration(levels)
         state.hold_grain()
@@ -186,7 +203,13 @@ def relax_multilevel(
     state.evaluate_at_rest()
     state.work_units += FORCE_WORK
     notes = _cycle_until_rest(pieces, work_before, least_gain=least_gain, watch=watch, each_step=each_step)
-    return replace(state.make_outcome(steps_before, work_before, began_at=began_at), notes=notes)
+    outcome = state.make_outcome(steps_before, work_before, began_at=began_at)
+    left = max((piece.left for piece in pieces.progress), key=lambda each: each.outline_mm)
+    return replace(outcome, notes=notes, left=left if np.isfinite(left.outline_mm) else None)
+
+
+def _progress_of(networks: Sequence[SpringNetwork]) -> list[_PieceProgress]:
+    return [_PieceProgress(estimate=CycleRemainder(border_edges_of(network.surface).tail)) for network in networks]
 
 
 def _cycle_until_rest(
@@ -207,6 +230,8 @@ def _cycle_until_rest(
     while not pieces.finished.all() and pieces.state.work_units - work_before < options.max_steps:
         spent = pieces.state.work_units - work_before
         if spent >= patience:
+            for piece in pieces.progress:
+                piece.left = Remainder()
             if whole.network.model == "membrane":
                 relax(pieces.state, watch=watch, each_step=each_step)
                 notes = (f"plain steps went on after {spent:.0f} work units: {_SLOW_CYCLES}",)

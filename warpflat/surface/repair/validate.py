@@ -35,6 +35,8 @@ __all__ = ["check_positions", "make_surface"]
 
 # Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
 _SMALLEST, _LARGEST = 1e-20, 1e20
+# Odd factors by which the vertices of a face are mixed to one number.
+_HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93], dtype=np.uint64)
 
 
 @dataclass
@@ -236,6 +238,11 @@ def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> 
 
 def _drop_double_faces(mesh: _Mesh) -> None:
     key = np.sort(mesh.faces, axis=1)
+    # Faces with different hashes are different, and hardly any two that differ have the same.
+    hashed = key.astype(np.uint64) @ _HASH
+    hashed.sort()
+    if not (hashed[1:] == hashed[:-1]).any():
+        return
     _, first = np.unique(key, axis=0, return_index=True)
     if len(first) == len(mesh.faces):
         return
@@ -304,7 +311,8 @@ def _separate_touching_fans(mesh: _Mesh) -> None:
     """Give each fan of faces its own vertex where several touch in one point only."""
     he = half_edges(mesh.faces)
     fan = corner_fans(mesh.faces)
-    _, first = np.unique(fan, return_index=True)
+    # Fans are numbered by their first corners.
+    first = np.flatnonzero(np.diff(np.maximum.accumulate(fan), prepend=-1))
     vertex = he.tail[first]
     order = np.lexsort((first, vertex))
     again = np.zeros(len(first), dtype=bool)
@@ -326,7 +334,7 @@ def _separate_touching_fans(mesh: _Mesh) -> None:
 
 
 def _drop_unused(mesh: _Mesh) -> None:
-    used = np.unique(mesh.faces[mesh.faces >= 0])
+    used = _used_vertices(mesh.faces)
     unused = len(mesh.vertices) - len(used)
     if unused == 0:
         return
@@ -334,6 +342,11 @@ def _drop_unused(mesh: _Mesh) -> None:
     new[used] = np.arange(len(used), dtype=np.int32)
     mesh.faces = new[mesh.faces]
     mesh.vertices, mesh.index = mesh.vertices[used], mesh.index[used]
+
+
+def _used_vertices(faces: IntArray) -> NDArray[np.int64]:
+    """Return the vertices that faces (filled up with -1) have, sorted."""
+    return np.flatnonzero(np.bincount(faces.ravel() + 1)[1:])
 
 
 def _renumber_lines(mesh: _Mesh, paths: Mapping[str, IntArray]) -> dict[str, list[int]]:
@@ -415,7 +428,7 @@ def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: Floa
             f"neighbours, {before - used} of their vertices fell away: {names}"
         )
         mesh.faces, mesh.origin = faces, mesh.origin[of]
-        keep = np.unique(faces[faces >= 0])
+        keep = _used_vertices(faces)
         new = np.full(before + 1, -1, dtype=np.int32)
         new[keep] = np.arange(len(keep), dtype=np.int32)
         lines = {key: new[line].tolist() for key, line in lines.items()}

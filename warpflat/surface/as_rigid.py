@@ -1,0 +1,39 @@
+"""As-rigid iterations (Liu et al. 2008): a layout is unfolded, and comes near to the shapes that its faces have on the body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.surface.cells import make_cells
+from warpflat.surface.injective import is_injective, winds_twice
+from warpflat.surface.laplacian import laplacian_of
+from warpflat.surface.mesh import Surface
+
+__all__ = ["as_rigid_layout"]
+
+# A cell of less than this share of its area counts as mirrored.
+_LEAST_AREA = 0.01
+# As-rigid iterations end with one that moves the piece by no more than this share of its size, or after so many.
+_SMALL_STEP = 1e-3
+_MOST_STEPS = 20
+
+
+def as_rigid_layout(surface: Surface, positions: FloatArray) -> FloatArray | None:
+    """Return what as-rigid iterations make of a layout: none of its cells mirrored; None where that fails.
+
+    Once a layout is injective, they end before one that is not.
+    """
+    cells, laplacian = make_cells(surface), laplacian_of(surface)
+    size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    found, apart = None, False
+    for _ in range(_MOST_STEPS):
+        before, positions = positions, laplacian.as_rigid_step(positions)
+        if cells.least_shares(positions).min() > _LEAST_AREA:
+            lies_over_itself = not is_injective(surface, positions)
+            if apart and lies_over_itself:
+                break
+            found, apart = positions, not lies_over_itself
+        if np.sqrt(np.mean((positions - before) ** 2)) <= _SMALL_STEP * size:
+            break
+    return None if found is None or (not apart and winds_twice(surface, cells, found)) else found
