@@ -1,6 +1,6 @@
 """The stop of a relaxation: what it says is left, beside what a run ten times as long still finds, and the time that it took too long.
 
-    OMP_NUM_THREADS=1 python benchmarks/stopping.py [FILES] [--units m] [--fabrics isotropic linen] [--repeats 2]
+    OMP_NUM_THREADS=1 python benchmarks/stopping.py [FILES] [--units m] [--fabrics isotropic linen denim] [--repeats 2]
 
 Without files: forms of two sizes in six fabrics, split and irregular grids, a crack, discs of the bodies in WARPFLAT_DATA. None of them
 served to choose the estimate's factors.
@@ -166,7 +166,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE")
     parser.add_argument("--units", default="m", help="of files that carry none")
-    parser.add_argument("--fabrics", nargs="+", default=["isotropic", "linen"])
+    parser.add_argument("--fabrics", nargs="+", default=["isotropic", "linen", "denim"])
     parser.add_argument("--repeats", type=int, default=2, help="the fastest counts")
     chosen = parser.parse_args()
     choose_clock("cpu")
