@@ -287,6 +287,8 @@ def test_what_a_hidden_folder_lists_of_other_places_is_left_alone(tmp_path: Path
 
 # --- an interruption at every line
 
+_WATCHED = ("/atomic_files.py", "/hidden_files.py", "contextlib.py")
+
 
 def _interrupted(action: Callable[[], None], at: int, watched: tuple[str, ...]) -> bool:
     """Whether the action was interrupted, as by Ctrl-C, before the line of that number among those of the files `watched`."""
@@ -324,7 +326,7 @@ def _frames(folder: Path) -> None:
 )  # interrupted while a generator is closed
 @pytest.mark.parametrize(
     ("action", "watched", "step"),
-    [(_change, ("atomic.py", "contextlib.py"), 1), (_frames, ("atomic.py", "contextlib.py", "/usd.py"), 7)],
+    [(_change, _WATCHED, 3), (_frames, (*_WATCHED, "/usd.py"), 23)],
     ids=["folder", "frames"],
 )
 def test_an_interruption_anywhere_leaves_nothing_behind(
@@ -347,7 +349,7 @@ def test_an_interruption_anywhere_leaves_nothing_behind(
     # A folder that was made for it goes, too.
     fresh = tmp_path / "other" / "out"
     for number in range(0, 200, 5):
-        if _interrupted(lambda: _change_fresh(fresh), number, ("atomic.py", "contextlib.py")):
+        if _interrupted(lambda: _change_fresh(fresh), number, _WATCHED):
             gc.collect()
             hidden_files._clear_all()
             assert not (tmp_path / "other").exists(), number

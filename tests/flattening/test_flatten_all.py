@@ -24,7 +24,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
 from warpflat.model.wear import Wear
 from warpflat.solver.multigrid.levels import Levels
-from warpflat.solver.multigrid.solve import _CycledPieces, _PieceProgress, multigrid_pays, relax_multilevel
+from warpflat.solver.multigrid.solve import _CycledPieces, _progress_of, multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
@@ -339,7 +339,7 @@ def test_pieces_that_are_done_are_cycled_no_more():
     start = np.concatenate([each.vertices[:, :2] for each in surfaces])
     state = Relaxation(join_networks(parts), RelaxOptions(), start=start)
     state.check_start()
-    cycles = _CycledPieces(state=state, levels=Levels(state), progress=[_PieceProgress() for _ in parts])
+    cycles = _CycledPieces(state=state, levels=Levels(state), progress=_progress_of(parts))
     assert cycles.without_finished() is None
     cycles.progress[1].gains_little = cycles.progress[2].gains_little = True
     left = cycles.without_finished()
