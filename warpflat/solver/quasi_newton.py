@@ -289,12 +289,12 @@ class _Cloth:
 
     def at(self, positions: FloatArray) -> Point:
         """Evaluate a layout."""
-        self.state.position.assign(positions)
+        self.state.place(positions)
         return Point(positions=positions, energy=float(self.state.potentials().sum()))
 
     def gradient(self, point: Point) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
-        self.state.position.assign(point.positions)
+        self.state.place(point.positions)
         return -self.state.forces()
 
     def solver(self, point: Point) -> Solve:
@@ -393,7 +393,7 @@ def _check(state: Relaxation, descent: Descent[Point], near: bool, left: Remaind
         near: whether it may be at rest.
         left: what is left by estimate.
     """
-    state.position.assign(descent.point.positions)
+    state.place(descent.point.positions)
     state.evaluate_at_rest()
     status, options = state.check_convergence(1.0), state.options
     residual = status.residual * _without_reaction(state)
