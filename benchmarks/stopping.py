@@ -5,9 +5,10 @@
 Without files: forms of two sizes in six fabrics, split and irregular grids, a crack, discs of the bodies in WARPFLAT_DATA. None of them
 served to choose the estimate's factors.
 
-`left` is what the last stage of `flatten` says in `metrics.json`, `found` what ten times as many iterations still release of the energy and
-how far they move the outline. `over` tells which of both was not bounded. `ratio` is the processor time of `flatten` over that after which
-energy and outline were within their tolerances for good. Pieces that multigrid has relaxed have no estimate and are left out.
+`left` is what the last stage of `flatten` says in `metrics.json`. `found` is what the same run, ten times as long, still releases of the
+energy, and how far it moves the outline; directions of springs are measured anew all the while. `over` tells which of both was not bounded.
+`ratio` is the processor time of `flatten` over that after which energy and outline were within their tolerances for good. Pieces that
+multigrid has relaxed have no estimate and are left out.
 """
 
 from __future__ import annotations
@@ -28,11 +29,8 @@ from real import default_files
 import warpflat
 from warpflat.core.arrays import FloatArray
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.result import Flattening
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.quasi_newton import relax_quasi_newton
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.connectivity import border_of, components
 from warpflat.surface.io.read import read_scan, read_surface
@@ -102,14 +100,13 @@ def _fresh(surface: Surface) -> Surface:
     return replace(surface, vertices=surface.vertices.copy(), faces=surface.faces.copy(), of_faces={})
 
 
-def _later(result: Flattening, iterations: int) -> tuple[Relaxation, FloatArray]:
-    """Return the layout after so many iterations more, and a relaxation that measures energies of layouts."""
-    line = result.datum
-    grain = GrainAlignment(lower=int(line[0]), upper=int(line[-1]), vertices=slice(0, len(result.positions)))
-    options = RelaxOptions(energy_left=0.0, energy_tolerance=0.0, residual_tolerance=1e-12, max_steps=5 * iterations)
-    state = Relaxation(result.network, options, start=result.positions, alignments=[grain])
-    relax_quasi_newton(state)
-    return state, state.positions()
+def _later(surface: Surface, fabric: str, work_units: float) -> tuple[Relaxation, FloatArray]:
+    """Return the layout of the same run after so much work, and a relaxation that measures energies of layouts with its network."""
+    options = RelaxOptions(
+        energy_left=0.0, energy_tolerance=0.0, residual_tolerance=1e-12, max_steps=int(work_units), gap_mm=0.0
+    )
+    result = warpflat.flatten(_fresh(surface), fabric=fabric, device="cpu", relax=options)
+    return Relaxation(result.network, options, start=result.positions), result.positions
 
 
 def measure(name: str, surface: Surface, fabric: str, repeats: int) -> tuple[bool, float] | None:
@@ -133,7 +130,7 @@ def measure(name: str, surface: Surface, fabric: str, repeats: int) -> tuple[boo
     if stage.left is None:
         return None
     looks.append((total, result.positions))
-    state, end = _later(result, _LONGER * max(stage.steps, 20))
+    state, end = _later(surface, fabric, _LONGER * max(stage.work_units, 70.0))
     border, options = border_of(surface), RelaxOptions()
 
     def energy(positions: FloatArray) -> float:

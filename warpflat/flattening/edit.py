@@ -18,8 +18,10 @@ from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.applied_cut import AppliedCut, cut_sides
 from warpflat.flattening.datum import datum_extent
+from warpflat.flattening.keep_apart import keep_apart
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.relax_pieces import RelaxationTask, keep_apart, relax_pieces
+from warpflat.flattening.relax_pieces import relax_pieces
+from warpflat.flattening.relaxation_task import RelaxationTask
 from warpflat.flattening.result import Flattening
 from warpflat.solver.multigrid.coarsen import inherit_levels
 from warpflat.solver.options import RelaxOptions, given_options

@@ -19,9 +19,11 @@ from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
 from warpflat.flattening.develop import Development
+from warpflat.flattening.keep_apart import keep_apart
 from warpflat.flattening.nearly_closed import nearly_closed_notes
 from warpflat.flattening.progress import Progress, Stage
-from warpflat.flattening.relax_pieces import RelaxationTask, RelaxedPiece, keep_apart, relax_pieces
+from warpflat.flattening.relax_pieces import relax_pieces
+from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
 from warpflat.flattening.result import Flattening
 from warpflat.flattening.start import choose_start, given_start
 from warpflat.model.membrane import Model, check_model

@@ -8,43 +8,30 @@ its directions are updated between them.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-import warp as wp
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.sums import range_offsets
-from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric, grain_axes
-from warpflat.fabric.library import as_fabric
-from warpflat.flattening.develop import Development
-from warpflat.flattening.harmonic_layout import harmonic_layout
-from warpflat.flattening.progress import CONTACT, Progress, Stage
+from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
 from warpflat.model.join import join_networks
-from warpflat.model.membrane import Model
 from warpflat.model.network import SpringNetwork
-from warpflat.model.strain import strain_energy
-from warpflat.model.wear import Wear, intended_stretch
-from warpflat.solver.contact import open_cracks, relax_with_contact, swirl
 from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.grain_alignment import grain_alignments
 from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of, is_coarsest
 from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
-from warpflat.solver.options import RelaxOptions
 from warpflat.solver.quasi_newton import Measure, quasi_newton_pays, relax_quasi_newton
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
-from warpflat.surface.connectivity import components_of
-from warpflat.surface.injective import overlap_area
-from warpflat.surface.mesh import Surface
 
 Scheme = Literal["quasi-newton", "multigrid", "gauss-newton", "steps"]
 
-__all__ = ["RelaxationTask", "RelaxedPiece", "keep_apart", "relax_pieces"]
+__all__ = ["relax_pieces"]
 
 
 # Tolerances of all rounds but the last are looser by this factor: their layout only serves to update directions.
@@ -53,164 +40,10 @@ _ROUND_TOLERANCE = 30.0
 _ROUND_GAIN = 3e-3
 # and once a layout that can be free of strain is strained by no more than this.
 _ROUND_STRAIN = 1e-6
-# Directions are final once a round has moved the piece by no more than this share of its size, on average. Each round leaves about a
-# fifth of the error before it, so that more rounds than this would change little.
+# Directions are final once a round has moved the piece by no more than this share of its size, on average.
 _SETTLED_SHIFT = 2e-4
-_MAX_UPDATES = 6
-# Where contact costs much, relaxation also starts from its layout swirled by these angles about the middle [rad].
-_SWIRLS = (-1.5, 1.5)
 # Quads across the grain get a note where they are this many times as stiff in shear as the cloth.
 _NOTED_EXCESS = 3.0
-
-
-@dataclass
-class RelaxationTask:
-    """A piece that is to be relaxed, and the record of its relaxation.
-
-    Attributes:
-        surface, fabric, grain_angle, model, wear: the piece and its cloth, as `flatten` takes them.
-        device, options: where and how it is relaxed.
-        callback: called with its `Progress`.
-        datum: vertices of the line that stays upright.
-        stage_name: name of the stage in its history.
-        history: a row per convergence check: step, model energy [J], guard energy [J], residual.
-        notes: what was chosen or is worth a warning, one sentence each.
-        stopped: whether the callback has stopped the relaxation.
-    """
-
-    surface: Surface
-    fabric: Fabric
-    grain_angle: float
-    device: wp.Device
-    options: RelaxOptions
-    callback: Callable[[Progress], bool | None] | None
-    datum: IntArray
-    stage_name: str = "relax"
-    model: Model = "springs"
-    wear: Wear | None = None
-
-    history: list[tuple[float, float, float, float]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    stopped: bool = False
-
-    def shrink_to_rest(self, development: Development) -> Development:
-        """Shrink a development by the mean stretch with which the piece is to be worn; return it as it is without one."""
-        stretch, _ = self._wanted_stretch(development.positions)
-        if stretch is None:
-            return development
-        shrink = sum(
-            np.outer(axis, axis) / s for axis, s in zip(grain_axes(self.grain_angle), stretch.mean(0), strict=True)
-        )
-        return replace(development, positions=development.positions @ shrink)
-
-    def _wanted_stretch(self, positions: FloatArray) -> tuple[FloatArray | None, tuple[str, ...]]:
-        if self.wear is None:
-            return None, ()
-        return intended_stretch(self.surface, self.fabric, positions, self.wear, grain_angle=self.grain_angle)
-
-    def build_network(self, positions: FloatArray) -> SpringNetwork:
-        """Build the piece's network, with directions measured in a layout (#V by 2 [m])."""
-        stretch, notes = self._wanted_stretch(positions)
-        network = SpringNetwork.build(
-            self.surface,
-            self.fabric,
-            positions,
-            grain_angle=self.grain_angle,
-            device=self.device,
-            model=self.model,
-            stretch=stretch,
-        )
-        self.notes += [note for note in notes if note not in self.notes]
-        return network
-
-    def build_isotropic_network(self, positions: FloatArray) -> SpringNetwork:
-        """Build the network of the piece as an isotropic sheet without a stretch, with directions measured in a layout (#V by 2 [m]).
-
-        Such a sheet does not shear more easily than it stretches, so that it unfolds from a bad start without folds of its threads.
-        """
-        reference = as_fabric(DEFAULT_FABRIC)
-        return SpringNetwork.build(
-            self.surface, reference, positions, grain_angle=self.grain_angle, device=self.device, model=self.model
-        )
-
-    def needs_isotropic_start(self, development: Development) -> bool:
-        """Return whether the piece is relaxed as an isotropic sheet first.
-
-        A harmonic map stores so much energy that cloth which is soft in shear would come to rest in folds of its threads.
-        """
-        return development.method == "harmonic" and not development.as_rigid and not self.fabric.is_isotropic
-
-    def follows_layout(self, network: SpringNetwork) -> bool:
-        """Return whether the energy of the piece's network depends on the layout in which it is measured."""
-        springs = self.model == "springs"
-        return self._is_tight or (springs and (not self.fabric.is_isotropic or network.spring_arrays.long_quads > 0))
-
-    @property
-    def _is_tight(self) -> bool:
-        """Whether the lengths for an intended stretch depend on the layout."""
-        return self.wear is not None and self.wear.is_tight and (self.model == "springs" or bool(self.wear.pressure))
-
-    def max_direction_updates(self, *, mended: bool = False) -> int:
-        """Return how many times directions are updated at most.
-
-        That is several times where springs, or the lengths for a stretch, depend on the layout; once where only the steps of a
-        membrane do, or where the development was repaired; and not at all otherwise.
-
-        Args:
-            mended: whether folds of the development were repaired.
-        """
-        alike = self.fabric.is_isotropic or bool(self.surface.is_quad.all())
-        return _MAX_UPDATES if self._is_tight or (self.model == "springs" and not alike) else int(mended or not alike)
-
-    def report_progress(self, stage: str, state: Relaxation, piece: int) -> None:
-        """Call the callback with the state of this piece at the last convergence check; it may stop the relaxation."""
-        if self.callback is not None:
-            check = state.status
-            answer = self.callback(
-                Progress(
-                    stage,
-                    state,
-                    energies=Energies(*check.energies[piece].tolist()),
-                    residual=float(check.residual[piece]),
-                    max_steps=self.options.max_steps,
-                    piece=piece,
-                )
-            )
-            self.stopped = self.stopped or answer is True
-
-    def make_stage(
-        self, network: SpringNetwork, positions: FloatArray, outcome: Outcome, *, name: str | None = None
-    ) -> Stage:
-        """Make the entry of the history for the stage that has ended with an outcome, by default the task's own."""
-        return Stage(
-            name=name or self.stage_name,
-            model_energy_j=outcome.energies.potential,
-            guard_energy_j=outcome.energies.guard,
-            strain_energy_j=strain_energy(network, positions),
-            steps=outcome.steps,
-            work_units=outcome.work_units,
-            seconds=outcome.seconds,
-            converged=outcome.converged,
-            residual=outcome.residual,
-            left=outcome.left,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RelaxedPiece:
-    """A relaxed piece.
-
-    Attributes:
-        network: with directions as they were measured last.
-        positions: #V by 2, the layout [m].
-        begin: energies at the start.
-        outcome: how it ended; the seconds are those of all pieces that were relaxed with it.
-    """
-
-    network: SpringNetwork
-    positions: FloatArray
-    begin: Energies
-    outcome: Outcome
 
 
 def _grain_notes(network: SpringNetwork) -> list[str]:
@@ -263,59 +96,6 @@ def relax_pieces(
         # The springs of earlier rounds are gone: only those that the pattern has count.
         task.notes += _grain_notes(relaxed[number].network)
     return [relaxed[number] for number in range(len(tasks))]
-
-
-def keep_apart(
-    task: RelaxationTask, end: RelaxedPiece, start: FloatArray, cut_sides: IntArray
-) -> tuple[FloatArray, tuple[Stage, ...]]:
-    """Relax a piece once more, with contact, if it has come to rest lying over itself; add a note.
-
-    Args:
-        task: of the piece.
-        end: the piece relaxed without contact.
-        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective [m].
-        cut_sides: the vertices on the sides of its cuts; a cut whose sides lie over each other is left as it is.
-
-    Returns:
-        The layout, #V by 2 [m], and the stages: that of the relaxation, and "contact" if there was one that succeeded.
-    """
-    surface, network, free = end.network.surface, end.network, end.positions
-    relaxed = task.make_stage(network, free, end.outcome)
-    overlap = overlap_area(surface, free, cut_sides) if task.options.gap_mm and not task.stopped else 0.0
-    if overlap == 0.0:
-        return free, (relaxed,)
-    words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
-    alignments = grain_alignments(surface, task.datum, free)
-    starts = [lambda: open_cracks(surface, start)]
-    if not components_of(surface).any():
-        starts.append(lambda: harmonic_layout(surface))
-    for first in starts:
-        state = Relaxation(network, task.options, start=first(), alignments=alignments)
-        outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
-        if outcome is not None and outcome.converged:
-            before = relaxed.model_energy_j
-            if outcome.energies.potential > (1.0 + task.options.contact_share) * before:
-                state, outcome = _swirled(state, outcome)
-            after = outcome.energies.potential
-            share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
-            task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
-            return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
-    task.notes.append(f"{words}, and contact could not part it: cut it apart there")
-    return free, (relaxed,)
-
-
-def _swirled(state: Relaxation, outcome: Outcome) -> tuple[Relaxation, Outcome]:
-    """Return the lower end of a relaxation with contact (a state and its outcome) and those that follow from its layout swirled.
-
-    Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be wound up or unwound.
-    """
-    best, layout = (state, outcome), state.positions()
-    for turn in _SWIRLS:
-        other = Relaxation(state.network, state.options, start=swirl(layout, turn), alignments=state.alignments)
-        end = relax_with_contact(other, 1e-3 * state.options.gap_mm)
-        if end is not None and end.converged and end.energies.potential < best[1].energies.potential:
-            best = other, end
-    return best
 
 
 def _plain_step_notes(task: RelaxationTask, network: SpringNetwork) -> list[str]:

@@ -87,7 +87,7 @@ class _SewnCloth:
         touch = NO_CONTACTS if self._barrier is None else self._barrier(positions)
         energy = touch.energy
         if np.isfinite(energy):
-            state.position.assign(positions)
+            state.place(positions)
             energy += float(state.potentials().sum())
         if np.isfinite(energy):
             energy += state.network.seam_energy(state.position)
@@ -95,7 +95,7 @@ class _SewnCloth:
 
     def gradient(self, point: ContactPoint) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
-        self._state.position.assign(point.positions)
+        self._state.place(point.positions)
         gradient = -self._state.forces()
         point.touch.add_gradient(gradient)
         return gradient
@@ -173,7 +173,7 @@ def relax_under_equations(
     network, options, violations = state.network, state.options, list[float]()
     start = state.positions()
     align_grain(state.alignments, start)
-    state.position.assign(start)
+    state.place(start)
     state.check_start()
     problem = _SewnCloth(state, gap)
     descent = Descent(problem, problem.at(state.positions()))
@@ -181,7 +181,7 @@ def relax_under_equations(
     while True:
         _run_round(descent, state)
         state.work_units = work_before + descent.work_units
-        state.position.assign(descent.point.positions)
+        state.place(descent.point.positions)
         residuals = network.seam_residuals(state.position)
         violations.append(violation(residuals))
         if on_round is not None:

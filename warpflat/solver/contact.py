@@ -203,13 +203,13 @@ class _Problem:
         touch = self._barrier(positions)
         energy = touch.energy
         if np.isfinite(energy):
-            self.state.position.assign(positions)
+            self.state.place(positions)
             energy += float(self.state.potentials().sum())
         return ContactPoint(positions=positions, energy=energy, touch=touch)
 
     def gradient(self, point: ContactPoint) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
-        self.state.position.assign(point.positions)
+        self.state.place(point.positions)
         gradient = -self.state.forces()
         point.touch.add_gradient(gradient)
         return gradient
@@ -255,7 +255,7 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     residual = problem.residual(descent.point)
     end = descent.point.positions.copy()
     align_grain(state.alignments, end)
-    state.position.assign(end)
+    state.place(end)
     state.steps += descent.iterations
     state.work_units += descent.work_units
     return Outcome(

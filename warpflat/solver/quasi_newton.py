@@ -25,7 +25,7 @@ from warpflat.solver.grain_alignment import GrainAlignment, align_grain
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import Watch
 from warpflat.solver.relaxation import Relaxation
-from warpflat.solver.remainder import REMEMBERED, Remainder, RemainderEstimate
+from warpflat.solver.remainder import Remainder, RemainderEstimate, looked_back
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.laplacian import factor_pays, laplacian_of
 
@@ -45,6 +45,8 @@ _LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
 # Work units of an iteration: two evaluations of the forces and the solution; and of each layout that is tried.
 _WORK, _TRIAL_WORK = 3.0, 0.5
 
+# Directions are measured no more often than after so many iterations.
+_RENEWAL = 6
 # A rise of the energy from one measurement of directions to the next, as a share, that makes them follow the layout by less.
 _RISE = 1e-4
 
@@ -211,8 +213,9 @@ class Descent(Generic[P]):
     @property
     def gain(self) -> float:
         """The range of the last few energies, which the iterations between have released [J]; infinite if there were fewer."""
-        last = self.history[-1 - _REST_INTERVAL :]
-        return max(last) - min(last) if len(last) > _REST_INTERVAL else np.inf
+        count = max(_REST_INTERVAL, looked_back(self.iterations))
+        last = self.history[-1 - count :]
+        return max(last) - min(last) if len(last) > count else np.inf
 
     @property
     def iterations(self) -> int:
@@ -286,12 +289,12 @@ class _Cloth:
 
     def at(self, positions: FloatArray) -> Point:
         """Evaluate a layout."""
-        self.state.position.assign(positions)
+        self.state.place(positions)
         return Point(positions=positions, energy=float(self.state.potentials().sum()))
 
     def gradient(self, point: Point) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
-        self.state.position.assign(point.positions)
+        self.state.place(point.positions)
         return -self.state.forces()
 
     def solver(self, point: Point) -> Solve:
@@ -308,10 +311,15 @@ class _Directions:
 
     def __init__(self, measure: Measure, positions: FloatArray) -> None:
         self._measure, self._layout = measure, positions
-        self._share, self._energy = 1.0, np.inf
+        self._share, self._energy, self._measured = 1.0, np.inf, 0
 
-    def renew(self, state: Relaxation, point: Point) -> Relaxation:
-        """Return the state to go on with from a point."""
+    def is_due(self, iterations: int) -> bool:
+        """Return whether directions are to be measured after so many iterations: once on each stretch that is looked back upon."""
+        return iterations - self._measured >= max(_RENEWAL, looked_back(iterations))
+
+    def renew(self, state: Relaxation, point: Point, iterations: int) -> Relaxation:
+        """Return the state to go on with from a point, reached after so many iterations."""
+        self._measured = iterations
         self._layout = self._layout + self._share * (point.positions - self._layout)
         new = self._measure(point.positions, self._layout)
         new.steps, new.restarts, new.work_units = state.steps, state.restarts, state.work_units
@@ -360,9 +368,6 @@ def relax_quasi_newton(
         state.work_units = work_before + descent.work_units
         if moved and each_step is not None:
             each_step(state, state.status.total, state.status.worst_residual)
-        if directions is not None and descent.iterations % REMEMBERED == 0:
-            problem.state = state = directions.renew(state, descent.point)
-            descent.renew()
         left = estimate.add(descent.point.energy, descent.point.positions)
         near = left.is_small(options) or descent.is_at_rest(options)
         done = not moved or state.work_units - work_before >= options.max_steps
@@ -372,6 +377,9 @@ def relax_quasi_newton(
             done |= bool(state.status.at_rest.all())
             if watch is not None:
                 watch(state, state.status.total, state.status.worst_residual)
+        if not done and directions is not None and directions.is_due(descent.iterations):
+            problem.state = state = directions.renew(state, descent.point, descent.iterations)
+            descent.renew()
     outcome = state.make_outcome(steps_before, work_before, began_at=began_at)
     return replace(outcome, left=left if np.isfinite(left.outline_mm) else None)
 
@@ -385,7 +393,7 @@ def _check(state: Relaxation, descent: Descent[Point], near: bool, left: Remaind
         near: whether it may be at rest.
         left: what is left by estimate.
     """
-    state.position.assign(descent.point.positions)
+    state.place(descent.point.positions)
     state.evaluate_at_rest()
     status, options = state.check_convergence(1.0), state.options
     residual = status.residual * _without_reaction(state)

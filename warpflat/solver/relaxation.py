@@ -246,6 +246,14 @@ class Relaxation:
         """Return a copy of the layout, #V by 2 [m]."""
         return np.array(self.position.numpy(), dtype=np.float64, copy=True)
 
+    def place(self, positions: FloatArray) -> None:
+        """Set the layout to #V by 2 [m]."""
+        if self.network.device.is_cpu:
+            # A view; Warp's own copy takes as long as a tenth of an iteration on a small piece.
+            self.position.numpy()[...] = positions
+        else:
+            self.position.assign(positions)
+
     def mirrored_pieces(self) -> BoolArray:
         """Return whether each piece has a mirrored or collapsed cell at the last evaluated state, #P."""
         return self.piece_sums.mirrored()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -10,12 +11,13 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.solver.options import RelaxOptions
 
-__all__ = ["REMEMBERED", "CycleRemainder", "Remainder", "RemainderEstimate"]
+__all__ = ["CycleRemainder", "Remainder", "RemainderEstimate", "looked_back"]
 
-# So many iterations are looked back upon. What follows them releases at most so many times their energy, and moves the outline at most so
-# many times as far: measured on draped meshes, split grids and forms (`benchmarks/stopping.py` measures it on others).
-REMEMBERED = 6
-_ENERGY_FACTOR, _OUTLINE_FACTOR = 10.0, 4.0
+# The last share of all iterations is looked back upon, and no fewer than so many: where convergence is slow, a few iterations move little
+# though much is left. What follows releases at most so many times their energy, and moves the outline at most so many times as far. The
+# factors were chosen on draped meshes and forms; `benchmarks/stopping.py` measures on others what they are worth.
+_SHARE, _FEWEST = 0.15, 4
+_ENERGY_FACTOR, _OUTLINE_FACTOR = 1.0, 2.5
 # Multigrid cycles reduce what is left by about the same factor each: by no less than the first, and by no more than the second is assumed.
 # The sum of all that follow the last one, times this, is the estimate. On the irregular bodice of 200,000 vertices the energy that was
 # left after each cycle but the first was at most 0.45 of what that cycle had released; the estimate is three times or more.
@@ -48,6 +50,11 @@ class Remainder:
         return small and not strict
 
 
+def looked_back(iterations: int) -> int:
+    """Return on how many of the last iterations a descent looks back after so many."""
+    return max(_FEWEST, math.ceil(_SHARE * iterations))
+
+
 class RemainderEstimate:
     """The last layouts of a descent, and the estimate that follows from them."""
 
@@ -58,7 +65,8 @@ class RemainderEstimate:
             border: the vertices of the outline.
         """
         self._border = border
-        self._last: deque[tuple[float, FloatArray]] = deque(maxlen=REMEMBERED + 1)
+        self._iterations = 0
+        self._last: deque[tuple[float, FloatArray]] = deque()
 
     def add(self, energy: float, positions: FloatArray) -> Remainder:
         """Add the layout of the next iteration and return what is left after it; infinite after few iterations.
@@ -67,10 +75,14 @@ class RemainderEstimate:
             energy: of the layout [J].
             positions: #V by 2 [m], turned upright.
         """
+        self._iterations += 1
         outline = positions[self._border]
         self._last.append((energy, outline))
-        if len(self._last) <= REMEMBERED:
+        count = looked_back(self._iterations)
+        if len(self._last) <= count:
             return Remainder()
+        while len(self._last) > count + 1:
+            self._last.popleft()
         moved = outline - self._last[0][1]
         moved -= moved.mean(axis=0)
         distance = float(np.linalg.norm(moved, axis=1).max(initial=0.0))

@@ -22,18 +22,25 @@ _MOST_STEPS = 20
 def as_rigid_layout(surface: Surface, positions: FloatArray) -> FloatArray | None:
     """Return what as-rigid iterations make of a layout: none of its cells mirrored; None where that fails.
 
-    Once a layout is injective, they end before one that is not.
+    Once a layout is injective, they end before one that is not, unless the last one is injective again.
     """
     cells, laplacian = make_cells(surface), laplacian_of(surface)
     size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
-    found, apart = None, False
-    for _ in range(_MOST_STEPS):
-        before, positions = positions, laplacian.as_rigid_step(positions)
-        if cells.least_shares(positions).min() > _LEAST_AREA:
-            lies_over_itself = not is_injective(surface, positions)
-            if apart and lies_over_itself:
-                break
-            found, apart = positions, not lies_over_itself
-        if np.sqrt(np.mean((positions - before) ** 2)) <= _SMALL_STEP * size:
+    layouts = [positions]
+    while len(layouts) <= _MOST_STEPS:
+        layouts.append(laplacian.as_rigid_step(layouts[-1]))
+        if np.sqrt(np.mean((layouts[-1] - layouts[-2]) ** 2)) <= _SMALL_STEP * size:
             break
+
+    def is_unfolded(layout: FloatArray) -> bool:
+        return bool(cells.least_shares(layout).min() > _LEAST_AREA)
+
+    if is_unfolded(layouts[-1]) and is_injective(surface, layouts[-1]):
+        return layouts[-1]
+    found, apart = None, False
+    for layout in filter(is_unfolded, layouts[1:]):
+        lies_over_itself = not is_injective(surface, layout)
+        if apart and lies_over_itself:
+            break
+        found, apart = layout, not lies_over_itself
     return None if found is None or (not apart and winds_twice(surface, cells, found)) else found

@@ -44,13 +44,15 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
     # No place is further from another than half of the border is long.
     length, graph = path_length(surface, [line]), EdgeGraph(surface)
     on_border = half_edges_of(surface).count == 1
-    if 4 * length >= graph.length[on_border].sum():
+    around, area = float(graph.length[on_border].sum()), _area(surface)
+    # Nor, then, is it many widths long, the area being that way times the mean width.
+    if 4 * length >= around or around**2 < 4 * _NARROW * area:
         return None
     loops = border_loops(surface.faces, surface.vertices)
     one = _furthest(surface, loops[0], int(line[0]))[0]
     other, reach = _furthest(surface, loops[0], one)
     room = distance_from(surface, np.unique(graph.edges[on_border]))
-    greatest, mean = 2 * float(room.max()), _area(surface) / reach
+    greatest, mean = 2 * float(room.max()), area / reach
     # Of a strip one face wide, all vertices are on the border.
     width = max(greatest, mean)
     ring = len(loops) > 1 and path_length(surface, [np.append(loops[1], loops[1][0])]) > reach

@@ -1,0 +1,72 @@
+"""A piece that has come to rest lying over itself is relaxed once more, with contact."""
+
+from __future__ import annotations
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.flattening.harmonic_layout import harmonic_layout
+from warpflat.flattening.progress import CONTACT, Stage
+from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
+from warpflat.solver.contact import open_cracks, relax_with_contact, swirl
+from warpflat.solver.convergence import Outcome
+from warpflat.solver.grain_alignment import grain_alignments
+from warpflat.solver.relaxation import Relaxation
+from warpflat.surface.connectivity import components_of
+from warpflat.surface.injective import overlap_area
+
+__all__ = ["keep_apart"]
+
+# Where contact costs much, relaxation also starts from its layout swirled by these angles about the middle [rad].
+_SWIRLS = (-1.5, 1.5)
+
+
+def keep_apart(
+    task: RelaxationTask, end: RelaxedPiece, start: FloatArray, cut_sides: IntArray
+) -> tuple[FloatArray, tuple[Stage, ...]]:
+    """Relax a piece once more, with contact, if it has come to rest lying over itself; add a note.
+
+    Args:
+        task: of the piece.
+        end: the piece relaxed without contact.
+        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective [m].
+        cut_sides: the vertices on the sides of its cuts; a cut whose sides lie over each other is left as it is.
+
+    Returns:
+        The layout, #V by 2 [m], and the stages: that of the relaxation, and "contact" if there was one that succeeded.
+    """
+    surface, network, free = end.network.surface, end.network, end.positions
+    relaxed = task.make_stage(network, free, end.outcome)
+    overlap = overlap_area(surface, free, cut_sides) if task.options.gap_mm and not task.stopped else 0.0
+    if overlap == 0.0:
+        return free, (relaxed,)
+    words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
+    alignments = grain_alignments(surface, task.datum, free)
+    starts = [lambda: open_cracks(surface, start)]
+    if not components_of(surface).any():
+        starts.append(lambda: harmonic_layout(surface))
+    for first in starts:
+        state = Relaxation(network, task.options, start=first(), alignments=alignments)
+        outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
+        if outcome is not None and outcome.converged:
+            before = relaxed.model_energy_j
+            if outcome.energies.potential > (1.0 + task.options.contact_share) * before:
+                state, outcome = _swirled(state, outcome)
+            after = outcome.energies.potential
+            share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
+            task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
+            return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
+    task.notes.append(f"{words}, and contact could not part it: cut it apart there")
+    return free, (relaxed,)
+
+
+def _swirled(state: Relaxation, outcome: Outcome) -> tuple[Relaxation, Outcome]:
+    """Return the lower end of a relaxation with contact (a state and its outcome) and those that follow from its layout swirled.
+
+    Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be wound up or unwound.
+    """
+    best, layout = (state, outcome), state.positions()
+    for turn in _SWIRLS:
+        other = Relaxation(state.network, state.options, start=swirl(layout, turn), alignments=state.alignments)
+        end = relax_with_contact(other, 1e-3 * state.options.gap_mm)
+        if end is not None and end.converged and end.energies.potential < best[1].energies.potential:
+            best = other, end
+    return best
