@@ -19,7 +19,8 @@ from warpflat.mannequin.scan_legs import leg_curves, plumb_legs, slice_legs
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import neck_and_arms, underarm_point
 from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, leg_levels
-from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
+from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
+from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.table_body import PRINCESS
 
 __all__ = ["ScanFound", "blueprint_from_scan"]
@@ -29,6 +30,8 @@ _UP_SIGMA = 1.5
 _HARMONICS = 28
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
+# How far a side seam follows the waves of front and back at the waist.
+_OFF_PLUMB = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,11 +113,14 @@ def _profiles(
     spectrum[:, _HARMONICS:] = 0.0
     radii = np.fft.irfft(spectrum, count, axis=1)
     y, girth = t.y[rows], t.girth[rows]
-    # A side seam hangs nearly plumb: midway between front and back, whose waves it does not follow.
+    # A side seam hangs nearly plumb: halfway between the middle of front and back and the straight line from hip to underarm,
+    # and on that line from the bust up, so that it meets the armhole squarely.
     side_z = gaussian_filter1d(middle_z, 14.0, mode="nearest")
     _, under_y, under_z = 0.5 * (underarms["left"] + underarms["right"])
-    near = np.clip((y - levels["waist"]) / (under_y - levels["waist"]), 0.0, 1.0) ** 2
-    side_z = (1.0 - near) * side_z + near * under_z
+    hip, waist, bust = levels["hip"], levels["waist"], levels["bust"]
+    straight = np.interp(y, [hip, under_y], [np.interp(hip, y, side_z), under_z])
+    off = np.clip((bust - y) / (bust - waist), 0.0, 1.0)
+    side_z += (1.0 - _OFF_PLUMB * off * off * (3.0 - 2.0 * off)) * (y > hip) * (straight - side_z)
     rays = np.arange(count) * 2.0 * np.pi / count
     outward = np.column_stack([np.sin(rays), np.cos(rays)])
     bust_girth = float(np.interp(levels["bust"], y, girth))

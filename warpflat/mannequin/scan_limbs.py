@@ -13,7 +13,7 @@ from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
 from warpflat.mannequin.scan_arms import ScanArm, slice_arm
 from warpflat.mannequin.scan_levels import TrunkSections
-from warpflat.mannequin.scan_pose import Slicer
+from warpflat.mannequin.slicer import Slicer
 
 __all__ = ["neck_and_arms", "underarm_point"]
 

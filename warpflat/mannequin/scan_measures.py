@@ -12,8 +12,9 @@ from warpflat.core.errors import InputError
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.scan_arms import ScanArm, tape_around
 from warpflat.mannequin.scan_legs import LegSections
-from warpflat.mannequin.scan_levels import TrunkSections, leg_sections, smooth, summit
-from warpflat.mannequin.scan_pose import Slicer
+from warpflat.mannequin.scan_levels import TrunkSections, leg_sections, smooth
+from warpflat.mannequin.slicer import Slicer
+from warpflat.mannequin.summit import summit
 
 __all__ = ["ScanMeasure", "body_measures", "guess_note", "leg_levels"]
 
@@ -181,8 +182,9 @@ def _check(found: Mapping[str, ScanMeasure], stature: float) -> None:
 
 
 def _bust(trunk: TrunkSections, levels: Mapping[str, float]) -> float:
-    """Return the height where a chest that grows fuller up to the armpits is fullest: just below them."""
-    rows = np.flatnonzero((trunk.y > levels["waist"]) & (trunk.y <= levels["armpit"]))
+    """Return the height where a chest that grows fuller up to the armpits is fullest; a belly is no chest."""
+    middle = 0.5 * (levels["waist"] + levels["armpit"])
+    rows = np.flatnonzero((trunk.y > middle) & (trunk.y <= levels["armpit"]))
     return float(trunk.y[rows[np.argmax(trunk.girth[rows])]])
 
 
