@@ -24,6 +24,8 @@ __all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "is_tight"]
 
 # A fold's mitre runs off to nothing where trunk and arm lie against each other: at most twice as far as either side moves.
 _LEAST_MITRE = 0.5
+# Rows down to so many times as far below a lowered underarm share the height.
+_SHARED = 3.0
 # Parts of the body whose profiles can be mixed with each other.
 _PARTS = (RING_LEVELS, ARM_LEVELS[1:], LEG_LEVELS[1:])
 
@@ -316,25 +318,33 @@ def _mitre_underarms(move: FloatArray, layout: Layout, body: FloatArray) -> IntA
     loops = []
     for side, column in (("left", layout.quarter), ("right", 3 * layout.quarter)):
         beside, loop = bust[column], layout.arms[side][0]
-        out = float(move[beside] @ (normals[beside] * [1.0, 0.0, 1.0]))
+        of_trunk = normals[beside] * [1.0, 0.0, 1.0]
+        of_trunk /= np.linalg.norm(of_trunk)
+        out = float(move[beside] @ of_trunk)
         if out <= 0.0:
             return None
-        bisector = normals[loop[0]]
-        wished = out / max(float(bisector @ normals[beside]), _LEAST_MITRE) * bisector
+        # Beyond the rounded web of the armpit.
+        bisector = of_trunk + normals[layout.arms[side][layout.arm_row["biceps"] // 2, 0]]
+        bisector /= np.linalg.norm(bisector)
+        wished = out / max(float(bisector @ of_trunk), _LEAST_MITRE) * bisector
         more = wished - move[loop[0]]
         move[loop[at % len(loop)]] += near[:, None] * more
-        _lower_sides(move, layout, column, float(more[1]))
+        _lower_sides(move, layout, body, column, float(more[1]))
         loops.append(loop)
     return np.concatenate(loops)
 
 
-def _lower_sides(move: FloatArray, layout: Layout, column: int, lower: float) -> None:
-    """Lower the rows from the underbust to the bust at a side, so that they share the height below a lowered underarm."""
-    first, bust, chest = (layout.level_row[level] for level in ("underbust", "bust", "chest"))
+def _lower_sides(move: FloatArray, layout: Layout, body: FloatArray, column: int, lower: float) -> None:
+    """Lower the rows up to the bust at a side, so that they share the height below an underarm that is lowered by `-lower` [m]."""
+    bust, chest = layout.level_row["bust"], layout.level_row["chest"]
+    heights = body[layout.rings[: chest + 1, column], 1]
+    # From the underbust up; from further down where little height would be left to share.
+    far = np.flatnonzero(heights <= heights[chest] - _SHARED * abs(lower))
+    first = min(layout.level_row["underbust"], int(far[-1]) if len(far) else 0)
     reach, count = layout.quarter - layout.to_princess, layout.rings.shape[1]
     at = np.arange(-reach + 1, reach)
     near = 1.0 - np.abs(at) / reach
-    share = (np.arange(first, bust + 1) - first)[:, None] / (chest - first)
+    share = ((heights[first : bust + 1] - heights[first]) / (heights[chest] - heights[first]))[:, None]
     ids = layout.rings[first : bust + 1, (column + at) % count]
     move[ids, 1] += lower * share * near * near * (3.0 - 2.0 * near)
 

@@ -16,8 +16,10 @@ from warpflat.mannequin.sheet import sheet_laplacian
 
 __all__ = ["Neckline", "widen_neck"]
 
-# Steps by which a point of the front view finds its depth.
-_ROUNDS = 25
+# Upright sections of chest and back begin so far [m] above the lowest point across chest or back.
+_ABOVE = 0.015
+# Powers of the superellipses of a neckline: 2 is an ellipse, which would be boxy where it rises little.
+_POWER = {"front": 2.0, "back": 1.6}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +44,9 @@ class Neckline:
 def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> FloatArray:
     """Return a form's vertices (#V by 3 [m]) with the neck's row moved to a wider neckline on the same surface.
 
-    Seen from the front, each quarter of the neckline is that of an ellipse from the centre line, which it meets at right angles,
-    to the shoulder seam. What lies between it, the armholes and the bust follows smoothly.
+    Each quarter of the neckline is that of an ellipse from the centre line, which it meets at right angles, to the shoulder seam,
+    behind of a flatter superellipse: in the plane into which chest or back unroll, their upright sections side by side. What lies
+    between it, the armholes and the bust follows smoothly.
 
     Raises:
         InputError: the neckline takes a whole shoulder seam.
@@ -57,20 +60,19 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
         seam = layout.yokes[f"front-{side}"][-1]
         seams.append(seam if seam[0] in neck else seam[::-1])
         out[seams[-1]] = _along_seam(vertices[seams[-1]], 0.01 * neckline.side_cm)
-    for row, column, depth in (
-        (layout.front, 0, neckline.front_cm),
-        (layout.back, layout.rings.shape[1] // 2, neckline.back_cm),
+    for face, row, column, depth in (
+        ("front", layout.front, 0, neckline.front_cm),
+        ("back", layout.back, layout.rings.shape[1] // 2, neckline.back_cm),
     ):
+        patches = [row, *(layout.yokes[f"{face}-{side}"] for side in ("left", "right"))]
+        half = _Surface(vertices, quads[np.isin(quads, np.concatenate([p.ravel() for p in patches])).all(axis=1)])
         middle = row.shape[1] // 2
         centres.append(np.concatenate([row[:0:-1, middle], layout.rings[::-1, column]]))
         out[row[-1, middle]] = points_at_lengths(vertices[centres[-1]], [0.01 * depth])[0]
         for seam in seams:
             quarter = _quarter(neck, row[-1, middle], seam[0])
             share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
-            centre, shoulder = out[quarter[0]], out[quarter[-1]]
-            turn = 0.5 * np.pi * share[:, None]
-            ellipse = centre + (shoulder - centre) * np.hstack([np.sin(turn), 1.0 - np.cos(turn)])[:, [0, 1, 1]]
-            out[quarter[1:-1]] = surface.seen_at(ellipse[1:-1])
+            out[quarter[1:-1]] = _quarter_curve(half, out[quarter[0]], out[quarter[-1]], share[1:-1], _POWER[face])
     fixed = np.unique(
         np.concatenate(
             [neck, *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
@@ -102,12 +104,42 @@ class _Surface:
         triangle, weights, _ = self.closest(points)
         return np.asarray((self.vertices[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1))
 
-    def seen_at(self, points: FloatArray) -> FloatArray:
-        """Return the points of the surface that are seen from the front where these are, the nearest in depth."""
-        found = points
-        for _ in range(_ROUNDS):
-            found = self.nearest(np.column_stack([points[:, :2], found[:, 2]]))
-        return found
+    def upright(self, x: float, level: float) -> FloatArray:
+        """Return the section at `x` from the height `level` [m] up, #P by 3 from low to high."""
+        corner = self.vertices[self.triangles]
+        off = corner[:, :, 0] - x
+        ends = []
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            crossed = off[:, i] * off[:, j] < 0.0
+            share = (off[crossed, i] / (off[crossed, i] - off[crossed, j]))[:, None]
+            ends.append((1.0 - share) * corner[crossed, i] + share * corner[crossed, j])
+        line = np.concatenate(ends)
+        line = line[np.argsort(line[:, 1])]
+        return line[line[:, 1] > level]
+
+
+def _quarter_curve(
+    surface: _Surface, centre: FloatArray, shoulder: FloatArray, shares: FloatArray, power: float
+) -> FloatArray:
+    """Return points of a quarter of the neckline at `shares` of its way from the centre line to the shoulder seam, #P by 3 [m].
+
+    It is the superellipse of that `power`.
+    """
+    level = float(surface.vertices[:, 1].min()) + _ABOVE
+    turn = 0.5 * np.pi * shares
+    across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
+    # Just beside the seams, so that the sections do not run along edges of the mesh.
+    sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
+    sections = [surface.upright(float(x), level) for x in sides]
+    lengths = [arc_lengths(section) for section in sections]
+    low, high = (
+        float(np.interp(end[1], section[:, 1], length))
+        for end, section, length in ((centre, sections[0], lengths[0]), (shoulder, sections[-1], lengths[-1]))
+    )
+    wished = low + (high - low) * up
+    return surface.nearest(
+        np.array([points_at_lengths(section, [at])[0] for section, at in zip(sections[1:-1], wished, strict=True)])
+    )
 
 
 def _quarter(neck: IntArray, start: int, end: int) -> IntArray:

@@ -39,7 +39,7 @@ class BodySurface:
         self.used = np.unique(faces)
         self.tree = cKDTree(vertices[self.used])
         self.splits = [(triangles, Closest(vertices, triangles)) for triangles in splits]
-        self.near = 0.25 * layout.resolution
+        self.near = 0.5 * layout.resolution
 
     def ways_out(self, points: FloatArray) -> FloatArray:
         """Return for each point (#P by 3) the way to the nearest place of the surface [m]; zero for points outside."""

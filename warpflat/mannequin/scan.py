@@ -15,11 +15,13 @@ from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
 from warpflat.mannequin.rays import ray_radii
 from warpflat.mannequin.scan_checks import check_girths
-from warpflat.mannequin.scan_legs import leg_curves, plumb_legs, slice_legs
+from warpflat.mannequin.scan_legs import LegSections, leg_curves, plumb_legs, slice_legs
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
-from warpflat.mannequin.scan_limbs import neck_and_arms, underarm_point
+from warpflat.mannequin.scan_limbs import UpperSections, slice_neck_and_arms, underarm_point, upper_curves
 from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, leg_levels
-from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
+from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
+from warpflat.mannequin.scan_spread import guess_by_noise
+from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.table_body import PRINCESS
 
 __all__ = ["ScanFound", "blueprint_from_scan"]
@@ -29,6 +31,8 @@ _UP_SIGMA = 1.5
 _HARMONICS = 28
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
+# How far a side seam follows the waves of front and back at the waist.
+_OFF_PLUMB = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,32 +68,55 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         InputError: if the mesh is not a body that stands on two legs with its arms off the trunk, or has a measure that no body has.
     """
     slicer, notes = turn_scan_upright(vertices, faces, options)
+    body = _slice_body(slicer, options)
+    trunk, legs, levels = body.trunk, body.legs, body.levels
+    plumb, apart = plumb_legs(trunk, legs)
+    profile = _profiles(plumb, levels, body.underarms)
+    quarters, arms = upper_curves(slicer, levels, profile, body.upper)
+    blueprint = Blueprint(
+        profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
+        legs=leg_curves(slicer, legs, levels, profile(levels["hip"])), neck=body.upper.neck, collar=body.upper.collar,
+        attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
+    )  # fmt: skip
+    measures = guess_by_noise(slicer, body.measures, lambda copy: _slice_body(copy, options).measures)
+    sections = {level: float(np.interp(levels[level], trunk.y, trunk.length)) for level in RING_LEVELS}
+    return ScanFound(
+        blueprint=blueprint,
+        source=f"scan of a body {trunk.stature:.3f} m tall",
+        notes=(*notes, *body.notes, *apart, *guess_note(measures, body.notes)),
+        sections=sections,
+        measures=measures,
+        scan=(legs.move(slicer.vertices) if apart else slicer.vertices, slicer.triangles),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _SlicedBody:
+    """An upright scan's sections and levels, the tapes around it, and what was guessed."""
+
+    trunk: TrunkSections
+    legs: LegSections
+    upper: UpperSections
+    levels: Mapping[str, float]
+    underarms: Mapping[str, FloatArray]
+    measures: Mapping[str, ScanMeasure]
+    notes: tuple[str, ...]
+
+
+def _slice_body(slicer: Slicer, options: ScanOptions) -> _SlicedBody:
     trunk = trunk_sections(slicer)
-    levels, more = find_levels(trunk, options.landmarks)
+    levels, notes = find_levels(trunk, options.landmarks)
     check_girths(trunk, levels)
     legs = slice_legs(slicer, trunk, levels["hip"])
     of_legs, _ = leg_levels(legs)
     levels |= {name: of_legs[name] for name in ("knee", "ankle") if name not in options.landmarks}
     levels |= {"leg_knee": levels["knee"], "leg_calf": of_legs["calf"], "leg_ankle": levels["ankle"]}
-    plumb, apart = plumb_legs(trunk, legs)
     underarms = {side: underarm_point(slicer, trunk, side, levels["underbust"]) for side in ("left", "right")}
-    profile = _profiles(plumb, levels, underarms)
-    quarters, arms, neck, collar, sliced = neck_and_arms(slicer, trunk, levels, profile, underarms)
-    blueprint = Blueprint(
-        profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
-        legs=leg_curves(slicer, legs, levels, profile(levels["hip"])), neck=neck, collar=collar,
-        attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
+    upper = slice_neck_and_arms(slicer, trunk, levels, underarms)
+    return _SlicedBody(
+        trunk=trunk, legs=legs, upper=upper, levels=levels, underarms=underarms, notes=tuple(notes),
+        measures=body_measures(slicer, trunk, levels, legs, upper.arms, upper.neck, notes),
     )  # fmt: skip
-    measures = body_measures(slicer, trunk, levels, legs, sliced, neck, more)
-    sections = {level: float(np.interp(levels[level], trunk.y, trunk.length)) for level in RING_LEVELS}
-    return ScanFound(
-        blueprint=blueprint,
-        source=f"scan of a body {trunk.stature:.3f} m tall",
-        notes=(*notes, *more, *apart, *guess_note(measures)),
-        sections=sections,
-        measures=measures,
-        scan=(legs.move(slicer.vertices) if apart else slicer.vertices, slicer.triangles),
-    )
 
 
 def _profiles(
@@ -110,11 +137,14 @@ def _profiles(
     spectrum[:, _HARMONICS:] = 0.0
     radii = np.fft.irfft(spectrum, count, axis=1)
     y, girth = t.y[rows], t.girth[rows]
-    # A side seam hangs nearly plumb: midway between front and back, whose waves it does not follow.
+    # A side seam hangs nearly plumb: halfway between the middle of front and back and the straight line from hip to underarm,
+    # and on that line from the bust up, so that it meets the armhole squarely.
     side_z = gaussian_filter1d(middle_z, 14.0, mode="nearest")
     _, under_y, under_z = 0.5 * (underarms["left"] + underarms["right"])
-    near = np.clip((y - levels["waist"]) / (under_y - levels["waist"]), 0.0, 1.0) ** 2
-    side_z = (1.0 - near) * side_z + near * under_z
+    hip, waist, bust = levels["hip"], levels["waist"], levels["bust"]
+    straight = np.interp(y, [hip, under_y], [np.interp(hip, y, side_z), under_z])
+    off = np.clip((bust - y) / (bust - waist), 0.0, 1.0)
+    side_z += (1.0 - _OFF_PLUMB * off * off * (3.0 - 2.0 * off)) * (y > hip) * (straight - side_z)
     rays = np.arange(count) * 2.0 * np.pi / count
     outward = np.column_stack([np.sin(rays), np.cos(rays)])
     bust_girth = float(np.interp(levels["bust"], y, girth))

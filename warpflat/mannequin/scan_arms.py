@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.mannequin.profiles import convex_girth
-from warpflat.mannequin.scan_pose import Slicer
+from warpflat.mannequin.slicer import Slicer
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["ScanArm", "slice_arm", "tape_around"]

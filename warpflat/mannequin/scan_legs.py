@@ -15,7 +15,7 @@ from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import LEG_LEVELS
 from warpflat.mannequin.rays import ray_radii
 from warpflat.mannequin.scan_levels import TrunkSections
-from warpflat.mannequin.scan_pose import Slicer
+from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.table_legs import crotch_curve, profile_of_curve
 
 __all__ = ["LegSections", "leg_curves", "plumb_legs", "slice_legs"]

@@ -10,9 +10,10 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError
-from warpflat.mannequin.scan_pose import Slice, Slicer
+from warpflat.mannequin.slicer import Slice, Slicer
+from warpflat.mannequin.summit import summit
 
-__all__ = ["TrunkSections", "find_levels", "leg_sections", "smooth", "summit", "trunk_sections"]
+__all__ = ["TrunkSections", "find_levels", "leg_sections", "smooth", "trunk_sections"]
 
 _UP = np.array([0.0, 1.0, 0.0])
 # Trunk, head and legs have their middles within this distance of the midplane, as a share of the stature; arms do not.
@@ -311,15 +312,6 @@ def _hip(t: TrunkSections, waist: float, notes: list[str]) -> float:
     guess = max(0.52 * t.stature, t.crotch + 0.03 * t.stature)
     notes.append(f"hip = {guess:.3f} m is a guess: the seat does not stand out between crotch and waist")
     return guess
-
-
-def summit(y: FloatArray, values: FloatArray, row: int) -> float:
-    """Return the height where the parabola through `row` and its neighbours has its extreme [m]."""
-    a, b, c = values[row - 1 : row + 2]
-    bend = a - 2.0 * b + c
-    if abs(bend) < 1e-9:
-        return float(y[row])
-    return float(y[row] + np.clip(0.5 * (a - c) / bend, -1.0, 1.0) * (y[row + 1] - y[row]))
 
 
 def _neck(t: TrunkSections, armpit: float) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,9 +14,9 @@ from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
 from warpflat.mannequin.scan_arms import ScanArm, slice_arm
 from warpflat.mannequin.scan_levels import TrunkSections
-from warpflat.mannequin.scan_pose import Slicer
+from warpflat.mannequin.slicer import Slicer
 
-__all__ = ["neck_and_arms", "underarm_point"]
+__all__ = ["UpperSections", "slice_neck_and_arms", "underarm_point", "upper_curves"]
 
 #: How far the armhole's plane leans outward from the armpit up.
 _LEAN = np.radians(9.0)
@@ -32,45 +33,73 @@ _ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
 _NOTCH = 0.22
 
 
-def neck_and_arms(
-    slicer: Slicer,
-    trunk: TrunkSections,
-    levels: Mapping[str, float],
-    profile: Callable[[float], Profile],
-    underarms: Mapping[str, FloatArray],
-) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, FloatArray, dict[str, ScanArm]]:
-    """Return the curves above the bust.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UpperSections:
+    """Neck, armholes and arms of a scan.
+
+    Attributes:
+        neckline: #P by 3, the base of the neck, closed, from the front over the left [m].
+        collar: #P by 3, the curve around the neck above it [m].
+        holes: by side #P by 3, the closed armhole from its lowest point forward [m].
+        arms: the sliced arms, by side.
+    """
+
+    neckline: FloatArray
+    collar: FloatArray
+    holes: Mapping[str, FloatArray]
+    arms: Mapping[str, ScanArm]
+
+    @property
+    def neck(self) -> float:
+        """Length of the neck base [m]."""
+        return polyline_length(self.neckline, closed=True)
+
+
+def slice_neck_and_arms(
+    slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], underarms: Mapping[str, FloatArray]
+) -> UpperSections:
+    """Slice neck, armholes and arms.
 
     Args:
         slicer: the upright scan.
         trunk: its horizontal sections.
         levels: heights [m] of the levels and landmarks.
-        profile: the trunk's profile at a height [m].
         underarms: the left and the right armhole's lowest point (see :func:`underarm_point`).
-
-    Returns:
-        the quarters' curves, the arms' curves, the neck base's length [m], the collar's curve (#P by 3 [m]),
-        and the sliced arms.
 
     Raises:
         InputError: if the neck or an arm cannot be sliced.
     """
     neckline, collar = _neck(slicer, trunk, levels)
-    start = int(np.argmax(neckline[:, 2]))
-    neckline = np.roll(neckline, -start, axis=0)
-    collar = np.roll(collar, -int(np.argmax(collar[:, 2])), axis=0)
+    holes = {side: _armhole(slicer, trunk, side, underarms[side]) for side in ("left", "right")}
+    return UpperSections(
+        neckline=np.roll(neckline, -int(np.argmax(neckline[:, 2])), axis=0),
+        collar=np.roll(collar, -int(np.argmax(collar[:, 2])), axis=0),
+        holes=holes,
+        arms={side: slice_arm(slicer, hole, 1.0 if side == "left" else -1.0, side) for side, hole in holes.items()},
+    )
+
+
+def upper_curves(
+    slicer: Slicer, levels: Mapping[str, float], profile: Callable[[float], Profile], upper: UpperSections
+) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves]]:
+    """Return the curves of the quarters above the bust, and those of the arms.
+
+    Args:
+        slicer: the upright scan.
+        levels: heights [m] of the levels.
+        profile: the trunk's profile at a height [m].
+        upper: its neck, armholes and arms.
+    """
+    neckline = upper.neckline
     back = int(np.argmin(np.abs(neckline[:, 0]) + 10.0 * (neckline[:, 2] > neckline[:, 2].mean())))
+    bust = profile(levels["bust"])
     quarters: dict[str, QuarterCurves] = {}
-    arms: dict[str, ArmCurves] = {}
-    sliced: dict[str, ScanArm] = {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         around = neckline if sign > 0 else np.vstack([neckline[:1], neckline[:0:-1]])
         end = back if sign > 0 else len(neckline) - back
         corner = int(np.argmax(sign * around[: end + 1, 0]))
-        hole = _armhole(slicer, trunk, side, underarms[side])
+        hole = upper.holes[side]
         tip = int(np.argmax(hole[:, 1]))
-        sliced[side] = slice_arm(slicer, hole, sign, side)
-        arms[side] = _arm_curves(sliced[side])
         # The loop runs from the underarm forward: its first half is the front.
         halves = {"front": hole[tip::-1], "back": np.vstack([hole[tip:], hole[:1]])}
         seam = _shoulder(slicer, around[corner], hole[tip])
@@ -80,15 +109,14 @@ def neck_and_arms(
             s = arc_lengths(curve)
             notch = int(np.argmin(np.abs(rise - _NOTCH)))
             row = _row(slicer, curve[notch], face)
-            bust = profile(levels["bust"])
             first = bust.curve[0 if face == "front" else len(bust.curve) // 2]
             bottom = np.array([0.0, levels["bust"], first[1]])
             quarters[f"{face}-{side}"] = QuarterCurves(
                 neckline=line, bend=0.52, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
                 centre=_centre(slicer, bottom, row[0], line[0], face),
             )  # fmt: skip
-    length = polyline_length(neckline, closed=True)
-    return {name: quarters[name] for name in QUARTERS}, arms, length, collar, sliced
+    arms = {side: _arm_curves(arm) for side, arm in upper.arms.items()}
+    return {name: quarters[name] for name in QUARTERS}, arms
 
 
 def _loop(

@@ -12,8 +12,9 @@ from warpflat.core.errors import InputError
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.scan_arms import ScanArm, tape_around
 from warpflat.mannequin.scan_legs import LegSections
-from warpflat.mannequin.scan_levels import TrunkSections, leg_sections, smooth, summit
-from warpflat.mannequin.scan_pose import Slicer
+from warpflat.mannequin.scan_levels import TrunkSections, leg_sections, smooth
+from warpflat.mannequin.slicer import Slicer
+from warpflat.mannequin.summit import summit
 
 __all__ = ["ScanMeasure", "body_measures", "guess_note", "leg_levels"]
 
@@ -161,12 +162,12 @@ def body_measures(
     return found
 
 
-def guess_note(measures: Mapping[str, ScanMeasure]) -> list[str]:
-    """Return one note that names the tapes of head, arms and legs whose places are guesses; none if no place is one."""
-    of_limbs = {name: m.guess for name, m in measures.items() if m.guess and name not in _TRUNK}
-    if not of_limbs:
+def guess_note(measures: Mapping[str, ScanMeasure], notes: Sequence[str]) -> list[str]:
+    """Return one note that names the tapes whose places are guesses and that have no note of their own; none without any."""
+    guesses = {n: m.guess for n, m in measures.items() if m.guess and not any(k.startswith(f"{n} = ") for k in notes)}
+    if not guesses:
         return []
-    names = {why: [n for n, w in of_limbs.items() if w == why] for why in of_limbs.values()}
+    names = {why: [n for n, w in guesses.items() if w == why] for why in guesses.values()}
     return ["guessed: " + "; ".join(f"{' and '.join(names[why])} ({why})" for why in names)]
 
 
@@ -181,8 +182,9 @@ def _check(found: Mapping[str, ScanMeasure], stature: float) -> None:
 
 
 def _bust(trunk: TrunkSections, levels: Mapping[str, float]) -> float:
-    """Return the height where a chest that grows fuller up to the armpits is fullest: just below them."""
-    rows = np.flatnonzero((trunk.y > levels["waist"]) & (trunk.y <= levels["armpit"]))
+    """Return the height where a chest that grows fuller up to the armpits is fullest; a belly is no chest."""
+    middle = 0.5 * (levels["waist"] + levels["armpit"])
+    rows = np.flatnonzero((trunk.y > middle) & (trunk.y <= levels["armpit"]))
     return float(trunk.y[rows[np.argmax(trunk.girth[rows])]])
 
 
@@ -307,7 +309,8 @@ def _crotch(slicer: Slicer, trunk: TrunkSections) -> float:
 
 
 def _leg(legs: LegSections, side: str, thigh: float) -> dict[str, ScanMeasure]:
-    places, guesses = _places_of_leg(legs, side)
+    # Noise moves the places on each leg by itself: their mean moves less.
+    places, guesses = leg_levels(legs) if legs.noise else _places_of_leg(legs, side)
     places = {"thigh": thigh, **places}
     return {
         name: ScanMeasure(height=y, girth=float(np.interp(y, legs.y, legs.girths[side])), guess=guesses.get(name))

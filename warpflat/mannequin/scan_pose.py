@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.mannequin.scan_axes import across_trunk, find_facing, find_legs
 from warpflat.mannequin.scan_holes import close_holes
 from warpflat.mannequin.scan_noise import smooth_noise
+from warpflat.mannequin.slicer import Slicer
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
-__all__ = ["ScanOptions", "Slice", "Slicer", "turn_scan_upright"]
+__all__ = ["ScanOptions", "turn_scan_upright"]
 
 _UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 _AXES = {s + a: sign * np.eye(3)["xyz".index(a)] for s, sign in (("+", 1.0), ("-", -1.0)) for a in "xyz"}
-_STATURE = (1.2, 2.3)
+_STATURE = (0.9, 2.3)
 _LANDMARKS = (
     "ankle",
     "knee",
@@ -36,9 +37,6 @@ _LANDMARKS = (
 )
 # Pieces of so small a share of the faces are left out, if they are no more than so many together.
 _LOOSE, _LOOSE_TOGETHER = 0.01, 0.05
-
-#: A part of a section: area and centroid of its convex hull in the section's plane, in the scan's unit.
-_Part: TypeAlias = tuple[float, FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,96 +78,6 @@ class ScanOptions:
                 raise InputError(f"scan landmark {name} = {height:g} m: a height above the floor, 0 to {_STATURE[1]} m")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Slice:
-    """One connected part of a plane section.
-
-    Attributes:
-        points: #P by 3, where the plane meets mesh edges [m], in no order.
-        length: summed length of the section's segments [m].
-        closed: false where a hole in the mesh leaves a gap.
-        patched: length of the segments on patches that close holes [m].
-    """
-
-    points: FloatArray
-    length: float
-    closed: bool = True
-    patched: float = 0.0
-
-    @property
-    def is_holed(self) -> bool:
-        """Return whether a hole leaves a gap, or more than a tenth of the section runs over patches."""
-        return not self.closed or self.patched > 0.1 * self.length
-
-
-class Slicer:
-    """Plane sections of a triangle mesh, connected parts apart; holes in the mesh only leave gaps."""
-
-    def __init__(
-        self, vertices: FloatArray, triangles: NDArray[np.int64], noise: float = 0.0, scanned: int | None = None
-    ) -> None:
-        #: How far noise moved the vertices before it was smoothed [m].
-        self.noise = noise
-        #: Triangles from this one on close holes.
-        self.scanned = len(triangles) if scanned is None else scanned
-        ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
-        ends = np.sort(ends, axis=1).astype(np.int64)
-        keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
-        self.edges = np.column_stack([keys // len(vertices), keys % len(vertices)])
-        self.face_edges = np.ravel(inverse).reshape(-1, 3)
-        self.vertices = vertices
-        self.triangles = triangles
-        self._corners = np.ascontiguousarray(triangles.T)
-
-    def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
-        """Return the connected parts of the section where normal . x = offset, longest first."""
-        d = self.vertices @ normal - offset
-        d[d == 0.0] = 1e-12
-        above = d > 0.0
-        first, second, third = (above[corners] for corners in self._corners)
-        faces = np.flatnonzero((first != second) | (first != third))
-        if not len(faces):
-            return []
-        # Two of a cut triangle's edges cross the plane: which two, by the one that does not.
-        first, second, third = first[faces, None], second[faces, None], third[faces, None]
-        edges = self.face_edges[faces]
-        pairs = np.where(
-            first == second, edges[:, [1, 2]], np.where(second == third, edges[:, [0, 2]], edges[:, [0, 1]])
-        )
-        used, local = np.unique(pairs, return_inverse=True)
-        local = np.ravel(local).reshape(-1, 2)
-        a, b = self.edges[used].T
-        t = (d[a] / (d[a] - d[b]))[:, None]
-        points = (1 - t) * self.vertices[a] + t * self.vertices[b]
-        label = _part_labels(len(used), local)
-        segments = np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1)
-        length = np.bincount(label[local[:, 0]], segments)
-        patched = np.bincount(label[local[:, 0]], segments * (faces >= self.scanned))
-        loose = np.bincount(label, np.bincount(local.ravel(), minlength=len(used)) == 1)
-        parts = [
-            Slice(points=points[label == i], length=float(length[i]), closed=not loose[i], patched=float(patched[i]))
-            for i in np.argsort(-length)
-        ]
-        return [p for p in parts if len(p.points) > 3]
-
-
-def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return #size, the part of each point that the pairs join; quicker than a sparse graph for a section's few points."""
-    root = list(range(size))
-    for a, b in pairs.tolist():
-        while root[a] != a:
-            root[a] = a = root[root[a]]
-        while root[b] != b:
-            root[b] = b = root[root[b]]
-        if a < b:
-            root[b] = a
-        else:
-            root[a] = b
-    for i, above in enumerate(root):
-        root[i] = root[above]
-    return np.asarray(np.unique(root, return_inverse=True)[1].reshape(-1))
-
-
 def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> tuple[Slicer, list[str]]:
     """Bring a scan to metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
 
@@ -191,7 +99,7 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     notes = [f"loose pieces of less than 1 % of the scan's faces were left out: {loose}"] if loose else []
     candidates = [options.up] if options.up else list(_AXES)
     slicer = Slicer(points, triangles)
-    rated = [(_legs(slicer, _AXES[a]), a) for a in candidates]
+    rated = [(find_legs(slicer, _AXES[a]), a) for a in candidates]
     (score, sideways), up_name = max(rated, key=lambda r: r[0][0])
     if score < 0.6 or sideways is None:
         seen = "with the given up axis " if options.up else "in any direction "
@@ -210,8 +118,7 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit}")
     if up_name != "+y":
         notes.append(f"the scan's head was found towards {up_name}")
-    left = sideways - up * (sideways @ up)
-    left /= np.linalg.norm(left)
+    left = across_trunk(slicer, up, sideways)
     ahead = np.cross(left, up)
     if options.facing:
         wished = _AXES[options.facing] - up * (_AXES[options.facing] @ up)
@@ -219,7 +126,7 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
             raise InputError(f"scan: it does not face {options.facing}: its legs stand side by side along that axis")
         turn = float(np.sign(ahead @ wished))
     else:
-        turn = _facing(slicer, up, ahead)
+        turn = find_facing(slicer, up, ahead)
     frame = np.array([left * turn, up, ahead * turn])
     if options.facing is None and frame[2, 2] < 0.9:
         notes.append(f"the scan was found to face ({frame[2, 0]:+.2f}, {frame[2, 1]:+.2f}, {frame[2, 2]:+.2f})")
@@ -296,112 +203,3 @@ def _unit_of(height: float) -> str:
     raise InputError(
         f"scan: {height:.4g} tall in its own unit, which is a body's height in none of {', '.join(_UNITS)}; scale it"
     )
-
-
-def _hull_area_and_middle(points: FloatArray) -> tuple[float, FloatArray]:
-    """Return the area and the centroid of the convex hull of plane points, which do not depend on the plane's axes."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        return 0.0, points.mean(axis=0)
-    ring = points[hull.vertices]
-    after = np.roll(ring, -1, axis=0)
-    wedge = ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]
-    if hull.volume <= 0.0:
-        return 0.0, points.mean(axis=0)
-    return float(hull.volume), np.asarray((ring + after).T @ wedge / (6.0 * hull.volume))
-
-
-def _plane_axes(up: FloatArray) -> FloatArray:
-    """Return two unit vectors at right angles to `up` and to each other, 2 by 3."""
-    first = np.eye(3)[int(np.argmin(np.abs(up)))]
-    first = first - up * (first @ up)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(up, first)])
-
-
-def _legs(slicer: Slicer, up: FloatArray) -> tuple[float, FloatArray | None]:
-    """Rate how much the mesh is like a standing body if `up` is up.
-
-    Returns:
-        A score from 0 to 1, and the direction from leg to leg; None without legs.
-    """
-    points = slicer.vertices
-    low, high = float((points @ up).min()), float((points @ up).max())
-    across = _plane_axes(up)
-
-    def parts(share: float) -> list[_Part]:
-        return _large_parts(slicer, up, low + share * (high - low), across)
-
-    levels = np.linspace(0.07, 0.40, 12)
-    pairs = [legs for share in levels if _is_pair(legs := parts(float(share)))]
-    if not pairs:
-        return 0.0, None
-    apart = [legs[0][1] - legs[1][1] for legs in pairs]
-    direction = np.mean([a * np.sign(a @ apart[0]) for a in apart], axis=0)
-    if np.linalg.norm(direction) == 0.0:
-        return 0.0, None
-    middle = np.mean([0.5 * (legs[0][1] + legs[1][1]) for legs in pairs], axis=0)
-    stands = _is_body(middle, parts(0.62), parts(0.93), high - low)
-    return len(pairs) / len(levels) if stands else 0.0, direction @ across
-
-
-def _large_parts(slicer: Slicer, up: FloatArray, height: float, across: FloatArray) -> list[_Part]:
-    """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
-    found = [_hull_area_and_middle(part.points @ across.T) for part in slicer.cut(up, height)]
-    found.sort(key=lambda part: -part[0])
-    return [part for part in found if part[0] > 0.15 * found[0][0]]
-
-
-def _is_pair(legs: list[_Part]) -> bool:
-    """Return whether parts of a section are two of similar size, as those of two legs are."""
-    return len(legs) == 2 and legs[0][0] < 2.0 * legs[1][0]
-
-
-def _is_body(middle: FloatArray, trunk: list[_Part], head: list[_Part], height: float) -> bool:
-    """Return whether one trunk, broader than either leg, stands over the legs' middle, and one head, narrower, over the trunk."""
-    reach = 0.12 * height
-    if not trunk or np.linalg.norm(trunk[0][1] - middle) >= reach:
-        return False
-    if len(head) != 1 or np.linalg.norm(head[0][1] - middle) >= 1.5 * reach:
-        return False
-    return head[0][0] < 0.9 * trunk[0][0] and trunk[0][0] < (0.42 * height) ** 2
-
-
-def _facing(slicer: Slicer, up: FloatArray, ahead: FloatArray) -> float:
-    """Return +1 if the body looks along `ahead`, -1 if the other way.
-
-    Feet reach forward from the ankles; the seat stands out behind the waist more than anything stands out in front.
-    """
-    points = slicer.vertices
-    low, high = float((points @ up).min()), float((points @ up).max())
-    size = high - low
-
-    def band(a: float, b: float) -> FloatArray:
-        share = (points @ up - low) / size
-        return points[(share >= a) & (share <= b)] @ ahead
-
-    votes = 0.0
-    feet, ankles = band(0.0, 0.035), band(0.05, 0.08)
-    if len(feet) > 20 and len(ankles) > 20:
-        middle = 0.5 * (ankles.min() + ankles.max())
-        votes += float(np.clip(((feet.max() - middle) - (middle - feet.min())) / (0.04 * size), -1.0, 1.0)) * 1.5
-
-    def spans(a: float, b: float) -> tuple[float, float]:
-        cuts = [slicer.cut(up, low + s * size) for s in np.linspace(a, b, 8)]
-        trunks = [
-            max(c, key=lambda p: _hull_area_and_middle(p.points @ _plane_axes(up).T)[0]).points @ ahead
-            for c in cuts
-            if c
-        ]
-        return float(min(t.min() for t in trunks)), float(max(t.max() for t in trunks))
-
-    waist_cuts = [slicer.cut(up, low + s * size) for s in np.linspace(0.60, 0.64, 5)]
-    waist = np.concatenate([c[0].points @ ahead for c in waist_cuts if c])
-    seat = spans(0.49, 0.55)
-    votes += float(np.clip(((waist.min() - seat[0]) - (seat[1] - waist.max())) / (0.02 * size), -1.0, 1.0))
-    if abs(votes) < 0.25:
-        raise InputError("scan: front and back cannot be told apart by feet or seat; give facing, as facing = '+z'")
-    return float(np.sign(votes))

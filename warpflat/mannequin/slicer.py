@@ -1,0 +1,102 @@
+"""Plane sections of a triangle mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+
+__all__ = ["Slice", "Slicer"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slice:
+    """One connected part of a plane section.
+
+    Attributes:
+        points: #P by 3, where the plane meets mesh edges [m], in no order.
+        length: summed length of the section's segments [m].
+        closed: false where a hole in the mesh leaves a gap.
+        patched: length of the segments on patches that close holes [m].
+    """
+
+    points: FloatArray
+    length: float
+    closed: bool = True
+    patched: float = 0.0
+
+    @property
+    def is_holed(self) -> bool:
+        """Return whether a hole leaves a gap, or more than a tenth of the section runs over patches."""
+        return not self.closed or self.patched > 0.1 * self.length
+
+
+class Slicer:
+    """Plane sections of a triangle mesh, connected parts apart; holes in the mesh only leave gaps."""
+
+    def __init__(
+        self, vertices: FloatArray, triangles: NDArray[np.int64], noise: float = 0.0, scanned: int | None = None
+    ) -> None:
+        #: How far noise moved the vertices before it was smoothed [m].
+        self.noise = noise
+        #: Triangles from this one on close holes.
+        self.scanned = len(triangles) if scanned is None else scanned
+        ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
+        ends = np.sort(ends, axis=1).astype(np.int64)
+        keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
+        self.edges = np.column_stack([keys // len(vertices), keys % len(vertices)])
+        self.face_edges = np.ravel(inverse).reshape(-1, 3)
+        self.vertices = vertices
+        self.triangles = triangles
+        self._corners = np.ascontiguousarray(triangles.T)
+
+    def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
+        """Return the connected parts of the section where normal . x = offset, longest first."""
+        d = self.vertices @ normal - offset
+        d[d == 0.0] = 1e-12
+        above = d > 0.0
+        first, second, third = (above[corners] for corners in self._corners)
+        faces = np.flatnonzero((first != second) | (first != third))
+        if not len(faces):
+            return []
+        # Two of a cut triangle's edges cross the plane: which two, by the one that does not.
+        first, second, third = first[faces, None], second[faces, None], third[faces, None]
+        edges = self.face_edges[faces]
+        pairs = np.where(
+            first == second, edges[:, [1, 2]], np.where(second == third, edges[:, [0, 2]], edges[:, [0, 1]])
+        )
+        used, local = np.unique(pairs, return_inverse=True)
+        local = np.ravel(local).reshape(-1, 2)
+        a, b = self.edges[used].T
+        t = (d[a] / (d[a] - d[b]))[:, None]
+        points = (1 - t) * self.vertices[a] + t * self.vertices[b]
+        label = _part_labels(len(used), local)
+        segments = np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1)
+        length = np.bincount(label[local[:, 0]], segments)
+        patched = np.bincount(label[local[:, 0]], segments * (faces >= self.scanned))
+        loose = np.bincount(label, np.bincount(local.ravel(), minlength=len(used)) == 1)
+        parts = [
+            Slice(points=points[label == i], length=float(length[i]), closed=not loose[i], patched=float(patched[i]))
+            for i in np.argsort(-length)
+        ]
+        return [p for p in parts if len(p.points) > 3]
+
+
+def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return #size, the part of each point that the pairs join; quicker than a sparse graph for a section's few points."""
+    root = list(range(size))
+    for a, b in pairs.tolist():
+        while root[a] != a:
+            root[a] = a = root[root[a]]
+        while root[b] != b:
+            root[b] = b = root[root[b]]
+        if a < b:
+            root[b] = a
+        else:
+            root[a] = b
+    for i, above in enumerate(root):
+        root[i] = root[above]
+    return np.asarray(np.unique(root, return_inverse=True)[1].reshape(-1))
