@@ -90,7 +90,9 @@ def test_girths_are_the_body_and_its_ease(body, sewn):
     girths = sewn.metrics()["girths"]
     assert list(girths) == ["bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee"]
     wanted = {level: girth["ease_wanted_m"] for level, girth in girths.items() if "ease_wanted_m" in girth}
-    assert wanted == pytest.approx({"bust": 0.05, "waist": 0.025, "abdomen": 0.03, "hip": 0.03})
+    assert wanted == pytest.approx({"bust": 0.05, "waist": 0.025, "hip": 0.03})
+    # The skirt bridges the small of the back: it has more than the 3 cm of the preset there.
+    assert 0.03 < girths["abdomen"]["ease_m"] < 0.06
     for level, ease in wanted.items():
         assert girths[level]["body_m"] == pytest.approx(body.levels()[level].girth)
         assert girths[level]["ease_m"] == pytest.approx(ease, abs=2e-3)

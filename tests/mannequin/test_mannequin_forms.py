@@ -8,6 +8,7 @@ from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
 from warpflat.mannequin.blend import blend_forms
+from warpflat.mannequin.bridging import bridge_rows
 from warpflat.mannequin.forms import form_from_mapping, form_names
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.profiles import convex_girth
@@ -334,3 +335,20 @@ def test_every_part_of_a_line_is_kept(body: Mannequin) -> None:
     assert "bust 2" not in lines
     assert set(piece.edges["bust"].tolist()) < set(lines["bust"].tolist())
     assert len(lines["bust"]) == len(np.intersect1d(body.layout.lines["bust"], piece.grid_vertices))
+
+
+def test_cloth_bridges_the_small_of_the_back_and_stays_where_it_stands_out() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    radius = np.array([1.0, 0.8, 0.5, 0.45, 0.5])  # upwards: seat, small of the back, waist
+    hollow = np.linspace(0.0, 1.0, 5)[:, None] * np.ones(24)
+    rows = np.stack([radius[:, None] * np.cos(angle), hollow, radius[:, None] * np.sin(angle)], axis=-1)
+    out, grid = rows.reshape(-1, 3).copy(), np.arange(5 * 24).reshape(5, 24)
+    bridge_rows(out, grid, {"hip": 0, "waist": 4}, ("waist", "hip"))
+    bridged = np.linalg.norm(out.reshape(5, 24, 3)[..., [0, 2]], axis=2)
+    assert bridged == pytest.approx(np.linspace(1.0, 0.5, 5)[:, None] * np.ones(24), abs=5e-3)
+    assert np.array_equal(out[:, 1], rows.reshape(-1, 3)[:, 1])
+    full = rows.copy()
+    full[1:4, :, [0, 2]] = rows[1:4][..., [0, 2]] * (np.array([0.95, 0.85, 0.7]) / radius[1:4])[:, None, None]
+    kept = full.reshape(-1, 3).copy()
+    bridge_rows(kept, grid, {"hip": 0, "waist": 4}, ("waist", "hip"))
+    assert kept == pytest.approx(full.reshape(-1, 3), abs=1e-9)

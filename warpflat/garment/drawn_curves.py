@@ -17,7 +17,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.polyline import turning_angles
 from warpflat.garment.constraints import Constraint, DrawnLine, FixedLength, Straight
 from warpflat.garment.edge_rules import HEMMED_LEVELS
-from warpflat.pattern.fairing import count_inflections, fair_line, shortest_wave
+from warpflat.pattern.fairing import count_inflections, fair_line, fairest_line
 
 if TYPE_CHECKING:
     from warpflat.garment.sewn import ConstraintResult
@@ -88,7 +88,7 @@ class Curves:
     """The drawn borders of a garment.
 
     Attributes:
-        bound_mm: how far a line may lie from where the cloth would have it.
+        bound_mm: how far a line may lie from where the cloth would have it; in pieces that this would strain too much, less.
         price_j: energy that all cost together.
         lines: the drawn stretches.
     """
@@ -106,7 +106,7 @@ def plan_curves(
     layout: Layout,
     form: FormResult,
     positions: Mapping[str, FloatArray],
-    bound: float,
+    bounds: Mapping[str, float],
     constraints: Sequence[Constraint] = (),
 ) -> list[PlannedCurve]:
     """Return the lines that the edges of a form's pieces are to be.
@@ -117,7 +117,7 @@ def plan_curves(
         layout: the body's grid.
         form: the pieces on it.
         positions: by piece, #V by 2, sewn [m].
-        bound: how far a line may lie from where the cloth would have it [m].
+        bounds: by piece, how far a line may lie from where the cloth would have it [m].
         constraints: of the sewing.
     """
     ruled = {(each.piece, each.line) for each in constraints if isinstance(each, Straight | FixedLength)}
@@ -129,6 +129,7 @@ def plan_curves(
     }
     plans = []
     for name, piece in form.pieces.items():
+        bound = bounds[name]
         on_fold = set() if piece.fold is None else set(piece.edges[piece.fold].tolist())
         for edge, vertices in _open_edges(form, name, positions[name]):
             part = piece.parts.get(edge, edge)
@@ -140,11 +141,11 @@ def plan_curves(
             away = fair_line(own, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
             straight = bool(wanted.any()) and away <= bound
             kept = wanted if straight else None
-            wave = shortest_wave(own, bound, straight=kept, mirrored=mirrored)
-            if wave is None:
+            one_way = book == "below hip" and bool(np.isin(grid, layout.rings[: layout.level_row["waist"] + 1]).all())
+            drawn = fairest_line(own, bound, straight=kept, mirrored=mirrored, one_way=one_way)
+            if drawn is None:
                 continue
-            shape = fair_line(own, wave, straight=kept, mirrored=mirrored).points
-            line = DrawnLine(piece=name, line=edge, vertices=vertices, shape=shape)
+            line = DrawnLine(piece=name, line=edge, vertices=vertices, shape=drawn.points)
             plans.append(PlannedCurve(line=line, before=own, book=book, straight=straight, away=away))
     return plans
 

@@ -343,9 +343,31 @@ class _SewAgain:
         return kept, replace(self, held=[*self.held, *girths])
 
     def with_curves(self, garment: Garment, bound: float) -> Garment:
-        """Return the garment with its borders drawn as by hand, within a bound [m]."""
+        """Return the garment with its borders drawn as by hand, within a bound [m].
+
+        Pieces that fit as the cloth rests and are strained beyond its limit as they are drawn get half the bound, and half of that.
+        """
+        bounds = dict.fromkeys(garment.pieces, bound)
+        for last in (False, False, True):
+            drawn = self._drawn(garment, bounds)
+            if drawn.curves is None:
+                return drawn
+            strained = [
+                name for name, piece in drawn.pieces.items() if not piece.fit.fits and garment.pieces[name].fit.fits
+            ]
+            if last or not strained:
+                break
+            bounds |= {name: 0.5 * bounds[name] for name in strained}
+        less = [f"{name} {1e3 * own:.3g} mm" for name, own in bounds.items() if own < bound]
+        if not less:
+            return drawn
+        words = f"borders are drawn within less, or the cloth would be strained beyond its limit: {', '.join(less)}"
+        return replace(drawn, remarks=(*drawn.remarks, words))
+
+    def _drawn(self, garment: Garment, bounds: Mapping[str, float]) -> Garment:
+        """Return the garment with the borders of each piece drawn within its bound [m]."""
         assert garment.sewn is not None
-        plans = plan_curves(garment.mannequin.layout, garment.form, _positions(garment), bound, self.held)
+        plans = plan_curves(garment.mannequin.layout, garment.form, _positions(garment), bounds, self.held)
         if not plans or not garment.sewn.converged:
             return garment
         drawn, outcome = self(garment, [plan.line for plan in plans])
@@ -356,6 +378,7 @@ class _SewAgain:
             garment.form, plans, _positions(drawn), [each for each in outcome.results if each.kind == "curve"]
         )
         assert drawn.sewn is not None
+        bound = max(bounds.values())
         return replace(drawn, curves=Curves(bound_mm=1e3 * bound, price_j=drawn.sewn.drawing_cost, lines=lines))
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.mannequin.bridging import bridge_row, bridge_rows, rule_rows
 from warpflat.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
 from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
@@ -82,6 +83,7 @@ def adjusted_vertices(
     profiles: Mapping[str, Adjustment],
     ruled: Sequence[tuple[str, str]] = (),
     ease: Mapping[str, float] | None = None,
+    bridged: Sequence[tuple[str, str]] = (),
 ) -> FloatArray:
     """Return the body's vertices with some profiles moved; what lies between follows smoothly.
 
@@ -91,6 +93,7 @@ def adjusted_vertices(
         profiles: what is done, by level: a closed level of the trunk, ``chest``, an arm or a leg level; ``crotch`` moves up or down only.
         ruled: pairs of levels (upper, lower) of trunk, arms or legs between which the rows are straight.
         ease: by level, what a tape around it reads more than around the body [cm]. Cloth with ease bridges hollows.
+        bridged: pairs of levels of the trunk between which the cloth bridges hollows from level to level, too.
 
     Raises:
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
@@ -98,9 +101,11 @@ def adjusted_vertices(
     ease = ease or {}
     _check_levels(profiles, ease)
     out = vertices.copy()
-    if profiles or ruled or ease:
+    if profiles or ruled or ease or bridged:
         changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
         _move_rings(out, layout, vertices, changes, ruled)
+        for pair in bridged:
+            bridge_rows(out, layout.rings, layout.level_row, pair)
         _move_sheet(out, layout, vertices, changes.get("chest"))
         _move_arms(out, layout, vertices, changes, ruled)
         _move_legs(out, layout, vertices, changes, ruled)
@@ -133,7 +138,7 @@ def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease
     if other is not None:
         new[:, [0, 2]] += change.weight * (other - row)[:, [0, 2]]
     if change.bridge or ease_cm > 0.0:
-        new = _bridged(new)
+        new = bridge_row(new)
     middle = 0.5 * (new.min(axis=0) + new.max(axis=0))
     new = middle + (new - middle) * np.array([change.scale, 1.0, change.scale])
     grow = 2.0 * math.pi * change.offset_cm / 100.0 + ease_cm / 100.0
@@ -148,18 +153,6 @@ def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease
         new = scale_to_girth(new + outward * normal * grow / (2.0 * math.pi), girth)
     new[:, 1] += change.raise_cm / 100.0
     return new
-
-
-def _bridged(row: FloatArray) -> FloatArray:
-    """Return a closed level row with every vertex that lies in a hollow moved to the straight line across it."""
-    from scipy.spatial import ConvexHull
-
-    touch = np.sort(ConvexHull(row[:, [0, 2]]).vertices)
-    s = arc_lengths(row, closed=True)
-    at = np.append(s[touch], s[-1] + s[touch[0]])
-    around = np.vstack([row[touch], row[touch[:1]]])
-    own = np.where(s[:-1] < at[0], s[:-1] + s[-1], s[:-1])
-    return np.column_stack([np.interp(own, at, around[:, i]) for i in range(3)])
 
 
 def _move_rings(
@@ -189,7 +182,7 @@ def _move_rings(
     row_of = {level: layout.level_row[level] for level in RING_LEVELS}
     for pair in ruled:
         if not set(pair) & {*ARM_LEVELS, *LEG_LEVELS}:
-            _rule(out, layout.rings, row_of, pair, body[solid])
+            rule_rows(out, layout.rings, row_of, pair, body[solid])
 
 
 def _level_moves(
@@ -215,57 +208,6 @@ def _level_moves(
 
 def _ring_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
     return _changed(row, other, change, ease_cm) - row
-
-
-def _rule(
-    out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], solid: FloatArray | None
-) -> None:
-    """Lay the rows between two levels straight.
-
-    Args:
-        out: #V by 3 [m], changed in place.
-        grid: rows of trunk, arm or leg.
-        row_of: its levels.
-        pair: of levels.
-        solid: #P by 3, the body, over which cloth hangs where it stands out between the levels; None for an arm, whose
-            rows share the way evenly whatever its direction.
-    """
-    for level in pair:
-        if level not in row_of:
-            raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, row_of)}")
-    a, b = sorted(row_of[level] for level in pair)
-    if a == b:
-        raise InputError(f"form: ruled: {pair[0]} and {pair[1]} are the same level")
-    ids = grid[a : b + 1]
-    first, last = out[ids[0]], out[ids[-1]]
-    share = np.linspace(0.0, 1.0, len(ids))
-    if solid is not None:
-        share = (out[ids, 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
-    straight = first + share[:, None, None] * (last - first)
-    if len(ids) > 2 and solid is not None:
-        low, high = sorted((first[:, 1].mean(), last[:, 1].mean()))
-        between = solid[(solid[:, 1] > low) & (solid[:, 1] < high)]
-        ends = np.concatenate([first, last])
-        inner = straight[1:-1]
-        middles = inner.mean(axis=1, keepdims=True) * [1.0, 0.0, 1.0] + inner * [0.0, 1.0, 0.0]
-        rays = inner - middles
-        alone, over = (_hull_reach(points, middles, rays) for points in (ends, np.concatenate([ends, between])))
-        # Straight, except where the body pushes the hull out; the hull of the end rows alone is no straight line, so that
-        # the body may stand out of the one and not of the other.
-        bare = _hull_reach(between, middles, rays)
-        pushed = np.maximum(np.where(over > alone * (1.0 + 1e-9), over, bare), 1.0)
-        straight[1:-1] = middles + pushed[..., None] * rays
-    out[ids] = straight
-
-
-def _hull_reach(points: FloatArray, starts: FloatArray, rays: FloatArray) -> FloatArray:
-    """Return how many of its own lengths each ray, #R by #P by 3, runs from inside the convex hull of `points` to it."""
-    from scipy.spatial import ConvexHull
-
-    planes = ConvexHull(points).equations
-    rate = rays @ planes[:, :3].T
-    room = -(starts @ planes[:, :3].T + planes[:, 3])
-    return np.asarray(np.where(rate > 1e-12, room / np.where(rate > 1e-12, rate, 1.0), np.inf).min(axis=2))
 
 
 def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[Adjustment, float] | None) -> None:
@@ -371,7 +313,7 @@ def _move_arms(
         out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
         for pair in ruled:
             if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
-                _rule(out, grid, layout.arm_row, pair, None)
+                rule_rows(out, grid, layout.arm_row, pair, None)
 
 
 def _move_legs(
@@ -408,7 +350,7 @@ def _move_legs(
         out[fork] = body[fork] + move[fork]
         for pair in ruled:
             if set(pair) & set(LEG_LEVELS):
-                _rule(out, grid, row_of, pair, body[grid[1:].reshape(-1)])
+                rule_rows(out, grid, row_of, pair, body[grid[1:].reshape(-1)])
 
 
 def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float) -> FloatArray:

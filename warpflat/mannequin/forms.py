@@ -60,6 +60,7 @@ class Form:
         pieces: recipes by piece name.
         profiles: adjustments of the body's profiles, by level.
         ruled: pairs of levels (upper, lower) between which the cloth hangs in straight lines.
+        bridged: pairs of levels of the trunk between which it bridges hollows, as the small of the back.
         blend: another form and its weight from 0 to 1: the surface between this form's and the other's.
         darts: slits in its pieces.
         ease: by level, how much more than around the body a tape reads around the garment [cm]; negative for knits.
@@ -73,6 +74,7 @@ class Form:
     pieces: Mapping[str, PieceRecipe]
     profiles: Mapping[str, Adjustment] = field(default_factory=dict)
     ruled: tuple[tuple[str, str], ...] = ()
+    bridged: tuple[tuple[str, str], ...] = ()
     blend: tuple[Form, float] | None = None
     darts: tuple[FormDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
@@ -102,7 +104,7 @@ class FormResult:
         pieces: by name; each is one disk.
         seams: between edges that are the same curve in space.
         darts: of the pieces on both sides of the body.
-        ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled ones.
+        ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled or bridged ones.
     """
 
     name: str
@@ -247,15 +249,22 @@ def _keeps_ease(form: Form, level: str) -> bool:
     if level not in RING_LEVELS or (level in form.profiles and form.profiles[level].like is not None):
         return False
     at = RING_LEVELS.index(level)
-    pairs = [sorted(map(RING_LEVELS.index, pair)) for pair in form.ruled if set(pair) <= set(RING_LEVELS)]
+    pairs = [
+        sorted(map(RING_LEVELS.index, pair)) for pair in (*form.ruled, *_bridged(form)) if set(pair) <= set(RING_LEVELS)
+    ]
     return not any(low < at < high for low, high in pairs)
+
+
+def _bridged(form: Form) -> tuple[tuple[str, str], ...]:
+    """Return the levels between which the form bridges hollows; one that is tighter than its body bridges none."""
+    return () if is_tight(form.profiles, form.ease) else form.bridged
 
 
 def _surface(
     layout: Layout, body: FloatArray, form: Form, used: IntArray, neckline: Neckline | None = None
 ) -> FloatArray:
     """Return the body's vertices moved to the form; the vertices `used` lie outside the body, unless the form is tighter than it."""
-    vertices = adjusted_vertices(layout, body, form.profiles, form.ruled, form.ease)
+    vertices = adjusted_vertices(layout, body, form.profiles, form.ruled, form.ease, _bridged(form))
     tight = is_tight(form.profiles, form.ease)
     if form.blend is not None:
         other, weight = form.blend

@@ -13,13 +13,14 @@ from warpflat.mannequin.layout import Layout
 
 __all__ = ["shaped_form"]
 
-_HOLLOW = (("bust", "waist"),)
+_UNDER_BUST = ("bust", "waist")
+_SMALL_OF_BACK = ("waist", "hip")
 
 
 def shaped_form(layout: Layout, form: Form, shape: Literal["none", "darts", "princess"]) -> Form:
     """Return a form whose pieces are shaped: by the darts of a pattern book's block, or by princess seams.
 
-    With a bust dart the cloth hangs straight from the bust to the waist.
+    With a bust dart the cloth hangs straight from the bust to the waist, and with skirt darts it bridges the small of the back.
 
     Raises:
         InputError: an unknown brick.
@@ -29,9 +30,15 @@ def shaped_form(layout: Layout, form: Form, shape: Literal["none", "darts", "pri
         return form
     if shape == "darts":
         darts = standard_darts(layout, bricks)
-        # Legs are straight where the cloth hangs straight, over the hollow under the bust.
-        ruled = _HOLLOW if any(dart.line == "bust" for dart in darts) else ()
-        return replace(form, darts=(*form.darts, *darts), ruled=(*form.ruled, *ruled))
+        # Legs are straight where the cloth hangs straight over the hollows of the body.
+        ruled = [_UNDER_BUST] if any(dart.line == "bust" for dart in darts) else []
+        bridged = [_SMALL_OF_BACK] if any(dart.towards is not None for dart in darts) else []
+        return replace(
+            form,
+            darts=(*form.darts, *darts),
+            ruled=(*form.ruled, *ruled),
+            bridged=(*form.bridged, *bridged),
+        )
     pieces: dict[str, PieceRecipe] = {}
     for name, recipe in form.pieces.items():
         pieces |= _parted(name, recipe, bricks[name])

@@ -21,7 +21,7 @@ __all__ = ["PRINCESS", "blueprint_from_measurements", "replace_chest"]
 
 #: Where the princess lines run: distance from the centre as a share of the bust points', by level, front and back.
 PRINCESS = {
-    "ankle": (0.62, 0.62), "knee": (0.80, 0.80), "thigh": (1.05, 1.05), "hip": (1.05, 1.08), "abdomen": (0.95, 0.95),
+    "ankle": (0.62, 0.62), "knee": (0.80, 0.80), "thigh": (1.05, 1.05), "hip": (1.05, 1.08), "abdomen": (0.92, 0.90),
     "waist": (0.82, 0.80), "underbust": (0.94, 0.92), "bust": (1.00, 1.00),
 }  # fmt: skip
 _SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0)}
@@ -80,6 +80,8 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
     # A side seam climbs nearly plumb to the armhole, and a bust's widest points stand far behind those of the ribs.
     line = column("shift", 0.0, size / 100.0)
     line[-2:] = line[-3] + _SIDE_BACK * (line[-2] - line[-3])
+    hip, abdomen, waist = (RING_LEVELS.index(level) for level in ("hip", "abdomen", "waist"))
+    line[abdomen] = np.interp(y[abdomen], y[[hip, waist]], line[[hip, waist]])
 
     # Monotone between levels: no girth, width or depth swells beyond those measured above and below.
     smooth = PchipInterpolator(

@@ -9,7 +9,7 @@ import numpy as np
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 
-__all__ = ["FairLine", "count_inflections", "fair_line", "shortest_wave"]
+__all__ = ["FairLine", "bend_one_way", "best_wave", "count_inflections", "fair_line", "fairest_line"]
 
 #: A line is faired at places this far apart [m], but at no fewer and no more of them than this.
 STEP, FEWEST, MOST = 0.003, 24, 200
@@ -17,6 +17,8 @@ STEP, FEWEST, MOST = 0.003, 24, 200
 LEAST_BEND = np.radians(1.0)
 #: Waves that are tried: the first [m], the factor from each to the next, and how many.
 FIRST_WAVE, GROWTH, WAVES = 0.03, 1.3, 20
+#: An inflection is drawn away if the line need not move farther than this for it [m]. The waist of a side seam is one to keep.
+WORTH = 0.0006
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,10 +69,7 @@ def fair_line(
     """
     places, even = _evenly(points)
     arc = arc_lengths(points)
-    is_straight = np.zeros(len(even), dtype=bool)
-    if straight is not None and straight.any():
-        ends = arc[straight][[0, -1]] + places[1] * np.array([-1.0, 1.0])
-        is_straight = (places >= ends[0]) & (places <= ends[1])
+    is_straight = _straight_places(points, places, straight)
     first = 0
     for at_end in (False, True):
         if mirrored[at_end]:
@@ -89,22 +88,92 @@ def fair_line(
     return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
 
 
-def shortest_wave(
+def best_wave(
     points: FloatArray,
     bound: float,
     *,
     straight: BoolArray | None = None,
     mirrored: tuple[bool, bool] = (False, False),
 ) -> float | None:
-    """Return the shortest wave that makes the fewest inflections within a bound [m]; None if every wave breaks the bound."""
-    best: tuple[int, float] | None = None
+    """Return the wave that makes the fewest inflections for the least shift; None if every wave breaks the bound [m]."""
+    best: tuple[float, float] | None = None
     for wave in FIRST_WAVE * GROWTH ** np.arange(WAVES):
         tried = fair_line(points, float(wave), straight=straight, mirrored=mirrored)
         if tried.shift > bound:
             break
-        if best is None or tried.inflections < best[0]:
-            best = tried.inflections, float(wave)
+        cost = tried.shift + WORTH * tried.inflections
+        if best is None or cost < best[0]:
+            best = cost, float(wave)
     return None if best is None else best[1]
+
+
+def bend_one_way(points: FloatArray, wave: float, *, straight: BoolArray | None = None) -> FairLine | None:
+    """Return the line that is as near and as fair as that of :func:`fair_line` among those that bend to one side only.
+
+    The line is a graph over the chord of its ends: a straight line and hinges of one sign (non-negative least squares).
+
+    Args:
+        points: #P by 2 [m].
+        wave: as in :func:`fair_line` [m].
+        straight: #P, points in a row that come to lie on one straight line, if some do.
+
+    Returns:
+        The line; None if it is no graph over its chord.
+    """
+    from scipy.optimize import nnls
+
+    places, even = _evenly(points)
+    chord = even[-1] - even[0]
+    along = chord / max(float(np.linalg.norm(chord)), 1e-12)
+    across = np.array([-along[1], along[0]])
+    x, y = (even - even[0]) @ along, (even - even[0]) @ across
+    if np.diff(x).min() <= 0.0:
+        return None
+    side = np.sign(y.sum()) or 1.0
+    is_straight = _straight_places(points, places, straight)
+    bends = np.array([at for at in range(1, len(x) - 1) if not is_straight[at - 1 : at + 2].all()])
+    # The straight line's height and slope may have either sign.
+    basis = np.column_stack([np.ones_like(x), -np.ones_like(x), x, -x, -np.maximum(x[:, None] - x[bends], 0.0)])
+    bend = (wave / (2 * np.pi * places[1])) ** 3 * np.diff(basis, n=3, axis=0)
+    shares, _ = nnls(np.vstack([basis, bend]), np.concatenate([side * y, np.zeros(len(bend))]), maxiter=100 * len(x))
+    smooth = even[0] + x[:, None] * along + side * (basis @ shares)[:, None] * across
+    placed = points_at_lengths(smooth, np.interp(arc_lengths(points), places, arc_lengths(smooth)))
+    return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
+
+
+def fairest_line(
+    points: FloatArray,
+    bound: float,
+    *,
+    straight: BoolArray | None = None,
+    mirrored: tuple[bool, bool] = (False, False),
+    one_way: bool = False,
+) -> FairLine | None:
+    """Return the line within a bound that has few inflections for little shift; None if no line is within it.
+
+    Args:
+        points, straight, mirrored: as in :func:`fair_line`.
+        bound: [m].
+        one_way: whether a line that bends to one side only is preferred, with the longest wave within the bound.
+    """
+    wave = best_wave(points, bound, straight=straight, mirrored=mirrored)
+    best = None if wave is None else fair_line(points, wave, straight=straight, mirrored=mirrored)
+    if not one_way or (best is not None and best.inflections == 0):
+        return best
+    for wave in FIRST_WAVE * GROWTH ** np.arange(WAVES):
+        tried = bend_one_way(points, float(wave), straight=straight)
+        if tried is None or tried.shift > bound:
+            break
+        best = tried
+    return best
+
+
+def _straight_places(points: FloatArray, places: FloatArray, straight: BoolArray | None) -> BoolArray:
+    """Return which places along a line lie between points that come to lie straight."""
+    if straight is None or not straight.any():
+        return np.zeros(len(places), dtype=bool)
+    first, last = arc_lengths(points)[straight][[0, -1]] + places[1] * np.array([-1.0, 1.0])
+    return np.asarray((places >= first) & (places <= last))
 
 
 def _evenly(points: FloatArray) -> tuple[FloatArray, FloatArray]:
