@@ -35,7 +35,7 @@
     }
     piece.layouts = [];
     let before = null;
-    for (const number of film.frames) {
+    for (const number of piece.frames) {
       let shape = piece.topologies[0];
       for (const each of piece.topologies) if (each.first <= number) shape = each;
       const steps = planes(2 * shape.vertices, 2), colours = data.slice(at, at + shape.vertices);
@@ -45,7 +45,7 @@
         for (let i = 0; i < colours.length; i++) colours[i] += before.colours[i];
       }
       before = { shape, steps, colours };
-      piece.layouts.push({ shape, colours, points: placed(piece, steps) });
+      piece.layouts.push({ number, shape, colours, points: placed(piece, steps) });
     }
   }
   function placed(piece, steps) {
@@ -134,12 +134,15 @@
     gl.drawElements(gl.LINES, shape.edge.length, gl.UNSIGNED_INT, 0);
   }
 
-  // --- time: between two frames of one topology the layout is blended
+  // --- time: between two layouts of one topology there are blends of both
   const last = film.frames.length - 1;
   let now = 0, playing = false;
   function stateAt(piece, time) {
-    const k = Math.min(Math.floor(time), last), share = time - k, a = piece.layouts[k];
-    const b = piece.layouts[Math.min(k + 1, last)];
+    const k = Math.min(Math.floor(time), last), next = film.frames[Math.min(k + 1, last)];
+    const frame = film.frames[k] + (time - k) * (next - film.frames[k]);
+    const after = piece.layouts.findIndex((layout) => layout.number > frame);
+    const a = piece.layouts.at(after < 0 ? -1 : Math.max(after - 1, 0)), b = after < 0 ? a : piece.layouts[after];
+    const share = after < 0 ? 0 : (frame - a.number) / (b.number - a.number);
     if (share <= 0 || b.shape !== a.shape) return a;
     const blended = (x, y, kind) => kind.from(x, (value, i) => value + share * (y[i] - value));
     return { shape: a.shape, points: blended(a.points, b.points, Float32Array), colours: blended(a.colours, b.colours, Uint8Array) };
@@ -152,7 +155,7 @@
     const grow = (p) => { for (let i = 0; i < p.length; i++) { low[i % 3] = Math.min(low[i % 3], p[i]); high[i % 3] = Math.max(high[i % 3], p[i]); } };
     for (const piece of film.pieces) {
       if (which !== "pattern") grow(piece.topologies[0].surface);
-      if (which !== "surface") for (const k of [0, last]) grow(piece.layouts[k].points);
+      if (which !== "surface") for (const k of [0, -1]) grow(piece.layouts.at(k).points);
     }
     return [low, high];
   }
