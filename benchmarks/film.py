@@ -1,19 +1,24 @@
 """Figures of the films of scenes: how many frames, how much moves in one, and what film and review page add to a run.
 
-    python benchmarks/film.py [SCENE.toml ...] [--repeats 2]
+    OMP_NUM_THREADS=1 python benchmarks/film.py [SCENE.toml ...] [--repeats 3] [--figures]
 
 A row per scene. `frames` is their number, `stages` how many each stage has. `largest share` is the way of the vertex that moves
-farthest in one frame, as a share of the largest displacement in its stage, over all pieces. `film` and `MB` are what `frames.usdc`
-adds to the run: CPU seconds by the difference of the fastest runs with it and without it, and its size. `review` is the same of
-`review.html`. `run` is the whole run with both. CPU seconds count, since they are the same on a busy machine.
+farthest in one frame, as a share of the largest displacement in its stage, over all pieces. `run` is the processor time of the
+whole command, a process of its own with compiled kernels. `film` and `page` are what it spends on `frames.usdc` and on `review.html`,
+libraries loaded for them among it; `share` is both of the run. `MB` are their sizes, `other` is that of all other files. The
+fastest of the repeats counts. `--figures` runs each scene once.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
+import json
+import os
+import subprocess
+import sys
 import tempfile
 import time
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,7 +27,6 @@ import numpy as np
 
 import warpflat
 from warpflat.core.errors import InputError
-from warpflat.scene.load import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
 
@@ -54,46 +58,91 @@ def largest_shares(film: Path) -> tuple[int, list[int], float]:
     return frames, counts, worst
 
 
-def timed(scene: Scene, folder: Path, repeats: int, **output: Any) -> float:
-    """Return the seconds of the fastest run with these settings of its output."""
-    settings = scene.settings.model_copy(update={"output": scene.settings.output.model_copy(update=output)})
-    asked, best = replace(scene, settings=settings), np.inf
+def seconds(scene: Path, folder: Path, repeats: int) -> tuple[float, float, float]:
+    """Run a scene as a command; return the processor seconds of film, page and all, of the fastest repeat."""
+    found = []
     for _ in range(repeats):
-        begun = time.process_time()
-        warpflat.run_scene(asked, folder)
-        best = min(best, time.process_time() - begun)
-    return float(best)
+        command = [sys.executable, __file__, "--child", str(scene), str(folder)]
+        before = os.times()
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        after = os.times()
+        if done.returncode:
+            raise InputError(done.stderr.strip().splitlines()[-1])
+        spent = json.loads(done.stdout.splitlines()[-1])
+        found.append((spent["film"], spent["page"], sum(after[2:4]) - sum(before[2:4])))
+    return min(found, key=lambda each: each[2])
+
+
+def child(scene: str, folder: str) -> None:
+    """Run a scene in this process as the program does; print the processor seconds of film and page, imports among them."""
+    from warpflat.cli.run import start_warp_silently
+    from warpflat.core.beside import work_beside
+
+    spent, inside = {"film": 0.0, "page": 0.0}, []
+
+    def count(owner: Any, name: str, part: str) -> None:
+        function = getattr(owner, name)
+
+        def counted(*args: Any, **options: Any) -> Any:
+            if inside:
+                return function(*args, **options)
+            inside.append(part)
+            begun = time.thread_time()
+            try:
+                return function(*args, **options)
+            finally:
+                spent[inside.pop()] += time.thread_time() - begun
+
+        setattr(owner, name, counted)
+
+    start_warp_silently()
+    loaded = warpflat.load_scene(scene)
+    frames = importlib.import_module("warpflat.scene.frames")
+    page = importlib.import_module("warpflat.review.page")
+    for owner, names, part in (
+        (frames.Film, ("__enter__", "__exit__"), "film"),
+        (frames.FrameRecorder, ("__call__", "record_result", "record_cut_line"), "film"),
+        (page, ("pack_frames", "pack_pictures", "write_review"), "page"),
+    ):
+        for name in names:
+            count(owner, name, part)
+    with work_beside():
+        warpflat.run_scene(loaded, Path(folder))
+    print(json.dumps(spent))
 
 
 def main() -> None:
     """Print a row per scene."""
+    if sys.argv[1:2] == ["--child"]:
+        child(*sys.argv[2:4])
+        return
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "scenes", nargs="*", type=Path, default=sorted(set(SCENES.glob("*.toml")) - set(SCENES.glob("batch_*.toml")))
     )
-    parser.add_argument("--repeats", type=int, default=2)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--figures", action="store_true", help="run each scene once")
     given = parser.parse_args()
     print(
-        f"{'scene':22}{'frames':>7}{'largest share':>15}{'film s':>8}{'MB':>6}{'page s':>8}{'MB':>6}{'run s':>7}  stages"
+        f"{'scene':20}{'frames':>7}{'largest share':>15}{'MB':>6}{'page MB':>8}{'other':>6}"
+        f"{'film s':>8}{'page s':>8}{'run s':>7}{'share':>7}  stages"
     )
     for path in given.scenes:
-        scene = warpflat.load_scene(path)
         try:
-            with tempfile.TemporaryDirectory() as folder:
-                timed(scene, Path(folder) / "warm", 1)  # kernels and libraries are loaded
-                bare = timed(scene, Path(folder) / "bare", given.repeats, frames=0, review=False)
-                filmed = timed(scene, Path(folder) / "bare", given.repeats, review=False)
-                whole = timed(scene, Path(folder) / "film", given.repeats)
-                film = Path(folder) / "film" / "frames.usdc"
+            with tempfile.TemporaryDirectory() as scratch:
+                folder = Path(scratch) / path.stem
+                film_s, page_s, run_s = seconds(path, folder, 1 if given.figures else given.repeats)
+                film = folder / "frames.usdc"
                 frames, counts, share = largest_shares(film)
-                size, page = film.stat().st_size / 1e6, film.with_name("review.html").stat().st_size / 1e6
+                sizes = {file.name: file.stat().st_size / 1e6 for file in folder.iterdir()}
+                size, page = sizes.pop("frames.usdc"), sizes.pop("review.html")
         except InputError as error:
-            print(f"{path.stem:22}{error}")
+            print(f"{path.stem:20}{error}")
             continue
         print(
-            f"{path.stem:22}{frames:7}{100 * share:14.2f}%{filmed - bare:8.2f}{size:6.1f}"
-            f"{whole - filmed:8.2f}{page:6.2f}{whole:7.2f}  "
-            f"{' + '.join(map(str, counts))}"
+            f"{path.stem:20}{frames:7}{100 * share:14.2f}%{size:6.1f}{page:8.2f}{sum(sizes.values()):6.1f}"
+            f"{film_s:8.2f}{page_s:8.2f}{run_s:7.2f}{100 * (film_s + page_s) / run_s:6.0f}%  {' + '.join(map(str, counts))}",
+            flush=True,
         )
 
 

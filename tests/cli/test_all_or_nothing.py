@@ -135,17 +135,20 @@ def test_saving_is_all_or_nothing(tmp_path: Path):
 
 
 def test_usd_that_fails_without_a_word_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from pxr import Sdf
+    from pxr import Usd
 
-    export = Sdf.Layer.Export
+    save = Usd.Stage.Save
 
-    def cut_short(layer: Any, path: str) -> bool:
-        export(layer, path)
+    def cut_short(stage: Any) -> None:
+        save(stage)
+        path = stage.GetRootLayer().realPath
         os.truncate(path, os.path.getsize(path) - 100)
-        return True
 
-    monkeypatch.setattr(Sdf.Layer, "Export", cut_short)
-    with pytest.raises(InputError, match=r"cannot write .*frames\.usdc"), FrameWriter(tmp_path / "frames.usdc"):
+    monkeypatch.setattr(Usd.Stage, "Save", cut_short)
+    with (
+        pytest.raises(InputError, match=r"cannot write .*frames\.usdc"),
+        FrameWriter(tmp_path / "frames.usdc", scale=1.0),
+    ):
         pass
     assert files(tmp_path) == {}
 
@@ -314,7 +317,7 @@ def _interrupted(action: Callable[[], None], at: int, watched: tuple[str, ...]) 
 
 
 def _frames(folder: Path) -> None:
-    with FrameWriter(folder / "frames.usdc") as writer:
+    with FrameWriter(folder / "frames.usdc", scale=1.0) as writer:
         writer.add_piece("dome", make_shape("dome", resolution=5))
         writer.write(
             "dome", positions=make_shape("dome", resolution=5).vertices[:, :2], face_energy_density=np.zeros(16)

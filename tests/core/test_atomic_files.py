@@ -95,7 +95,7 @@ def _export(kind: str, path: Path) -> None:
     elif kind == "obj":
         write_obj(path, shape, flat)
     elif kind == "usdc":
-        with FrameWriter(path) as writer:
+        with FrameWriter(path, scale=1.0) as writer:
             writer.add_piece("dome", shape)
             writer.write("dome", positions=flat, face_energy_density=density)
     else:
@@ -134,7 +134,7 @@ def test_a_signal_while_a_place_is_tried_leaves_no_file(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(Path, "touch", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        FrameWriter(tmp_path / "frames.usdc").__enter__()
+        FrameWriter(tmp_path / "frames.usdc", scale=1.0).__enter__()
     assert os.listdir(tmp_path) == []
 
 
@@ -144,7 +144,7 @@ def test_a_signal_while_a_film_is_opened_leaves_no_file(tmp_path: Path, monkeypa
         raise KeyboardInterrupt
 
     monkeypatch.setattr("warpflat.export.usd.define_group", interrupted)
-    with pytest.raises(KeyboardInterrupt), FrameWriter(tmp_path / "frames.usdc"):
+    with pytest.raises(KeyboardInterrupt), FrameWriter(tmp_path / "frames.usdc", scale=1.0):
         pass
     assert os.listdir(tmp_path) == []
 

@@ -16,7 +16,7 @@ from usd_validation import validate_usd
 import warpflat
 from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours, linear_rgb
-from warpflat.export.usd import FrameWriter
+from warpflat.export.usd import FrameWriter, film_scale
 
 # A child finds the package and the helpers where this process found them.
 FOUND = {
@@ -53,7 +53,7 @@ def test_numbers_read_back_as_written(tmp_path: Path) -> None:
     shape = dome(9)
     rng = np.random.default_rng(0)
     frames = [(rng.standard_normal((81, 2)), rng.random(64)) for _ in range(5)]
-    with FrameWriter(tmp_path / "frames.usdc", save_every=2) as writer:
+    with FrameWriter(tmp_path / "frames.usdc", save_every=2, scale=1.0) as writer:
         writer.add_piece("dome", shape)
         numbers = [
             writer.write(
@@ -87,7 +87,7 @@ def test_stage_says_what_it_is(tmp_path: Path) -> None:
     from pxr import Kind, Usd, UsdGeom
 
     shape = mixed()
-    with FrameWriter(tmp_path / "frames.usdc", frames_per_second=30) as writer:
+    with FrameWriter(tmp_path / "frames.usdc", frames_per_second=30, scale=1.0) as writer:
         writer.add_piece("Ärmel links", shape)
         for _ in range(3):
             writer.write("Ärmel links", positions=shape.vertices[:, :2], face_energy_density=np.ones(3))
@@ -111,7 +111,8 @@ def test_stage_says_what_it_is(tmp_path: Path) -> None:
 def test_colours_have_one_scale_over_time_and_pieces(tmp_path: Path) -> None:
     shape = dome(5)
     flat = shape.vertices[:, :2]
-    with FrameWriter(tmp_path / "frames.usdc") as writer:
+    scale = film_scale([shape, shape], [np.full(16, 2.0), np.full(16, 1.0)])
+    with FrameWriter(tmp_path / "frames.usdc", scale=scale) as writer:
         for name, first, last in (("front", 8.0, 2.0), ("back", 4.0, 1.0)):
             writer.add_piece(name, shape)
             writer.write(name, positions=flat, face_energy_density=np.full(16, first))
@@ -120,10 +121,12 @@ def test_colours_have_one_scale_over_time_and_pieces(tmp_path: Path) -> None:
     expected = {("front", 1): 1.0, ("front", 2): 1.0, ("back", 1): 1.0, ("back", 2): 0.5}
     for (name, frame), share in expected.items():
         for kind in ("surface", "pattern"):
-            colour = mesh_at(stage, f"/World/{name}/{kind}").GetDisplayColorAttr()
-            assert colour.GetCustomData()["rangeMax"] == 2.0
+            colour = mesh_at(stage, f"/World/{name}/{kind}").GetDisplayColorPrimvar()
+            assert colour.GetAttr().GetCustomData()["rangeMax"] == 2.0
             np.testing.assert_allclose(
-                np.asarray(colour.Get(frame)), np.tile(linear_rgb(energy_colours(share, 1.0)), (25, 1)), atol=2e-3
+                np.asarray(colour.ComputeFlattened(frame)),
+                np.tile(linear_rgb(energy_colours(share, 1.0)), (25, 1)),
+                atol=2e-3,
             )
 
 
@@ -145,7 +148,7 @@ def boxes(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def test_surfaces_and_patterns_lie_side_by_side(tmp_path: Path) -> None:
     front = dome(5)
-    with FrameWriter(tmp_path / "frames.usdc") as writer:
+    with FrameWriter(tmp_path / "frames.usdc", scale=1.0) as writer:
         writer.add_piece("front", front)
         for size in (1.0, 3.0, 0.5):
             writer.write("front", positions=front.vertices[:, :2] * size - 1.0, face_energy_density=np.ones(16))
@@ -189,7 +192,7 @@ def cut_film(path: Path) -> tuple[np.ndarray, np.ndarray, list[list[int]]]:
     shuffled = np.random.default_rng(3).permutation(len(to_surface))
     renumbered = np.argsort(shuffled).astype(np.int32)
     density = np.linspace(0.0, 1.0, 64)
-    with FrameWriter(path) as writer:
+    with FrameWriter(path, scale=1.0) as writer:
         writer.add_piece("front", shape)
         writer.write("front", positions=flat, face_energy_density=density)
         writer.write("front", positions=1.1 * flat, face_energy_density=density)
@@ -217,7 +220,7 @@ def test_validation_finds_what_is_wrong(tmp_path: Path) -> None:
     mesh = mesh_at(stage, "/World/front/pattern")
     mesh.GetFaceVertexIndicesAttr().Set(Vt.IntArray([999] * 256), 3)
     mesh.GetPointsAttr().Set(Vt.Vec3fArray([9.0 * point for point in mesh.GetPointsAttr().Get(4)]), 4)
-    mesh.GetDisplayColorPrimvar().GetAttr().Set([(1, 1, 1)] * 3, 2)
+    mesh.GetDisplayColorPrimvar().GetIndicesAttr().Set(Vt.IntArray([0] * 3), 2)
     stage.ClearDefaultPrim()
     stage.Export(str(tmp_path / "bad.usdc"))
     messages = "\n".join(validate_usd(tmp_path / "bad.usdc"))
@@ -234,7 +237,7 @@ def test_validation_finds_what_is_wrong(tmp_path: Path) -> None:
 def test_validation_finds_points_that_run_across_a_change(tmp_path: Path) -> None:
     from pxr import Vt
 
-    with FrameWriter(tmp_path / "a.usdc") as writer:
+    with FrameWriter(tmp_path / "a.usdc", scale=1.0) as writer:
         shape = dome(3)
         writer.add_piece("front", shape)
         for size in (1.0, 2.0):
@@ -305,7 +308,7 @@ def test_lines_follow_the_mesh_and_cuts_show_while_they_exist(tmp_path: Path) ->
 
 def test_names_stay_apart(tmp_path: Path) -> None:
     shape = mixed()
-    with FrameWriter(tmp_path / "a.usdc") as writer:
+    with FrameWriter(tmp_path / "a.usdc", scale=1.0) as writer:
         for name in ("1 a", "1_a", "_1a"):
             writer.add_piece(name, shape)
         with pytest.raises(ValueError, match="already"):
@@ -317,7 +320,7 @@ def test_names_stay_apart(tmp_path: Path) -> None:
 def test_arrays_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     shape = dome(5)
     flat, density = shape.vertices[:, :2], np.ones(16)
-    with FrameWriter(tmp_path / "a.usdc") as writer:
+    with FrameWriter(tmp_path / "a.usdc", scale=1.0) as writer:
         writer.add_piece("front", shape)
         with pytest.raises(ValueError, match="energy densities for 16 faces"):
             writer.write("front", positions=flat, face_energy_density=density[:3])
@@ -337,7 +340,7 @@ def test_an_exception_leaves_nothing(tmp_path: Path) -> None:
     shape = dome(5)
 
     def diverge() -> None:
-        with FrameWriter(tmp_path / "a.usdc", save_every=1) as writer:
+        with FrameWriter(tmp_path / "a.usdc", save_every=1, scale=1.0) as writer:
             writer.add_piece("front", shape)
             writer.write("front", positions=shape.vertices[:, :2], face_energy_density=np.ones(16))
             raise RuntimeError("diverged")
@@ -353,7 +356,7 @@ def test_a_folder_that_vanishes_is_one_line(tmp_path: Path) -> None:
     shape = dome(5)
 
     def write() -> None:
-        with FrameWriter(folder / "a.usdc") as writer:
+        with FrameWriter(folder / "a.usdc", scale=1.0) as writer:
             writer.add_piece("front", shape)
             writer.write("front", positions=shape.vertices[:, :2], face_energy_density=np.ones(16))
             shutil.rmtree(folder)
@@ -375,7 +378,7 @@ def anonymous():
 
 path, count, stop = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "stop"
 shape = dome(71)
-with FrameWriter(path, save_every=8) as writer:
+with FrameWriter(path, save_every=8, scale=1.0) as writer:
     writer.add_piece("front", shape)
     rng = np.random.default_rng(0)
     before = anonymous()

@@ -72,6 +72,20 @@ def test_the_packed_film_is_the_film(run: Path) -> None:
     np.testing.assert_allclose(np.array([x, y]) + steps / 65535 * size, expected, atol=size / 65535)
 
 
+def test_all_frames_follow_from_the_layouts_that_the_page_holds(run: Path) -> None:
+    stored = film_of((run / "review.html").read_text(encoding="utf-8"))["pieces"][0]["frames"]
+    (source,) = open_film(run / "frames.usdc")
+    assert len(stored) < 0.7 * len(source.times)
+    for time in source.times:
+        shape = source.shape(max(change for change in source.changes if change <= time))
+        before = max(frame for frame in stored if frame <= time)
+        after = min(frame for frame in stored if frame >= time)
+        share = (time - before) / max(after - before, 1)
+        ends = [source.positions(frame, len(shape.surface)) for frame in (before, after)]
+        expected = (1.0 - share) * ends[0] + share * ends[1]
+        np.testing.assert_allclose(source.positions(time, len(shape.surface)), expected, atol=1e-6)
+
+
 def test_the_command_writes_the_page_again_and_moving_pictures(
     run: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

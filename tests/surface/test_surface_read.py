@@ -406,7 +406,7 @@ def test_a_film_is_read_with_the_lines_of_the_mesh_that_is_chosen(tmp_path):
     from warpflat.surface.shapes import make_shape
 
     shape = make_shape("bodice", resolution=9)
-    with FrameWriter(tmp_path / "frames.usdc") as film:
+    with FrameWriter(tmp_path / "frames.usdc", scale=1.0) as film:
         film.add_piece("front", shape)
         # The pattern lies so near to the surface that its lines could be drawn on either.
         flat = shape.vertices[:, :2] * [1.0, 1.01]

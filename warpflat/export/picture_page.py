@@ -134,7 +134,7 @@ def page_height(bands: Sequence[Sequence[Row]]) -> float:
 def _wrapped(pen: Pen, row: Row) -> list[str]:
     """Return the captions as lines that end before the next piece or the colour bar."""
     width, height = row.pattern.size[:2]
-    captions = {"pattern": f"{_length(width, unit=False)} × {_length(height)}"} | dict(row.captions)
+    captions = {"pattern": _size(width, height)} | dict(row.captions)
     lines: list[str] = []
     for key, value in captions.items():
         entry = f"{key} {value}"
@@ -383,8 +383,14 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
 
 
-def _length(metres: float, *, digits: int = 1, unit: bool = True) -> str:
+def _length(metres: float, *, digits: int = 1) -> str:
     """Return a length as pattern makers write it: in centimetres, or in millimetres if it is below one."""
     value, word = (100 * metres, "cm") if metres >= 0.00999 else (1000 * metres, "mm")
     number = f"{value:.{digits}f}" if digits or value >= 1 else f"{value:.3g}"
-    return f"{number} {word}" if unit else number
+    return f"{number} {word}"
+
+
+def _size(width: float, height: float) -> str:
+    """Return width and height in the unit of the larger one."""
+    factor, word = (100, "cm") if max(width, height) >= 0.00999 else (1000, "mm")
+    return f"{factor * width:.1f} × {factor * height:.1f} {word}"

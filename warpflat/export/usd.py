@@ -1,15 +1,14 @@
 """`frames.usdc`: every piece in space and in the plane, over the time of the relaxation.
 
 The writer streams: frames go to a hidden file that is saved every few frames, so that memory does not grow with their
-number. Two things are known only at the end, and are authored in a second pass over that file: the places of the
-patterns beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale comes
-from the last frame. Then the file is exported once, which compacts it, and renamed to its final name.
+number. The places of the patterns beside the surfaces are authored at the end, since they depend on how far each pattern
+ever reached. Then the file takes its final name.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -19,20 +18,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
-from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import hidden_file, require_writable
+from warpflat.core.atomic_files import atomic_path, hidden_file, require_writable
 from warpflat.core.errors import InputError
-from warpflat.export.colours import energy_colours, energy_scale, linear_rgb
+from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import area_vectors, face_areas, polylines_of, vertex_normals
-from warpflat.export.usd_colours import FrameColours
-from warpflat.export.usd_piece import FIRST_FRAME, FramePiece, check_frame, density_attribute
+from warpflat.export.usd_colours import VertexColours
+from warpflat.export.usd_piece import FIRST_FRAME, FramePiece, check_frame
 from warpflat.export.usd_prims import (
     MeshSamples,
     SampledLines,
     bounding_box,
     define_group,
     define_mesh,
-    export_stage,
+    require_usd,
     usd_errors,
     valid_name,
 )
@@ -40,11 +38,10 @@ from warpflat.export.usd_scene import add_cameras, add_light, add_material, add_
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["FrameWriter"]
+__all__ = ["FrameWriter", "film_scale"]
 
 _LINE_COLOUR = (0.03, 0.05, 0.10)
 _CUT_COLOUR = (0.02, 0.20, 0.75)
-_COLOUR_STEPS = 1024
 # The working file is saved when so many frames, of so many vertices together, are in memory; those take some 50 MB.
 _FRAMES, _VERTICES = 16, 2_000_000
 # USD's type of a measure; a bool is an int, too.
@@ -53,13 +50,24 @@ _TYPES = {bool: "Bool", int: "Int", float: "Double", str: "String"}
 Measure = bool | int | float | str
 
 
+def film_scale(surfaces: Sequence[Surface], densities: Sequence[ArrayLike]) -> float:
+    """Return the upper end of a film's colour scale [J/m2]: 98 % of the area of all pieces stays below it in their last frames.
+
+    Args:
+        surfaces: the pieces.
+        densities: #F of each, strain energy per area in its last frame [J/m2].
+    """
+    areas = np.concatenate([face_areas(surface.vertices, surface.faces) for surface in surfaces])
+    return energy_scale(np.concatenate([np.asarray(density) for density in densities]), areas)
+
+
 class FrameWriter:
     """Streaming writer of `frames.usdc`; used in a ``with`` block.
 
     ``/World/NAME/surface`` is the piece in space, where it lies in the input. ``/World/NAME/pattern`` is its pattern in
     the XY plane, facing +Z; its points are the positions as given, and a translation sets it beside the surfaces
-    and the other patterns. Both carry the energy density per face and colours per vertex (linear Rec. 709) on one scale
-    for all pieces and all frames, stated in the colours' custom data. The values of the last frame are also
+    and the other patterns. Both carry the energy density per face and colours per vertex (linear Rec. 709, indexed) on one
+    scale for all pieces and all frames, stated in the colours' custom data. The values of the last frame are also
     authored as defaults, for readers that do not ask for a time.
 
     When the block ends well the file appears under its final name, whole. When it ends with an exception, or the
@@ -70,18 +78,17 @@ class FrameWriter:
         self,
         path: str | os.PathLike[str],
         *,
+        scale: float,
         frames_per_second: float = 24.0,
         save_every: int | None = None,
-        scale: float | None = None,
     ) -> None:
         """Prepare a writer; nothing is touched before the ``with`` block is entered.
 
         Args:
-            path: the file, ``*.usdc`` (or ``*.usd``, ``*.usda``).
+            path: the file, ``*.usdc``.
+            scale: upper end of the colour scale [J/m2]; see :func:`film_scale`.
             frames_per_second: of playback.
             save_every: frames kept in memory at most; if not given 16, or more of a small mesh.
-            scale: upper end of the colour scale [J/m2]; if not given, 98 % of the area of the last frames of all pieces
-                lies below it (see :func:`warpflat.export.colours.energy_scale`).
         """
         if (save_every is not None and save_every < 1) or not frames_per_second > 0.0:
             raise ValueError("save_every must be at least 1, and frames_per_second above 0")
@@ -89,7 +96,7 @@ class FrameWriter:
         self._rate = float(frames_per_second)
         self._save_every = _FRAMES if save_every is None else int(save_every)
         self._save_after = _VERTICES if save_every is None else 0
-        self._scale = scale
+        self._scale = float(scale)
         self._pieces: dict[str, FramePiece] = {}
         self._used_names = {"Looks", "cameras", "light"}
         self._unsaved = self._unsaved_vertices = 0
@@ -105,13 +112,12 @@ class FrameWriter:
         from pxr import Usd
 
         require_writable(self._final)
-        if self._final.suffix not in (".usdc", ".usd", ".usda"):
-            raise InputError(f"cannot write {self._final}: USD frames need the suffix .usdc, .usd or .usda")
+        if self._final.suffix != ".usdc":  # the only format that can be saved bit by bit
+            raise InputError(f"cannot write {self._final}: USD frames need the suffix .usdc")
         try:
-            # Crate files are the only ones that can be saved bit by bit, whatever the final format.
-            working = self._hidden.enter_context(hidden_file(self._final.with_suffix(".usdc")))
+            self._working = self._hidden.enter_context(hidden_file(self._final))
             with usd_errors(self._final):
-                self._stage = Usd.Stage.CreateNew(str(working))
+                self._stage = Usd.Stage.CreateNew(str(self._working))
             self._begin(self._stage)
         except BaseException:
             self._hidden.close()
@@ -134,17 +140,21 @@ class FrameWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Colour, place and export if the block ended well; the working file is removed in any case."""
+        """Place and dress if the block ended well, and give the file its name; the working file is removed in any case."""
         with self._hidden:
             if kind is None:
                 with usd_errors(self._final):
                     self._place()
                     self._dress()
-                    self._colour()
                     self._author_defaults()
                     self._save()
-                export_stage(self._stage, self._final)
+            # Nothing may hold the file open when it is moved.
             self._stage = None
+            self._pieces.clear()
+            if kind is None:
+                with atomic_path(self._final) as temporary:
+                    require_usd(self._working, self._final)
+                    self._working.replace(temporary)
 
     def add_piece(self, name: str, surface: Surface) -> None:
         """Author the surface of a piece with its feature lines, and prepare its pattern.
@@ -172,18 +182,19 @@ class FrameWriter:
         default = Usd.TimeCode.Default()
         triangles, _ = triangulate(surface.faces)
         normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
-        on_surface = MeshSamples(define_mesh(self._stage, f"{path}/surface", normals, per_face=False))
+        on_surface = MeshSamples(define_mesh(self._stage, f"{path}/surface", normals, per_face=False), self._scale)
         on_surface.write(default, points, surface.faces)
         # Cuts change the number of vertices and never that of faces: one normal per face serves all frames.
         upright = np.tile([0.0, 0.0, 1.0], (len(surface.faces), 1))
-        on_pattern = MeshSamples(define_mesh(self._stage, f"{path}/pattern", upright, per_face=True))
+        on_pattern = MeshSamples(define_mesh(self._stage, f"{path}/pattern", upright, per_face=True), self._scale)
         lines = polylines_of(surface.lines)
         group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
+        colours = VertexColours(surface.faces, face_areas(surface.vertices, surface.faces), len(points))
         self._pieces[name] = FramePiece(
             name=name,
             surface=surface,
             path=path,
-            areas=face_areas(surface.vertices, surface.faces),
+            colours=(colours, colours),
             on_surface=on_surface,
             on_pattern=on_pattern,
             surface_cuts=group("surface_cuts", _CUT_COLOUR),
@@ -243,7 +254,7 @@ class FrameWriter:
         from pxr import Usd
 
         piece = self._pieces[name]
-        flat = np.asarray(positions, dtype=np.float64)
+        flat = np.asarray(positions, dtype=np.float32)
         density = np.asarray(face_energy_density, dtype=np.float32)
         number = FIRST_FRAME + piece.frames
         what = f"frame {number} of piece {piece.surface.name!r}"
@@ -251,15 +262,14 @@ class FrameWriter:
         new_faces = piece.change_faces(faces, len(flat), what) or piece.frames == 0
         if len(flat) != len(piece.to_surface):
             raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
-        new_lines = new_faces or lines is not None or cuts is not None
-        piece.change_lines(lines, cuts, len(flat))
+        new_lines = piece.change_lines(lines, cuts, len(flat), new_faces=new_faces)
 
         time = Usd.TimeCode(number)
         self._sample(piece, flat, density, time, new_faces=new_faces, new_lines=new_lines)
         self._measure(piece, measures or {}, time)
 
         piece.frames += 1
-        piece.last_density, piece.last_positions = density, flat
+        piece.last_positions = flat
         low, high = bounding_box(flat)
         piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
         self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
@@ -269,7 +279,7 @@ class FrameWriter:
     def _sample(
         self,
         piece: FramePiece,
-        flat: FloatArray,
+        flat: NDArray[np.float32],
         density: NDArray[np.float32],
         time: Any,
         *,
@@ -282,9 +292,11 @@ class FrameWriter:
         points = np.zeros((len(flat), 3), dtype=np.float32)
         points[:, :2] = flat
         piece.on_pattern.write(time, points, piece.faces if new_faces else None)
-        energy = Vt.FloatArray.FromNumpy(density)
-        for samples in (piece.on_surface, piece.on_pattern):
-            density_attribute(samples).Set(energy, time)
+        energy, rows = Vt.FloatArray.FromNumpy(density), None
+        for samples, colours in zip((piece.on_surface, piece.on_pattern), piece.colours, strict=True):
+            if rows is None or colours is not piece.colours[0]:
+                rows = colours.rows(density, self._scale)
+            samples.write_energy(time, energy, rows)
         piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
         piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
         if new_lines:
@@ -348,28 +360,6 @@ class FrameWriter:
         for piece in shown:
             for samples in (piece.on_surface, piece.on_pattern):
                 add_texture_coordinates(samples.mesh, piece.surface, piece.faces, piece.last_positions)
-
-    def _colour(self) -> None:
-        """Author the colours of all frames, from their energies, on one scale."""
-        shown = [piece for piece in self._pieces.values() if piece.last_density is not None]
-        if not shown:
-            return
-        scale = self._scale
-        if scale is None:
-            density = np.concatenate([piece.last_density for piece in shown if piece.last_density is not None])
-            scale = energy_scale(density, np.concatenate([piece.areas for piece in shown]))
-        table = linear_rgb(energy_colours(np.arange(_COLOUR_STEPS) / (_COLOUR_STEPS - 1), 1.0)).astype(np.float32)
-        for piece in shown:
-            for samples in (piece.on_surface, piece.on_pattern):
-                attribute = samples.mesh.GetDisplayColorPrimvar().GetAttr()
-                attribute.SetCustomData(
-                    {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
-                )
-        painters = [FrameColours(piece) for piece in shown]
-        for number in range(FIRST_FRAME, FIRST_FRAME + max(piece.frames for piece in shown)):
-            for painter in painters:
-                painter.colour(number, scale, table)
-            self._save_every_few_frames(sum(len(piece.last_positions) for piece in shown))
 
     def _author_defaults(self) -> None:
         """Author the last value of every sampled attribute as its default."""

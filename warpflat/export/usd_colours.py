@@ -1,4 +1,7 @@
-"""Colours of the pieces in `frames.usdc`: energies of every frame on one scale."""
+"""Colours of the pieces in `frames.usdc`: one table for all, and for each vertex of a frame its row of that table.
+
+A row takes a byte or two where a colour takes twelve.
+"""
 
 from __future__ import annotations
 
@@ -8,64 +11,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.export.geometry import corner_average
-from warpflat.export.usd_piece import FIRST_FRAME, FramePiece, density_attribute
+from warpflat.export.colours import energy_colours, linear_rgb
 
-__all__ = ["FrameColours"]
+__all__ = ["COLOURS", "VertexColours", "define_colour_table"]
+
+COLOURS = 1024
 
 
-class FrameColours:
-    """Colours of a piece, frame by frame; its topology is read only where it changes."""
+def define_colour_table(mesh: Any, scale: float) -> Any:
+    """Author the table of a mesh's `displayColor`, whose last row is the energy `scale` [J/m2]; return the attribute of rows."""
+    from pxr import Vt
 
-    def __init__(self, piece: FramePiece) -> None:
-        self._piece = piece
-        own = piece.surface.faces
-        self._face = np.nonzero(own >= 0)[0].astype(np.int32)
-        self._surface = (own[own >= 0], len(piece.surface.vertices))
-        self._pattern = self._surface
-        pattern = piece.on_pattern.mesh
-        self._indices, self._points = pattern.GetFaceVertexIndicesAttr(), pattern.GetPointsAttr()
-        self._changes = set(self._indices.GetTimeSamples())
-        self._density = density_attribute(piece.on_pattern)
-        self._on_surface, self._on_pattern = (
-            samples.mesh.GetDisplayColorPrimvar().GetAttr() for samples in (piece.on_surface, piece.on_pattern)
+    table = linear_rgb(energy_colours(np.arange(COLOURS) / (COLOURS - 1), 1.0)).astype(np.float32)
+    primvar = mesh.GetDisplayColorPrimvar()
+    primvar.Set(Vt.Vec3fArray.FromNumpy(table))
+    primvar.GetAttr().SetCustomData(
+        {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
+    )
+    return primvar.CreateIndicesAttr()
+
+
+class VertexColours:
+    """Rows of the colour table around the vertices of one topology: a vertex has the mean of its faces by area."""
+
+    def __init__(self, faces: IntArray, areas: FloatArray, count: int) -> None:
+        """
+        Args:
+            faces: #F by 4, -1 as the fourth corner of a triangle.
+            areas: #F, that count [m2].
+            count: the number of vertices.
+        """
+        from scipy.sparse import csr_array
+
+        used = faces >= 0
+        face, vertex = np.nonzero(used)[0], faces[used]
+        # A sliver without area still counts a little, so that a vertex among slivers only has a colour.
+        weights = areas + (1e-9 * float(areas.max(initial=0.0)) or 1.0)
+        whole = np.bincount(vertex, weights=weights[face], minlength=count)
+        self._shares = csr_array(
+            ((weights[face] / whole[vertex]).astype(np.float32), (vertex, face)), shape=(count, len(faces))
         )
 
-    def colour(self, number: int, scale: float, table: NDArray[np.float32]) -> None:
-        """Author the colours of a frame, if the piece has it: energies [J/m2] up to `scale` as rows of `table`."""
-        if number >= FIRST_FRAME + self._piece.frames:
-            return
-        if number in self._changes:
-            # Copies: what USD hands out may lie in the file, which grows.
-            vertex, size = np.array(self._indices.Get(number)), len(self._points.Get(number))
-            same = size == self._surface[1] and np.array_equal(vertex, self._surface[0])
-            self._pattern = self._surface if same else (vertex, size)
-        density = np.asarray(self._density.Get(number), dtype=np.float64)
-        colours = self._vertex_colours(density, *self._surface, scale, table)
-        self._on_surface.Set(colours, number)
-        if self._pattern is not self._surface:
-            colours = self._vertex_colours(density, *self._pattern, scale, table)
-        self._on_pattern.Set(colours, number)
-
-    def _vertex_colours(
-        self,
-        density: FloatArray,
-        vertex: IntArray,
-        size: int,
-        scale: float,
-        table: NDArray[np.float32],
-    ) -> Any:
-        """Return the colours of `size` vertices.
-
-        Args:
-            density: #F [J/m2].
-            vertex: #C, the vertex of each corner.
-            size: number of vertices.
-            scale: energy of the last colour [J/m2].
-            table: colours, linear RGB.
-        """
-        from pxr import Vt
-
-        share = corner_average(density, self._piece.areas, self._face, vertex, size) / scale
-        step = np.clip(share * (len(table) - 1) + 0.5, 0, len(table) - 1).astype(np.int32)
-        return Vt.Vec3fArray.FromNumpy(table[step])
+    def rows(self, density: NDArray[np.float32], scale: float) -> NDArray[np.int32]:
+        """Return the row of each vertex (#V) for the energies of the faces (#F) [J/m2]; the last row is `scale`."""
+        share = self._shares @ density
+        share *= np.float32((COLOURS - 1) / scale)
+        share += np.float32(0.5)
+        return np.asarray(np.clip(share, 0, COLOURS - 1, out=share).astype(np.int32))

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.export.geometry import Polylines, polylines_of
+from warpflat.export.geometry import Polylines, face_areas, polylines_of
+from warpflat.export.usd_colours import VertexColours
 from warpflat.export.usd_prims import MeshSamples, SampledLines
 from warpflat.surface.mesh import Surface
 
-__all__ = ["FIRST_FRAME", "FramePiece", "check_frame", "density_attribute"]
+__all__ = ["FIRST_FRAME", "FramePiece", "check_frame"]
 
 FIRST_FRAME = 1
 
@@ -26,7 +27,7 @@ class FramePiece:
     name: str
     surface: Surface
     path: str
-    areas: FloatArray
+    colours: tuple[VertexColours, VertexColours]  # of surface and pattern; one and the same until a cut
     on_surface: MeshSamples
     on_pattern: MeshSamples
     surface_cuts: SampledLines
@@ -38,8 +39,7 @@ class FramePiece:
     cuts: dict[str, Polylines] = field(default_factory=dict)
     measures: dict[str, Any] = field(default_factory=dict)
     frames: int = 0
-    last_density: NDArray[np.float32] | None = None
-    last_positions: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    last_positions: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 2), dtype=np.float32))
     low: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
     high: FloatArray = field(default_factory=lambda: np.full(2, -np.inf))
 
@@ -62,14 +62,20 @@ class FramePiece:
         if not np.array_equal(to_surface[new[used]], own[used]):
             raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
         self.faces, self.to_surface = new, to_surface
+        areas = face_areas(self.surface.vertices, own)
+        self.colours = self.colours[0], VertexColours(new, areas, count)
         return True
 
-    def change_lines(self, lines: Mapping[str, Any] | None, cuts: Mapping[str, Any] | None, count: int) -> None:
-        """Take over new lines and cuts of a pattern with `count` vertices.
+    def change_lines(
+        self, lines: Mapping[str, Any] | None, cuts: Mapping[str, Any] | None, count: int, *, new_faces: bool
+    ) -> bool:
+        """Take over new lines and cuts of a pattern with `count` vertices, and return whether they or the faces are new.
 
         Raises:
             ValueError: a line refers to other vertices.
         """
+        if not new_faces and lines is None and cuts is None:
+            return False
         self.lines = self.lines if lines is None else polylines_of(lines)
         self.cuts = self.cuts if cuts is None else polylines_of(cuts)
         for line, parts in (*self.lines.items(), *self.cuts.items()):
@@ -77,13 +83,14 @@ class FramePiece:
                 raise ValueError(
                     f"line {line!r} of piece {self.name!r} refers to vertices beyond the {count} positions"
                 )
+        return True
 
     def cuts_on_surface(self) -> dict[str, Polylines]:
         """Return the cuts in the surface's numbering, where both sides of a crack are one line."""
         return {key: _on_surface(parts, self.to_surface) for key, parts in self.cuts.items()}
 
 
-def check_frame(what: str, flat: FloatArray, density: NDArray[np.float32], face_count: int) -> None:
+def check_frame(what: str, flat: NDArray[np.float32], density: NDArray[np.float32], face_count: int) -> None:
     """Check the shapes and values of a frame.
 
     Raises:
@@ -95,13 +102,6 @@ def check_frame(what: str, flat: FloatArray, density: NDArray[np.float32], face_
         raise ValueError(f"{what}: {density.shape} energy densities for {face_count} faces")
     if not (np.isfinite(flat).all() and np.isfinite(density).all()):
         raise ValueError(f"{what}: positions or energy densities are not finite")
-
-
-def density_attribute(samples: MeshSamples) -> Any:
-    """Return the attribute of energy densities."""
-    from pxr import UsdGeom
-
-    return UsdGeom.PrimvarsAPI(samples.mesh).GetPrimvar("strainEnergyDensity").GetAttr()
 
 
 def _on_surface(parts: Polylines, to_surface: IntArray) -> Polylines:

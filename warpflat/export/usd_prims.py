@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError
 from warpflat.export.geometry import Polylines
+from warpflat.export.usd_colours import define_colour_table
 
 __all__ = [
     "MeshSamples",
@@ -28,6 +30,7 @@ __all__ = [
     "define_group",
     "define_mesh",
     "export_stage",
+    "require_usd",
     "usd_errors",
     "valid_name",
 ]
@@ -56,16 +59,25 @@ def usd_errors(path: str | os.PathLike[str]) -> Iterator[None]:
 def export_stage(stage: Any, path: str | os.PathLike[str]) -> None:
     """Write a stage's root layer, whole or not at all.
 
-    The written file is opened once, since USD may fail without an error.
-
     Raises:
         InputError: the file cannot be written.
     """
+    with atomic_path(path) as temporary:
+        with usd_errors(path):
+            stage.GetRootLayer().Export(str(temporary))
+        require_usd(temporary, path)
+
+
+def require_usd(written: Path, path: str | os.PathLike[str]) -> None:
+    """Open a file once that USD has written as `path`, since USD may fail without an error.
+
+    Raises:
+        InputError: it is incomplete.
+    """
     from pxr import Sdf
 
-    with atomic_path(path) as temporary, usd_errors(path):
-        written = stage.GetRootLayer().Export(str(temporary))
-        if not (written and Sdf.Layer.FindOrOpen(str(temporary))):
+    with usd_errors(path):
+        if not Sdf.Layer.FindOrOpen(str(written)):
             raise InputError(f"cannot write {path}: USD has left it incomplete (folder still there? disk full?)")
 
 
@@ -124,10 +136,19 @@ def bounding_box(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
 
 
 class MeshSamples:
-    """Samples of one mesh: points every frame, topology only where it changes."""
+    """Samples of one mesh: points, energies and colours every frame, topology only where it changes."""
 
-    def __init__(self, mesh: Any) -> None:
+    def __init__(self, mesh: Any, scale: float) -> None:
+        """
+        Args:
+            mesh: of :func:`define_mesh`.
+            scale: energy of the last colour [J/m2].
+        """
+        from pxr import UsdGeom
+
         self.mesh = mesh
+        self._density = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("strainEnergyDensity").GetAttr()
+        self._rows = define_colour_table(mesh, scale)
         self._stored = 0
         self._padding = 0
         self._points: Any = None
@@ -149,7 +170,14 @@ class MeshSamples:
         self._extent.Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
         self._stored = len(stored)
 
-    def _padded(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    def write_energy(self, time: Any, density: Any, rows: NDArray[np.int32]) -> None:
+        """Write the energies of the faces [J/m2], and the row of the colour table of each vertex (#P)."""
+        from pxr import Vt
+
+        self._density.Set(density, time)
+        self._rows.Set(Vt.IntArray.FromNumpy(self._padded(rows)), time)
+
+    def _padded(self, rows: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate([rows, rows[-1:]]) if self._padding else np.ascontiguousarray(rows)
 
 

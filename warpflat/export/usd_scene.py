@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.surface.mesh import Surface
@@ -39,7 +40,7 @@ def add_material(stage: Any, meshes: list[Any]) -> None:
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
-def add_texture_coordinates(mesh: Any, surface: Surface, faces: IntArray, positions: FloatArray) -> None:
+def add_texture_coordinates(mesh: Any, surface: Surface, faces: IntArray, positions: NDArray[np.float32]) -> None:
     """Author `primvars:st` of a mesh: the place of each corner in the pattern [m].
 
     Args:
@@ -50,7 +51,7 @@ def add_texture_coordinates(mesh: Any, surface: Surface, faces: IntArray, positi
     """
     from pxr import Sdf, UsdGeom, Vt
 
-    corners = np.asarray(positions, dtype=np.float32)[faces[surface.faces >= 0]]
+    corners = positions[faces[surface.faces >= 0]]
     st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
     st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(corners)))
     st.GetAttr().SetCustomDataByKey("unit", "m")

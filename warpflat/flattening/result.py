@@ -389,9 +389,10 @@ def _runs_along_cut(name: str, own: Mapping[str, Any]) -> bool:
 
 
 def _write_frames(path: Path, results: Sequence[Flattening]) -> None:
-    from warpflat.export.usd import FrameWriter
+    from warpflat.export.usd import FrameWriter, film_scale
 
-    with FrameWriter(path) as writer:
+    scale = film_scale([result.surface for result in results], [result.face_energy_density for result in results])
+    with FrameWriter(path, scale=scale) as writer:
         for result in results:
             name, surface = result.surface.name, result.surface
             writer.add_piece(name, surface)

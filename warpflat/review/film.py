@@ -1,11 +1,16 @@
-"""`frames.usdc` is packed for a page: quantised, as differences between frames, compressed."""
+"""`frames.usdc` is packed for a page: only layouts that were computed, quantised, as differences, compressed.
+
+Frames between two of them are blended evenly in the file, and so they are on the page.
+"""
 
 from __future__ import annotations
 
 import base64
 import zlib
-from collections.abc import Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +20,15 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours
-from warpflat.export.geometry import corner_average, face_areas, outline_edges
+from warpflat.export.geometry import outline_edges
+from warpflat.export.usd_colours import COLOURS
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["FilmPiece", "Shape", "open_film", "pack_film"]
 
-# Bytes of all frames before compression; beyond, every second frame is left out, or every third ...
+# Bytes of all layouts before compression; beyond, every second frame is left out, or every third ...
 _ROOM = 4_000_000
-# Bytes of a vertex in a frame: two coordinates of 16 bits, and a colour.
+# Bytes of a vertex in a layout: two coordinates of 16 bits, and a colour.
 _VERTEX = 5
 _COLOURS = 256
 # Of zlib: the last level takes eight times as long as this one, and spares a twentieth of the bytes.
@@ -36,12 +42,10 @@ class Shape:
     Attributes:
         faces: #F by 4, in the pattern's numbering.
         surface: #P by 3, the place on the surface of each vertex of the pattern [m].
-        areas: #F, of the faces on the surface [m2].
     """
 
     faces: IntArray
     surface: FloatArray
-    areas: FloatArray
 
 
 class FilmPiece:
@@ -59,8 +63,12 @@ class FilmPiece:
         self.changes = [int(time) for time in self._pattern.GetFaceVertexIndicesAttr().GetTimeSamples()]
         place = UsdGeom.Xformable(self._pattern).ComputeLocalToWorldTransform(0.0).ExtractTranslation()
         self.offset = [float(value) for value in place]
-        colour = self._pattern.GetDisplayColorPrimvar().GetAttr()
-        self.scale = float(colour.GetCustomData().get("rangeMax", 1.0))
+        colour = self._pattern.GetDisplayColorPrimvar()
+        self.scale = float(colour.GetAttr().GetCustomData().get("rangeMax", 1.0))
+        self.is_indexed = bool(colour.IsIndexed())
+        self._rows = colour.GetIndicesAttr()
+        tags = prim.GetAttribute("warpflat:interpolated")
+        self.computed = [time for time in self.times if not (tags and tags.Get(time))]
         self._density = UsdGeom.PrimvarsAPI(self._pattern).GetPrimvar("strainEnergyDensity").GetAttr()
 
     def shape(self, time: int) -> Shape:
@@ -73,8 +81,7 @@ class FilmPiece:
         faces[np.arange(4) < counts[:, None]] = corners
         origin = np.zeros(int(corners.max()) + 1, dtype=np.int32)
         origin[corners] = own
-        surface = space[origin]
-        return Shape(faces=faces, surface=surface, areas=face_areas(surface, faces))
+        return Shape(faces=faces, surface=space[origin])
 
     def positions(self, time: int, count: int) -> FloatArray:
         """Return the pattern at a frame, #P by 2 [m]."""
@@ -83,6 +90,16 @@ class FilmPiece:
     def density(self, time: int) -> FloatArray:
         """Return the energies at a frame, #F [J/m2]."""
         return np.array(self._density.Get(time), dtype=np.float64)
+
+    def rows(self, time: int, count: int) -> NDArray[np.uint8]:
+        """Return the row of the page's colour table of each vertex at a frame, #P."""
+        return np.asarray(np.array(self._rows.Get(time))[:count] // (COLOURS // _COLOURS), dtype=np.uint8)
+
+    def key_frames(self) -> list[int]:
+        """Return the computed frames without those at which the piece stands still, before and after; all others follow from them."""
+        points = [np.array(self._pattern.GetPointsAttr().Get(time)) for time in self.computed]
+        moves = [True, *(not np.array_equal(a, b) for a, b in pairwise(points)), True]
+        return [time for time, moved in zip(self.computed, pairwise(moves), strict=True) if any(moved)]
 
     def measure(self, key: str, time: int) -> Any:
         """Return a measure of a frame, None if there is none."""
@@ -94,7 +111,7 @@ def open_film(path: Path) -> list[FilmPiece]:
     """Open the pieces of a `frames.usdc` that have frames.
 
     Raises:
-        InputError: it is no USD file.
+        InputError: it is no USD file, or of an earlier version.
     """
     from pxr import Tf, Usd
 
@@ -103,7 +120,10 @@ def open_film(path: Path) -> list[FilmPiece]:
     except Tf.ErrorException as error:
         raise InputError(f"{path}: is not a USD file that can be opened; run the scene again") from error
     found = [FilmPiece(stage, prim) for prim in stage.GetDefaultPrim().GetChildren() if prim.GetChild("pattern")]
-    return [piece for piece in found if piece.times]
+    pieces = [piece for piece in found if piece.times]
+    if not all(piece.is_indexed for piece in pieces):
+        raise InputError(f"{path}: the film was written by an earlier version of warpflat; run the scene again")
+    return pieces
 
 
 def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
@@ -112,25 +132,24 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
     The entry `data` is the base64 text of what `zlib` has compressed; `pieces` says what lies in it, in its order.
     """
     shapes = {piece.name: [piece.shape(change) for change in piece.changes] for piece in pieces}
-    vertices = sum(len(shape[-1].surface) for shape in shapes.values())
-    shown = _shown_frames(pieces, _ROOM // (_VERTEX * max(vertices, 1)))
+    shown, stored = _choose_frames(pieces, shapes)
     if not shown:
         return None
     packer = zlib.compressobj(_LEVEL)
     parts, entries = list[bytes](), list[dict[str, Any]]()
     for piece in pieces:
-        entry, blocks = _packed(piece, shapes[piece.name], shown)
+        entry, blocks = _packed(piece, shapes[piece.name], stored[piece.name])
         entries.append(entry)
         parts += [packer.compress(block) for block in blocks]
     parts.append(packer.flush())
-    first = pieces[0]
+    first, computed = pieces[0], set(pieces[0].computed)
     table = np.round(255.0 * energy_colours(np.arange(_COLOURS) / (_COLOURS - 1), 1.0)).astype(np.uint8)
     return {
         "frames": shown,
         "of": first.times[-1],
         "rate": 24,
         "stages": [first.measure("stage", time) or "" for time in shown],
-        "computed": [not first.measure("interpolated", time) for time in shown],
+        "computed": [time in computed for time in shown],
         "scale": first.scale,
         "colours": base64.b64encode(table.tobytes()).decode("ascii"),
         "pieces": entries,
@@ -138,19 +157,37 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
     }
 
 
-def _shown_frames(pieces: Sequence[FilmPiece], most: int) -> list[int]:
-    """Return the numbers of the frames that the page has: evenly taken, with those before and after each change of topology."""
-    times = pieces[0].times
-    if most < 2:
-        return []
-    stride = -(-len(times) // most)
-    kept = {*times[::stride], times[-1]}
-    for piece in pieces:
-        kept |= {time for change in piece.changes for time in (change - 1, change) if time >= times[0]}
-    return sorted(kept)
+def _choose_frames(
+    pieces: Sequence[FilmPiece], shapes: Mapping[str, Sequence[Shape]]
+) -> tuple[list[int], dict[str, list[int]]]:
+    """Return the frames that the page shows, and those whose layouts it holds of each piece; none if there is no room for two.
+
+    Frames are taken evenly, with those before and after each change of topology.
+    """
+    times, keys = pieces[0].times, {piece.name: piece.key_frames() for piece in pieces}
+    for stride in range(1, len(times) + 1):
+        kept = {*times[::stride], times[-1]}
+        for piece in pieces:
+            kept |= {time for change in piece.changes for time in (change - 1, change) if time >= times[0]}
+        shown = sorted(kept)
+        stored = {piece.name: _stored_frames(keys[piece.name], shown) for piece in pieces}
+        vertices = sum(len(stored[piece.name]) * len(shapes[piece.name][-1].surface) for piece in pieces)
+        if _VERTEX * vertices <= _ROOM:
+            return shown, stored
+    return [], {}
 
 
-def _packed(piece: FilmPiece, shapes: Sequence[Shape], shown: Sequence[int]) -> tuple[dict[str, Any], list[bytes]]:
+def _stored_frames(keys: Sequence[int], shown: Sequence[int]) -> list[int]:
+    """Return those frames of the shown ones that are keys, or lie between keys of which one is not shown."""
+    seen, stored = set(shown), []
+    for time in shown:
+        after = bisect_left(keys, time)
+        if keys[after] == time or not seen.issuperset(keys[after - 1 : after + 1]):
+            stored.append(time)
+    return stored
+
+
+def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> tuple[dict[str, Any], list[bytes]]:
     """Return what the page must know of a piece, and its arrays."""
     space, blocks, topologies = _Box(shapes[0].surface), list[bytes](), list[dict[str, int]]()
     for change, shape in zip(piece.changes, shapes, strict=True):
@@ -168,12 +205,12 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], shown: Sequence[int]) -> 
         blocks.append(_planes(space.steps(shape.surface)))
     layouts = [
         (number, shape, piece.positions(time, len(shape.surface)), time)
-        for number, shape, time in _at(piece, shapes, shown)
+        for number, shape, time in _at(piece, shapes, stored)
     ]
     box = _Box(np.concatenate([positions for _, _, positions, _ in layouts]))
     before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
-    for number, shape, positions, time in layouts:
-        steps, colours = box.steps(positions), _colours(shape, piece.density(time), piece.scale)
+    for number, _, positions, time in layouts:
+        steps, colours = box.steps(positions), piece.rows(time, len(positions))
         same = before is not None and before[0] == number
         blocks.append(_planes(steps - before[1] if same and before else steps))
         blocks.append((colours - before[2] if same and before else colours).tobytes())
@@ -184,23 +221,16 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], shown: Sequence[int]) -> 
         "space": space.as_list(),
         "box": box.as_list(),
         "topologies": topologies,
+        "frames": list(stored),
     }
     return entry, blocks
 
 
-def _at(piece: FilmPiece, shapes: Sequence[Shape], shown: Sequence[int]) -> Iterator[tuple[int, Shape, int]]:
-    """Yield for each shown frame the number of its topology, that topology, and the frame."""
-    for time in shown:
+def _at(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> Iterator[tuple[int, Shape, int]]:
+    """Yield for each stored frame the number of its topology, that topology, and the frame."""
+    for time in stored:
         number = sum(change <= time for change in piece.changes) - 1
         yield number, shapes[number], min(time, piece.times[-1])
-
-
-def _colours(shape: Shape, density: FloatArray, scale: float) -> NDArray[np.uint8]:
-    """Return the row of the colour table of each vertex."""
-    used = shape.faces >= 0
-    face = np.nonzero(used)[0].astype(np.int32)
-    mean = corner_average(density, shape.areas, face, shape.faces[used], len(shape.surface))
-    return np.round(np.clip(mean / scale, 0.0, 1.0) * (_COLOURS - 1)).astype(np.uint8)
 
 
 class _Box:

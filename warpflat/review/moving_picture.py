@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.errors import InputError
 from warpflat.core.manifest import record_file
 from warpflat.export.colours import energy_colours
+from warpflat.export.geometry import outline_edges
 from warpflat.export.raster import rasterise, shade
 from warpflat.review.film import FilmPiece, Shape, open_film
 from warpflat.review.page import read_run
 from warpflat.surface.triangles import triangulate
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 __all__ = ["write_moving_pictures"]
 
@@ -26,6 +30,9 @@ _FRAMES, _SHEET = 60, (4, 3)
 _MARGIN = 12
 _RATE = 24
 _PAPER = 249
+_INK, _OUTLINE = (38, 40, 48), 200
+# Room for the line below a picture.
+_FOOT = 18
 
 
 def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]:
@@ -34,6 +41,8 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
     Raises:
         InputError: the folder holds no film, or they cannot be written.
     """
+    from PIL import Image
+
     _, files, name = read_run(folder)
     if "frames.usdc" not in files:
         raise InputError(f"{folder}: has no frames.usdc of this run; run the scene with frames above 0")
@@ -47,10 +56,11 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
         if sheet:
             columns, rows = _SHEET
             images = _images(pieces, _evenly(pieces[0].times, columns * rows), _SHEET_SIDE)
-            while len(images) < columns * rows:
-                images.append(np.full_like(images[0], _PAPER))
-            lines = [np.concatenate(images[row * columns : (row + 1) * columns], axis=1) for row in range(rows)]
-            _save(folder / "contact_sheet.png", [np.concatenate(lines)])
+            cell = images[0].size
+            page = Image.new("RGB", (columns * cell[0], rows * cell[1]), (_PAPER,) * 3)
+            for number, image in enumerate(images):
+                page.paste(image, (number % columns * cell[0], number // columns * cell[1]))
+            _save(folder / "contact_sheet.png", [page])
             written.append("contact_sheet.png")
         for file in written:
             record_file(folder, name, file)
@@ -67,47 +77,92 @@ def _durations(times: Sequence[int], count: int) -> list[int]:
     return [round(1000 * len(times) / _RATE / count)] * (count - 1) + [1500]
 
 
-def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -> list[NDArray[np.uint8]]:
+def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -> list[Image.Image]:
     """Return pictures of all patterns at these frames, RGB, of one size."""
-    shapes = {piece.name: [piece.shape(change) for change in piece.changes] for piece in pieces}
+    shapes = {piece.name: [_drawn(piece.shape(change)) for change in piece.changes] for piece in pieces}
     frames = [[_layout(piece, shapes[piece.name], time) for piece in pieces] for time in times]
     everything = np.concatenate([points for frame in frames for _, points, _ in frame])
     low, size = everything.min(axis=0), np.ptp(everything, axis=0)
-    scale = (long_side - 2 * _MARGIN) / float(size.max())
-    shape = tuple(int(2 * np.ceil((extent * scale + 2 * _MARGIN) / 2)) for extent in size[::-1])
-    return [_image(frame, low, scale, shape, pieces[0].scale) for frame in frames]
+    scale = (long_side - 2 * _MARGIN - _FOOT) / float(size.max())
+    wide, high = (int(2 * np.ceil((extent * scale + 2 * _MARGIN) / 2)) for extent in size)
+    first = pieces[0]
+    return [
+        _with_foot(
+            _image(frame, low, scale, (high, wide), first.scale),
+            f"{first.measure('stage', time) or 'frame'} {time}/{first.times[-1]}",
+            first.scale,
+        )
+        for frame, time in zip(frames, times, strict=True)
+    ]
 
 
-def _layout(piece: FilmPiece, shapes: Sequence[Shape], time: int) -> tuple[Shape, FloatArray, FloatArray]:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Drawn:
+    """What is drawn of a piece in one topology: triangles (#T by 3), the face of each, border edges (#B by 2), number of vertices."""
+
+    triangles: IntArray
+    face: IntArray
+    edges: IntArray
+    count: int
+
+
+def _drawn(shape: Shape) -> _Drawn:
+    triangles, face = triangulate(shape.faces)
+    return _Drawn(triangles=triangles, face=face, edges=outline_edges(shape.faces), count=len(shape.surface))
+
+
+def _layout(piece: FilmPiece, shapes: Sequence[_Drawn], time: int) -> tuple[_Drawn, FloatArray, FloatArray]:
     at = min(time, piece.times[-1])
     shape = shapes[max(sum(change <= at for change in piece.changes) - 1, 0)]
-    return shape, piece.positions(at, len(shape.surface)) + piece.offset[:2], piece.density(at)
+    return shape, piece.positions(at, shape.count) + piece.offset[:2], piece.density(at)
 
 
 def _image(
-    frame: Sequence[tuple[Shape, FloatArray, FloatArray]],
+    frame: Sequence[tuple[_Drawn, FloatArray, FloatArray]],
     low: FloatArray,
     scale: float,
-    shape: tuple[int, ...],
+    shape: tuple[int, int],
     energy: float,
-) -> NDArray[np.uint8]:
-    page = np.full((*shape, 3), float(_PAPER))
+) -> Image.Image:
+    """Return the patterns of one frame, coloured by energy, with their outlines."""
+    from PIL import Image, ImageDraw
+
+    high, wide = shape
+    page = np.full((high, wide, 3), float(_PAPER))
+    lines = Image.new("L", (2 * wide, 2 * high))
+    pen = ImageDraw.Draw(lines)
     for piece, points, density in frame:
-        triangles, face = triangulate(piece.faces)
         grid = np.zeros((len(points), 3))
         grid[:, 0] = 2.0 * ((points[:, 0] - low[0]) * scale + _MARGIN)
-        grid[:, 1] = 2.0 * (shape[0] - (points[:, 1] - low[1]) * scale - _MARGIN)
-        samples = rasterise(grid, triangles, (2 * shape[0], 2 * shape[1]))
-        pixels = shade(samples, 2, grid, triangles, energy_colours(density, energy), face=face)
+        grid[:, 1] = 2.0 * (high - (points[:, 1] - low[1]) * scale - _MARGIN)
+        samples = rasterise(grid, piece.triangles, (2 * high, 2 * wide))
+        pixels = shade(samples, 2, grid, piece.triangles, energy_colours(density, energy), face=piece.face)
         cover = pixels[..., 3:] / 255.0
         page = page * (1.0 - cover) + pixels[..., :3] * cover
-    return np.round(page).astype(np.uint8)
+        for begin, end in grid[piece.edges, :2].tolist():
+            pen.line((*begin, *end), fill=_OUTLINE, width=2)
+    image = Image.fromarray(np.round(page).astype(np.uint8))
+    image.paste(_INK, mask=lines.reduce(2))
+    return image
 
 
-def _save(path: Path, images: Sequence[NDArray[np.uint8]], **settings: Any) -> None:
-    from PIL import Image
+def _with_foot(image: Image.Image, words: str, energy: float) -> Image.Image:
+    """Return a picture with a line below it: which frame it is, and the scale of its colours."""
+    from PIL import Image, ImageDraw
 
-    pictures = [Image.fromarray(image) for image in images]
+    page = Image.new("RGB", (image.width, image.height + _FOOT), (_PAPER,) * 3)
+    page.paste(image)
+    pen, middle = ImageDraw.Draw(page), image.height + _FOOT // 2 - 2
+    limit = f"{energy:.3g} J/m2"  # the font has no superscripts
+    right = page.width - _MARGIN - int(pen.textlength(limit))
+    ramp = np.round(255.0 * energy_colours(np.linspace(0.0, 1.0, 60), 1.0)).astype(np.uint8)
+    page.paste(Image.fromarray(np.tile(ramp, (8, 1, 1))), (right - 66, middle - 4))
+    for x, text in ((_MARGIN, words), (right - 76, "0"), (right, limit)):
+        pen.text((x, middle), text, fill=_INK, anchor="lm")
+    return page
+
+
+def _save(path: Path, pictures: Sequence[Image.Image], **settings: Any) -> None:
     more = {"save_all": True, "append_images": pictures[1:]} if len(pictures) > 1 else {}
     with atomic_path(path) as temporary:
         pictures[0].save(temporary, format="WEBP" if path.suffix == ".webp" else "PNG", **more, **settings)

@@ -99,10 +99,13 @@ class Film:
 
     def _write_at_end(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
-            from warpflat.export.usd import FrameWriter
+            from warpflat.export.usd import FrameWriter, film_scale
 
             report_activity("writing the film")
-            with FrameWriter(self._folder / "frames.usdc") as writer:
+            last = [recorder.stages[-1] for recorder in self.recorders.values()]
+            ends = [self._keys.density(stage, stage.keys[-1]) for stage in last]
+            scale = film_scale(list(self._surfaces.values()), ends)
+            with FrameWriter(self._folder / "frames.usdc", scale=scale) as writer:
                 if self._mannequin is not None:
                     self._show_mannequin(writer, self._mannequin)
                 for name, surface in self._surfaces.items():

@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
@@ -53,8 +54,8 @@ class Frame:
         interpolated: whether it lies between two computed layouts.
     """
 
-    positions: FloatArray
-    face_energy_density: FloatArray
+    positions: NDArray[np.float32]
+    face_energy_density: NDArray[np.float32]
     measures: Mapping[str, float]
     interpolated: bool
 
@@ -115,20 +116,20 @@ class KeyFile:
             raise InputError(f"cannot write {self._folder / 'frames.usdc'}: {reason}") from error
         return key
 
-    def positions(self, stage: FilmStage, key: Key) -> FloatArray:
+    def positions(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:
         """Read the layout of a key, #P by 2 [m]."""
         return self._read(key.place, 2 * stage.vertex_count).reshape(-1, 2)
 
-    def density(self, stage: FilmStage, key: Key) -> FloatArray:
+    def density(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:
         """Read the energies of a key, #F [J/m2]."""
         return self._read(key.place + 8 * stage.vertex_count, stage.face_count)
 
-    def _read(self, place: int, count: int) -> FloatArray:
+    def _read(self, place: int, count: int) -> NDArray[np.float32]:
         self._file.seek(place)
         content = bytearray()
         while len(content) < 4 * count:
             content += self._file.read(4 * count - len(content))
-        return np.frombuffer(content, dtype=np.float32).astype(np.float64)
+        return np.frombuffer(content, dtype=np.float32)
 
     def displacement(self, stage: FilmStage) -> float:
         """Return how far the vertex that moves farthest comes from its place at the start of a stage [m]."""
@@ -214,17 +215,19 @@ def spread(distances: Sequence[float], number: int) -> list[int]:
 
 def _blend(first: Frame, last: Frame, share: float) -> Frame:
     """Return the frame at this share of the way between two computed ones."""
-    a, b = 1.0 - share, share
+    a, b = np.float32(1.0 - share), np.float32(share)
     return Frame(
         positions=a * first.positions + b * last.positions,
         face_energy_density=a * first.face_energy_density + b * last.face_energy_density,
         measures={
-            key: a * value + b * last.measures[key] for key, value in first.measures.items() if key in last.measures
+            key: (1.0 - share) * value + share * last.measures[key]
+            for key, value in first.measures.items()
+            if key in last.measures
         },
         interpolated=True,
     )
 
 
-def _largest_move(before: FloatArray, after: FloatArray) -> float:
+def _largest_move(before: NDArray[np.float32], after: NDArray[np.float32]) -> float:
     """Return how far the vertex that moves farthest moves [m]."""
     return float(np.sqrt(((after - before) ** 2).sum(axis=1).max()))

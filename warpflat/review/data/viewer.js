@@ -35,7 +35,7 @@
     }
     piece.layouts = [];
     let before = null;
-    for (const number of film.frames) {
+    for (const number of piece.frames) {
       let shape = piece.topologies[0];
       for (const each of piece.topologies) if (each.first <= number) shape = each;
       const steps = planes(2 * shape.vertices, 2), colours = data.slice(at, at + shape.vertices);
@@ -45,7 +45,7 @@
         for (let i = 0; i < colours.length; i++) colours[i] += before.colours[i];
       }
       before = { shape, steps, colours };
-      piece.layouts.push({ shape, colours, points: placed(piece, steps) });
+      piece.layouts.push({ number, shape, colours, points: placed(piece, steps) });
     }
   }
   function placed(piece, steps) {
@@ -134,25 +134,28 @@
     gl.drawElements(gl.LINES, shape.edge.length, gl.UNSIGNED_INT, 0);
   }
 
-  // --- time: between two frames of one topology the layout is blended
+  // --- time: between two layouts of one topology there are blends of both
   const last = film.frames.length - 1;
   let now = 0, playing = false;
   function stateAt(piece, time) {
-    const k = Math.min(Math.floor(time), last), share = time - k, a = piece.layouts[k];
-    const b = piece.layouts[Math.min(k + 1, last)];
+    const k = Math.min(Math.floor(time), last), next = film.frames[Math.min(k + 1, last)];
+    const frame = film.frames[k] + (time - k) * (next - film.frames[k]);
+    const after = piece.layouts.findIndex((layout) => layout.number > frame);
+    const a = piece.layouts.at(after < 0 ? -1 : Math.max(after - 1, 0)), b = after < 0 ? a : piece.layouts[after];
+    const share = after < 0 ? 0 : (frame - a.number) / (b.number - a.number);
     if (share <= 0 || b.shape !== a.shape) return a;
     const blended = (x, y, kind) => kind.from(x, (value, i) => value + share * (y[i] - value));
     return { shape: a.shape, points: blended(a.points, b.points, Float32Array), colours: blended(a.colours, b.colours, Uint8Array) };
   }
 
   // --- camera
-  const camera = { turn: 0, tilt: 0, away: 3, target: [0, 0, 0] };
+  const camera = { turn: 0, tilt: 0, away: 3, target: [0, 0, 0], which: "all", moved: false };
   function boxOf(which) {
     const low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
     const grow = (p) => { for (let i = 0; i < p.length; i++) { low[i % 3] = Math.min(low[i % 3], p[i]); high[i % 3] = Math.max(high[i % 3], p[i]); } };
     for (const piece of film.pieces) {
       if (which !== "pattern") grow(piece.topologies[0].surface);
-      if (which !== "surface") for (const k of [0, last]) grow(piece.layouts[k].points);
+      if (which !== "surface") for (const k of [0, -1]) grow(piece.layouts.at(k).points);
     }
     return [low, high];
   }
@@ -163,7 +166,7 @@
     const deep = Math.abs(Math.sin(turn)) * size[0] + Math.abs(Math.cos(turn)) * size[2];
     camera.target = [0, 1, 2].map((k) => 0.5 * (low[k] + high[k]));
     camera.away = Math.max(wide / aspect, size[1]) * 1.12 / (2 * Math.tan(0.25)) + 0.5 * deep;
-    Object.assign(camera, { turn, tilt });
+    Object.assign(camera, { turn, tilt, which, moved: false });
     draw();
   }
   function axes() {
@@ -190,8 +193,8 @@
     const { back } = axes();
     for (const piece of film.pieces) {
       const state = stateAt(piece, now);
-      drawMesh(state.shape, state.shape.surface, state.shape.normals, state.colours, back);
-      drawMesh(state.shape, state.points, null, state.colours, back);
+      if (camera.which !== "pattern") drawMesh(state.shape, state.shape.surface, state.shape.normals, state.colours, back);
+      if (camera.which !== "surface") drawMesh(state.shape, state.points, null, state.colours, back);
     }
     const k = Math.min(Math.round(now), last);
     label.textContent = `${film.stages[k]} · frame ${film.frames[k]} of ${film.of}` + (film.computed[k] ? " · computed" : " · interpolated");
@@ -223,12 +226,20 @@
   });
   const views = { all: ["all", 0, 0], front: ["surface", 0, 0.08], side: ["surface", Math.PI / 2, 0.08], back: ["surface", Math.PI, 0.08], pattern: ["pattern", 0, 0] };
   for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => look(...views[button.dataset.view]));
-  canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+  const fingers = new Map();  // two of them zoom
+  const spread = () => { const [a, b] = [...fingers.values()]; return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY); };
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener("dblclick", () => look(...views.all));
   canvas.addEventListener("pointermove", (event) => {
     if (!event.buttons) return;
-    if (event.buttons === 1 && !event.shiftKey) {
+    camera.moved = true;
+    const before = fingers.size === 2 ? spread() : 0;
+    fingers.set(event.pointerId, event);
+    if (fingers.size === 2) {
+      camera.away *= before / Math.max(spread(), 1);
+    } else if (event.buttons === 1 && !event.shiftKey) {
       camera.turn -= event.movementX * 0.008;
       camera.tilt = Math.min(1.5, Math.max(-1.5, camera.tilt + event.movementY * 0.008));
     } else {
@@ -239,10 +250,11 @@
   });
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
+    camera.moved = true;
     camera.away *= Math.exp(0.001 * event.deltaY);
     draw();
   }, { passive: false });
-  window.addEventListener("resize", draw);
+  window.addEventListener("resize", () => { if (camera.moved) draw(); else look(camera.which, camera.turn, camera.tilt); });
   window.addEventListener("keydown", (event) => {
     if (event.target !== slider && event.key === "ArrowRight") { halt(); show(Math.floor(now) + 1); }
     if (event.target !== slider && event.key === "ArrowLeft") { halt(); show(Math.ceil(now) - 1); }
