@@ -2,8 +2,8 @@
 
     OMP_NUM_THREADS=1 python benchmarks/whole.py [--only paper_block tshirt 40000] [--variants] [--repeats 3] [--json FILE]
 
-Each command is a process of its own, with compiled kernels. Of each part it prints wall time, then processor time of the main thread: what
-its functions take less what others take that they call. `waiting` is for processes that write files beside it, `rest` is time in no part,
+Each command is a process of its own, with compiled kernels and modules. Of each part it prints wall time, then processor time of the main
+thread: what its functions take less what others take that they call. `waiting` is for processes that write files beside it, `rest` is time in no part,
 `beside` processor time of other threads and of those processes. The command with the least processor time of all repeats is shown. Memory
 is the largest sum of all its processes, shared pages counted once, looked at ten times a second. `--variants` runs each scene without its
 picture, film and pattern files, and with a marker and a drape.
@@ -176,6 +176,13 @@ def child(report: str, begun: float, arguments: list[str]) -> None:
     Path(report).write_text(json.dumps(found))
 
 
+def environment() -> dict[str, str]:
+    """Return the environment of a command: modules are kept compiled, as those of an installed package are."""
+    given = {**os.environ, "PYTHONPYCACHEPREFIX": os.path.join(tempfile.gettempdir(), "warpflat-modules")}
+    given.pop("PYTHONDONTWRITEBYTECODE", None)
+    return given
+
+
 def measured(arguments: list[str], repeats: int) -> dict[str, Any]:
     """Run a command some times; return what the one with the least processor time took."""
     best: dict[str, Any] = {}
@@ -185,7 +192,8 @@ def measured(arguments: list[str], repeats: int) -> dict[str, Any]:
             command = [sys.executable, __file__, "--child", str(report), repr(time.perf_counter()), *arguments]
             before = os.times()
             begun = time.perf_counter()
-            subprocess.run([*command, "--out", f"{folder}/out", "--quiet"], stdout=subprocess.DEVNULL, check=False)
+            command += ["--out", f"{folder}/out", "--quiet"]
+            subprocess.run(command, stdout=subprocess.DEVNULL, env=environment(), check=False)
             ended, after = time.perf_counter(), os.times()
             found = json.loads(report.read_text())
         if found["code"] not in (0, 1):
