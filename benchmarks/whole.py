@@ -4,9 +4,9 @@
 
 Each command is a process of its own, with compiled kernels and modules. Of each part it prints wall time, then processor time of the main
 thread: what its functions take less what others take that they call. `waiting` is for processes that write files beside it, `rest` is time
-in no part, `beside` processor time of other threads and of those processes. The command with the least processor time of all repeats is shown. Memory
-is the largest sum of all its processes, shared pages counted once, looked at ten times a second. `--variants` runs each scene without its
-picture, film and pattern files, and with a marker and a drape.
+in no part, `beside` processor time of other threads and of those processes. The command with the least processor time of all repeats is
+shown. Memory is the largest sum of all its processes, shared pages counted once, looked at ten times a second. `--variants` runs each
+scene without its picture, film and pattern files, and with a marker and a drape.
 """
 
 from __future__ import annotations

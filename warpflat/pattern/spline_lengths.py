@@ -105,6 +105,7 @@ class _LengthSystem:
         number, value, slope = _cubic_basis(knots, np.concatenate([at[1:-1], between]))
         self._at_points, self._value = number[: len(at) - 2], value[: len(at) - 2]
         self._at_quadrature, self._slope = number[len(at) - 2 :], slope[len(at) - 2 :]
+        self._fixed: NDArray[np.floating | np.integer]
         self._few = count * count <= 4 * len(span)
         if self._few:
             by_point = self._summed(np.arange(len(at) - 2), self._at_points, self._value)[:, 1:-1]
@@ -146,7 +147,9 @@ class _LengthSystem:
         by = np.broadcast_to(np.repeat(span, GAUSS)[:, None, None], of_rate.shape)[self._free]
         self._band = int(max(np.abs(row - column).max(), np.abs(by - to).max()))
         self._size = len(inner) + len(span)
-        self._fixed = np.bincount(self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size)
+        self._fixed: FloatArray = np.bincount(
+            self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size
+        )
         self._to = np.concatenate([self._flat(by, to), self._flat(to, by)])
 
     def _flat(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -183,7 +186,7 @@ class _LengthSystem:
         """Return a matrix with a column for each control point: the sum of values (#N by 4) by row (#N) and number (#N by 4)."""
         shape = int(row[-1]) + 1, len(self._start)
         flat = (row[:, None] * shape[1] + number).ravel()
-        return np.bincount(flat, value.ravel(), minlength=shape[0] * shape[1]).reshape(shape)
+        return np.asarray(np.bincount(flat, value.ravel(), shape[0] * shape[1]).reshape(shape), dtype=np.float64)
 
     def _move_few(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
         """Solve the normal equations for the moves of the inner control points, #control - 2 by 2."""
@@ -195,8 +198,8 @@ class _LengthSystem:
         matrix = length_rate.T @ length_rate
         matrix[::2, ::2] += self._fixed
         matrix[1::2, 1::2] += self._fixed
-        solved: FloatArray = np.linalg.solve(matrix, -gradient.ravel() - length_rate.T @ off)
-        return solved.reshape(-1, 2)
+        solved = np.linalg.solve(matrix, -gradient.ravel() - length_rate.T @ off)
+        return np.asarray(solved, dtype=np.float64).reshape(-1, 2)
 
     def _move_many(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
         """Solve the banded equations for the moves of the inner control points, #control - 2 by 2."""

@@ -192,7 +192,7 @@ class _Patch:
         return np.cross(p[2] - p[0], p[-1] - p[1] if len(p) == 4 else p[2] - p[1])
 
     def is_narrow(self, ring: tuple[int, ...], factor: float = 1.0) -> bool:
-        points = list(ring)
+        points = np.array(ring)
         return bool(_width(points_at(self.vertices, points)) <= factor * self.tolerance * self.scale[points].mean())
 
     def is_degenerate(self, face: int) -> bool:

@@ -377,7 +377,7 @@ def _drop_unused(mesh: _Mesh) -> None:
     mesh.vertices, mesh.index = mesh.vertices[used], mesh.index[used]
 
 
-def _used_vertices(faces: IntArray) -> NDArray[np.int64]:
+def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
     """Return the vertices that faces (filled up with -1) have, sorted."""
     return np.flatnonzero(np.bincount(faces.ravel() + 1)[1:])
 
