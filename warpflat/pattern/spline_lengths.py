@@ -105,7 +105,6 @@ class _LengthSystem:
         number, value, slope = _cubic_basis(knots, np.concatenate([at[1:-1], between]))
         self._at_points, self._value = number[: len(at) - 2], value[: len(at) - 2]
         self._at_quadrature, self._slope = number[len(at) - 2 :], slope[len(at) - 2 :]
-        self._fixed: NDArray[np.floating | np.integer]
         self._few = count * count <= 4 * len(span)
         if self._few:
             by_point = self._summed(np.arange(len(at) - 2), self._at_points, self._value)[:, 1:-1]
