@@ -146,9 +146,8 @@ class _LengthSystem:
         by = np.broadcast_to(np.repeat(span, GAUSS)[:, None, None], of_rate.shape)[self._free]
         self._band = int(max(np.abs(row - column).max(), np.abs(by - to).max()))
         self._size = len(inner) + len(span)
-        self._fixed: FloatArray = np.bincount(
-            self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size
-        )
+        fixed = np.bincount(self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size)
+        self._fixed = fixed.astype(np.float64, copy=False)
         self._to = np.concatenate([self._flat(by, to), self._flat(to, by)])
 
     def _flat(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
