@@ -170,7 +170,6 @@ def child(report: str, begun: float, arguments: list[str]) -> None:
         "part_cpu": clock.cpu,
         "main_cpu": time.thread_time(),
         "cpu": own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime,
-        "memory_gb": 1024 * own.ru_maxrss / 1e9,
         "ended": time.perf_counter(),
     }
     Path(report).write_text(json.dumps(found))
@@ -193,12 +192,16 @@ def measured(arguments: list[str], repeats: int) -> dict[str, Any]:
             before = os.times()
             begun = time.perf_counter()
             command += ["--out", f"{folder}/out", "--quiet"]
-            subprocess.run(command, stdout=subprocess.DEVNULL, env=environment(), check=False)
+            memory = 0.0
+            with subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment()) as process:
+                while process.poll() is None:
+                    memory = max(memory, memory_of(process.pid))
+                    time.sleep(0.1)
             ended, after = time.perf_counter(), os.times()
             found = json.loads(report.read_text())
         if found["code"] not in (0, 1):
             sys.exit(f"{' '.join(arguments)} ended with {found['code']}")
-        found["seconds"] = ended - begun
+        found["seconds"], found["memory_gb"] = ended - begun, memory
         found["cpu"] = after.children_user + after.children_system - before.children_user - before.children_system
         found["wall"]["end of process"] = ended - found.pop("ended")
         if not best or found["cpu"] < best["cpu"]:
