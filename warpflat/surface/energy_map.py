@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 # Relative tolerance of the diffusion, and the number of iterations after which it is solved directly, as slivers may need.
-_TOLERANCE = 1e-12
+_TOLERANCE = 1e-9
 _MOST_ITERATIONS = 1000
 # Surfaces of more vertices are smoothed with a preconditioner of several levels.
 _LARGE = 50_000
@@ -233,6 +233,8 @@ def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: fl
     )
     smooth = np.zeros(count)
     smooth[used] = solved if left == 0 else spsolve(system.tocsc(), energy[used])
+    # Spread evenly, what the iterations leave: the total is kept to rounding.
+    smooth[used] += (energy[used].sum() - area[used] @ smooth[used]) / area[used].sum()
     return smooth
 
 
