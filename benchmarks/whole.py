@@ -2,11 +2,11 @@
 
     OMP_NUM_THREADS=1 python benchmarks/whole.py [--only paper_block tshirt 40000] [--variants] [--repeats 3] [--json FILE]
 
-Each command is a process of its own, with compiled kernels. Of each part it prints wall time, then processor time of the main thread: what
-its functions take less what others take that they call. `waiting` is for processes that write files beside it, `rest` is time in no part,
-`beside` processor time of other threads and of those processes. The command with the least processor time of all repeats is shown. Memory
-is the largest sum of all its processes, shared pages counted once, looked at ten times a second. `--variants` runs each scene without its
-picture, film and pattern files, and with a marker and a drape.
+Each command is a process of its own, with compiled kernels and modules. Of each part it prints wall time, then processor time of the main
+thread: what its functions take less what others take that they call. `waiting` is for processes that write files beside it, `rest` is time
+in no part, `beside` processor time of other threads and of those processes. The command with the least processor time of all repeats is
+shown. Memory is the largest sum of all its processes, shared pages counted once, looked at ten times a second. `--variants` runs each
+scene without its picture, film and pattern files, and with a marker and a drape.
 """
 
 from __future__ import annotations
@@ -170,10 +170,16 @@ def child(report: str, begun: float, arguments: list[str]) -> None:
         "part_cpu": clock.cpu,
         "main_cpu": time.thread_time(),
         "cpu": own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime,
-        "memory_gb": 1024 * own.ru_maxrss / 1e9,
         "ended": time.perf_counter(),
     }
     Path(report).write_text(json.dumps(found))
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of a command: modules are kept compiled, as those of an installed package are."""
+    given = {**os.environ, "PYTHONPYCACHEPREFIX": os.path.join(tempfile.gettempdir(), "warpflat-modules")}
+    given.pop("PYTHONDONTWRITEBYTECODE", None)
+    return given
 
 
 def measured(arguments: list[str], repeats: int) -> dict[str, Any]:
@@ -185,12 +191,17 @@ def measured(arguments: list[str], repeats: int) -> dict[str, Any]:
             command = [sys.executable, __file__, "--child", str(report), repr(time.perf_counter()), *arguments]
             before = os.times()
             begun = time.perf_counter()
-            subprocess.run([*command, "--out", f"{folder}/out", "--quiet"], stdout=subprocess.DEVNULL, check=False)
+            command += ["--out", f"{folder}/out", "--quiet"]
+            memory = 0.0
+            with subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment()) as process:
+                while process.poll() is None:
+                    memory = max(memory, memory_of(process.pid))
+                    time.sleep(0.1)
             ended, after = time.perf_counter(), os.times()
             found = json.loads(report.read_text())
         if found["code"] not in (0, 1):
             sys.exit(f"{' '.join(arguments)} ended with {found['code']}")
-        found["seconds"] = ended - begun
+        found["seconds"], found["memory_gb"] = ended - begun, memory
         found["cpu"] = after.children_user + after.children_system - before.children_user - before.children_system
         found["wall"]["end of process"] = ended - found.pop("ended")
         if not best or found["cpu"] < best["cpu"]:

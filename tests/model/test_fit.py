@@ -250,13 +250,17 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     write_wear_sheet(tmp_path / "wear.png", results, title="sleeves")
     assert (tmp_path / "wear.png").exists()
     figure = drawn[0]
-    maps = [axis for axis in figure.axes if not axis.axison]
+    (page,) = (axis for axis in figure.axes if not axis.axison)
+    np.testing.assert_allclose((page.get_xlim()[1], page.get_ylim()[1]), figure.get_size_inches())
+    maps = list(page.artists)
     assert len(maps) == 2 * len(MAPS)
-    inches = figure.get_size_inches()[0]
-    scales = [np.ptp(axis.get_xlim()) / (axis.get_position().width * inches) for axis in maps]
-    np.testing.assert_allclose(scales, scales[0], rtol=1e-9)
+    pieces = np.repeat(results, len(MAPS))
+    scales = [
+        np.ptp(each.points, axis=0) / np.ptp(piece.positions, axis=0) for each, piece in zip(maps, pieces, strict=True)
+    ]
+    np.testing.assert_allclose(scales, scales[0][0], rtol=1e-9)
     for first, second in zip(maps[: len(MAPS)], maps[len(MAPS) :], strict=True):
-        assert first.artists[0].mappable.get_clim() == second.artists[0].mappable.get_clim()
+        assert first.mappable.get_clim() == second.mappable.get_clim()
     told = " ".join(text.get_text() for text in figure.texts)
     assert "does not fit: cylinder" in told
     assert "fits: yes, 0.0 % beyond the limit" in told

@@ -28,7 +28,7 @@ from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drawing import OnPaper, Stroke, draw_nest
 from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.layout import Placed, Sheet, lay_out, nests, occupied_points
-from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, font_file
+from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, embedded_font
 from warpflat.pattern.sewing_order import seam_letters
 from warpflat.pattern.tile_nesting import nest_on_tiles
 from warpflat.pattern.words import printed_in, translate
@@ -184,10 +184,9 @@ def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
 def _register_fonts() -> None:
     """Register the fonts, which are embedded."""
     from reportlab.pdfbase import pdfmetrics
-    from reportlab.pdfbase.ttfonts import TTFont
 
     for name in (FONT, BOLD):
-        pdfmetrics.registerFont(TTFont(name, str(font_file(name))))
+        pdfmetrics.registerFont(embedded_font(name))
 
 
 def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: Sequence[str]) -> None:

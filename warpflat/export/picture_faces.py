@@ -21,6 +21,7 @@ class ColouredFaces(Artist):
     """Faces in the plane, each in one colour, without seams between them.
 
     Attributes:
+        points: #P by 2, in the units of the axis.
         mappable: the scale of the colours.
     """
 
@@ -35,14 +36,14 @@ class ColouredFaces(Artist):
         """
         super().__init__()
         self.mappable = mappable
-        self._points, self._colours = points, np.asarray(mappable.to_rgba(values))[:, :3]
+        self.points, self._colours = points, np.asarray(mappable.to_rgba(values))[:, :3]
         self._triangles, self._face = triangulate(faces)
         self.set_zorder(1)
 
     def draw(self, renderer: Any) -> None:
         """Draw the pixels, at the renderer's resolution."""
         assert self.axes is not None
-        at = self.axes.transData.transform(self._points)
+        at = self.axes.transData.transform(self.points)
         low = np.floor(at.min(axis=0)) - 1.0
         columns, rows = (np.ceil(at.max(axis=0)) + 1.0 - low).astype(int).tolist()
         grid = np.zeros((len(at), 3))

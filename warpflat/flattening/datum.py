@@ -13,6 +13,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.band import line_along_band
 from warpflat.surface.paths.lines import line_between, line_from_indices, line_on_plane
 from warpflat.surface.triangles import triangulate
+from warpflat.surface.vectors import cross, norm, points_at
 
 __all__ = ["choose_and_name_datum", "choose_datum", "datum_extent"]
 
@@ -49,16 +50,18 @@ def choose_datum(surface: Surface) -> IntArray:
 def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
     """Return the line of `choose_datum`, and a description of it."""
     triangles, _ = triangulate(surface.faces)
-    p = surface.vertices[triangles]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    area = np.linalg.norm(normal, axis=1)
-    centre = np.average(p.mean(axis=1), axis=0, weights=area)
+    p = points_at(surface.vertices, triangles.T)
+    normal = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    area = norm(normal)
+    middle = p.mean(axis=1)
+    centre = np.average(middle, axis=1, weights=area)
     # Exact over each triangle, or the axis of a rectangle of quads would lean to the diagonals by which these are split.
-    at = np.concatenate([p, p.mean(axis=1, keepdims=True)], axis=1) - centre
-    share = np.array([1.0, 1.0, 1.0, 9.0]) / 12.0
-    spread = np.einsum("i,k,ikx,iky->xy", area, share, at, at)
+    spread = np.zeros((3, 3))
+    for points, share in ((p[:, 0], 1.0), (p[:, 1], 1.0), (p[:, 2], 1.0), (middle, 9.0)):
+        at = points - centre[:, None]
+        spread += share / 12.0 * (at * area) @ at.T
     values, axes = np.linalg.eigh(spread / area.sum())
-    facing = normal.sum(axis=0)
+    facing = normal.sum(axis=1)
     long_axis, words = _long_axis(values, axes, facing)
     long_axis = long_axis * _upwards(long_axis, long_axis)
     across = np.cross(long_axis, facing)

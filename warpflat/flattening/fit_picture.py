@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.core.sums import weighted_percentile
 from warpflat.export.letters import all_letters, is_drawn, titles
@@ -131,9 +131,12 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     figure = Figure(figsize=(3 * (width + 1.1), 2 * (height + 0.75) + 0.5), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     fit = result.fit
-    scales = _scales([fit], [[name] for name in MAPS])
+    scales, strokes = _scales([fit], [[name] for name in MAPS]), _Strokes.of(result)
     for axis, (name, (label, factor, unit)) in zip(figure.subplots(2, 3).ravel(), MAPS.items(), strict=True):
-        drawn = _draw_map(axis, result, name, scales[name], {})
+        drawn = _draw_map(axis, result.positions, result, strokes, name, scales[name], {})
+        axis.update_datalim(result.positions)
+        axis.set_aspect("equal")
+        axis.set_axis_off()
         axis.autoscale_view()
         axis.set_title(f"{label}, median {_shown(_median(fit, name) * factor)} {unit}", fontsize=10)
         bar = figure.colorbar(drawn, ax=axis, shrink=0.75, extend=scales[name].extend, pad=0.02)
@@ -178,13 +181,16 @@ def write_wear_sheet(
     scales = _scales(fits, [*([name] for name in maps if name in _BODY_MAPS), *_ALIKE], bodies)
     limit = max(fit.limit for fit in fits)
     top = _TOP
+    # One axis over the page, in inches: an axis for each map takes longer than all that is drawn in it.
+    page = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, sheet.size[0]), ylim=(0.0, sheet.size[1]))
+    page.set_axis_off()
     drawn: dict[str, ScalarMappable] = {}
     shown_names = titles([result.surface.name for result in results], is_drawn)
     for result, body, height in zip(results, bodies, sheet.rows, strict=True):
         _write_row_label(
             figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15), on_form=bool(on_body)
         )
-        drawn = _draw_row(figure, sheet, result, top, height, scales, body)
+        drawn = _draw_row(page, sheet, result, top, height, scales, body)
         top += height
     _draw_scales(figure, sheet, top, drawn, scales, limit)
     unfit = [result.surface.name for result in results if not result.fit.fits]
@@ -251,7 +257,7 @@ class _Sheet:
 
 
 def _draw_row(
-    figure: Figure,
+    page: Axes,
     sheet: _Sheet,
     result: Flattening,
     top: float,
@@ -262,12 +268,30 @@ def _draw_row(
     """Draw all maps of a piece side by side."""
     drawn = {}
     middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
+    inches = (result.positions - middle) * sheet.inches
+    strokes = _Strokes.of(result)
     for number, name in enumerate((*body, *MAPS)):
-        axis = figure.add_axes(sheet.box(_LABEL + number * sheet.column, top, sheet.column, height))
-        drawn[name] = _draw_map(axis, result, name, scales[name], body)
-        axis.set_xlim(middle[0] - 0.5 * sheet.column / sheet.inches, middle[0] + 0.5 * sheet.column / sheet.inches)
-        axis.set_ylim(middle[1] - 0.5 * height / sheet.inches, middle[1] + 0.5 * height / sheet.inches)
+        centre = _LABEL + (number + 0.5) * sheet.column, sheet.size[1] - top - 0.5 * height
+        drawn[name] = _draw_map(page, inches + centre, result, strokes, name, scales[name], body)
     return drawn
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Strokes:
+    """The edges of a piece that its maps show: of its lines, its border, and what is beyond the cloth's limit; #E by 2 each."""
+
+    lines: IntArray
+    border: IntArray
+    beyond: IntArray
+
+    @classmethod
+    def of(cls, result: Flattening) -> _Strokes:
+        none, faces = np.empty((0, 2), dtype=np.int32), result.faces
+        lines = [np.column_stack([line[:-1], line[1:]]) for line in result.network.surface.lines.values()]
+        beyond = [border_edges(faces[misfit.faces]) for misfit in result.fit.misfits]
+        return cls(
+            lines=np.concatenate([none, *lines]), border=border_edges(faces), beyond=np.concatenate([none, *beyond])
+        )
 
 
 def _draw_scales(
@@ -342,25 +366,23 @@ def _write_row_label(
     figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")
 
 
-def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale, body: OnBody) -> ScalarMappable:
+def _draw_map(
+    axis: Axes, places: FloatArray, result: Flattening, strokes: _Strokes, name: str, scale: _Scale, body: OnBody
+) -> ScalarMappable:
+    """Draw a map of a piece whose vertices come to lie at `places` (#P by 2) in the units of the axis."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     from warpflat.export.picture_faces import ColouredFaces
 
-    fit, p = result.fit, result.positions
     colours = colormaps[scale.colours].with_extremes(bad=_NOT_AROUND)
     mappable = ScalarMappable(Normalize(scale.low, scale.high), colours)
-    axis.add_artist(ColouredFaces(p, result.faces, _values(fit, body, name), mappable))
-    axis.update_datalim(p)
-    for line in result.network.surface.lines.values():
-        _draw_segments(axis, p[np.stack([line[:-1], line[1:]], axis=1)], "#808080", 0.4)
-    _draw_segments(axis, p[border_edges(result.faces)], "black", 0.9)
-    for misfit in fit.misfits if name in _LIMITED else ():
-        _draw_segments(axis, p[border_edges(result.faces[misfit.faces])], _BEYOND, 0.7)
-    axis.set_aspect("equal")
-    axis.set_axis_off()
+    axis.add_artist(ColouredFaces(places, result.faces, _values(result.fit, body, name), mappable))
+    _draw_segments(axis, places[strokes.lines], "#808080", 0.4)
+    _draw_segments(axis, places[strokes.border], "black", 0.9)
+    if name in _LIMITED:
+        _draw_segments(axis, places[strokes.beyond], _BEYOND, 0.7)
     return mappable
 
 

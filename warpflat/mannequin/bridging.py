@@ -96,6 +96,12 @@ def _hull_reach(points: FloatArray, starts: FloatArray, rays: FloatArray) -> Flo
     from scipy.spatial import ConvexHull
 
     planes = ConvexHull(points).equations
-    rate = rays @ planes[:, :3].T
-    room = -(starts @ planes[:, :3].T + planes[:, 3])
-    return np.asarray(np.where(rate > 1e-12, room / np.where(rate > 1e-12, rate, 1.0), np.inf).min(axis=2))
+    normals = np.ascontiguousarray(planes[:, :3].T)
+    reach = np.empty(rays.shape[:2])
+    for row, (start, ray) in enumerate(zip(starts, rays, strict=True)):  # a row of them at a time stays in the cache
+        rate = ray @ normals
+        room = -(start @ normals + planes[:, 3])
+        np.divide(room, rate, out=room, where=rate > 1e-12)
+        room[rate <= 1e-12] = np.inf
+        reach[row] = room.min(axis=1)
+    return reach

@@ -175,18 +175,22 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         total = np.bincount(face, area * values, minlength=faces)
         return np.asarray(np.divide(total, face_area, out=np.zeros(faces), where=face_area > 0.0))
 
-    pressure = smooth_face_values(surface, mean(load), smoothing_length)
     weight = np.maximum(face_area, 0.0)
     strain_warp, strain_weft = mean(strain[:, 0]), mean(strain[:, 1])
+    strain_bias, shear = mean(bias), mean(np.arcsin(sine))
+    tension_warp, tension_weft, loaded = mean(pull[:, 0]), mean(pull[:, 1]), mean(load)
+    # A million faces of them take a tenth of a gigabyte each, and the smoothing more.
+    del strain, stress, lengths, spread, pull, load, unit, bias, sine, along_warp, along_weft, crossed
+    pressure = smooth_face_values(surface, loaded, smoothing_length)
     excess = np.maximum(np.abs(strain_warp), np.abs(strain_weft)) - fabric.strain_limit
     total_area = max(float(weight.sum()), 1e-300)
     return WornFit(
         strain_warp=strain_warp,
         strain_weft=strain_weft,
-        strain_bias=mean(bias),
-        shear=mean(np.arcsin(sine)),
-        tension_warp=mean(pull[:, 0]),
-        tension_weft=mean(pull[:, 1]),
+        strain_bias=strain_bias,
+        shear=shear,
+        tension_warp=tension_warp,
+        tension_weft=tension_weft,
         pressure=np.maximum(pressure, 0.0),
         area=weight,
         limit=fabric.strain_limit,

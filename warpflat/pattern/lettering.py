@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from warpflat.core.arrays import FloatArray
 
-__all__ = ["BOLD", "CAPITALS", "FONT", "Words", "font_file", "text_width", "wrap_text"]
+if TYPE_CHECKING:
+    from reportlab.pdfbase.ttfonts import TTFont
+
+__all__ = ["BOLD", "CAPITALS", "FONT", "Words", "embedded_font", "font_file", "text_width", "wrap_text"]
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 #: Height of capitals over the font's size.
@@ -40,9 +45,18 @@ class Words:
 
 def font_file(name: str) -> Path:
     """Return the file of FONT or BOLD, which has most of the world's letters and comes with matplotlib."""
-    import matplotlib
+    found = find_spec("matplotlib")  # importing it takes longer than writing a pattern
+    assert found is not None
+    assert found.origin is not None
+    return Path(found.origin).parent / "mpl-data" / "fonts" / "ttf" / f"{name}.ttf"
 
-    return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / f"{name}.ttf"
+
+@cache
+def embedded_font(name: str) -> TTFont:
+    """Return FONT or BOLD for PDF files."""
+    from reportlab.pdfbase.ttfonts import TTFont
+
+    return TTFont(name, str(font_file(name)))
 
 
 def text_width(text: str, height: float, *, bold: bool = False) -> float:
@@ -54,9 +68,7 @@ def text_width(text: str, height: float, *, bold: bool = False) -> float:
 @cache
 def _widths(name: str) -> dict[int, float]:
     """Return the width of each letter over the font's size, by code point."""
-    from reportlab.pdfbase.ttfonts import TTFontFile
-
-    return {code: width / 1000 for code, width in TTFontFile(str(font_file(name))).charWidths.items()}
+    return {code: width / 1000 for code, width in embedded_font(name).face.charWidths.items()}
 
 
 def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> str:

@@ -81,7 +81,8 @@ class _LengthSystem:
     Up to each point the length depends on all control points before it, so the normal equations would be dense.
     Therefore the errors e of the lengths are unknowns as well, bound by e_j - e_{j-1} = excess length between two
     points. With the multipliers of these equations in place of e, and all unknowns in their order along the curve, the
-    matrix is banded.
+    matrix is banded. Where few control points follow many points the band would be as wide as the matrix, and the normal
+    equations are small.
     """
 
     def __init__(
@@ -104,6 +105,11 @@ class _LengthSystem:
         number, value, slope = _cubic_basis(knots, np.concatenate([at[1:-1], between]))
         self._at_points, self._value = number[: len(at) - 2], value[: len(at) - 2]
         self._at_quadrature, self._slope = number[len(at) - 2 :], slope[len(at) - 2 :]
+        self._few = count * count <= 4 * len(span)
+        if self._few:
+            by_point = self._summed(np.arange(len(at) - 2), self._at_points, self._value)[:, 1:-1]
+            self._fixed = by_point.T @ by_point / tolerance**2 + self._control_weight**2 * np.eye(count - 2)
+            return
         # Places of the unknowns in their order: x and y of each control point but the ends, and one for each span.
         middle = (knots[1:-3] + knots[2:-2] + knots[3:-1])[1:-1] / 3.0
         order = np.argsort(np.concatenate([np.repeat(middle, 2), 0.5 * (at[:-1] + at[1:])]), kind="stable")
@@ -140,7 +146,8 @@ class _LengthSystem:
         by = np.broadcast_to(np.repeat(span, GAUSS)[:, None, None], of_rate.shape)[self._free]
         self._band = int(max(np.abs(row - column).max(), np.abs(by - to).max()))
         self._size = len(inner) + len(span)
-        self._fixed = np.bincount(self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size)
+        fixed = np.bincount(self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size)
+        self._fixed = fixed.astype(np.float64, copy=False)
         self._to = np.concatenate([self._flat(by, to), self._flat(to, by)])
 
     def _flat(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -165,26 +172,50 @@ class _LengthSystem:
 
     def move(self, fit: _Fit) -> FloatArray:
         """Return the Gauss-Newton step from a fit (#control by 2 [m]); the ends stay."""
+        gradient = (fit.control - self._start) * self._control_weight**2
+        for axis in range(2):
+            along = self._value * fit.place_error[:, axis, None] / self._tolerance
+            gradient[:, axis] += np.bincount(self._at_points.ravel(), along.ravel(), minlength=len(gradient))
+        move = np.zeros_like(fit.control)
+        move[1:-1] = (self._move_few if self._few else self._move_many)(fit, gradient[1:-1])
+        return move
+
+    def _summed(self, row: NDArray[np.int64], number: NDArray[np.int64], value: FloatArray) -> FloatArray:
+        """Return a matrix with a column for each control point: the sum of values (#N by 4) by row (#N) and number (#N by 4)."""
+        shape = int(row[-1]) + 1, len(self._start)
+        flat = (row[:, None] * shape[1] + number).ravel()
+        return np.asarray(np.bincount(flat, value.ravel(), shape[0] * shape[1]).reshape(shape), dtype=np.float64)
+
+    def _move_few(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
+        """Solve the normal equations for the moves of the inner control points, #control - 2 by 2."""
+        span = np.repeat(np.arange(len(self._steps)), GAUSS)
+        rate = [self._summed(span, self._at_quadrature, self._slope * fit.rate[:, axis, None]) for axis in range(2)]
+        by_span = np.stack(rate, axis=2)[:, 1:-1].reshape(len(self._steps), -1)
+        length_rate = np.cumsum(by_span, axis=0) / self._length_weight
+        off = np.cumsum(fit.length_error) / self._length_weight
+        matrix = length_rate.T @ length_rate
+        matrix[::2, ::2] += self._fixed
+        matrix[1::2, 1::2] += self._fixed
+        solved = np.linalg.solve(matrix, -gradient.ravel() - length_rate.T @ off)
+        return np.asarray(solved, dtype=np.float64).reshape(-1, 2)
+
+    def _move_many(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
+        """Solve the banded equations for the moves of the inner control points, #control - 2 by 2."""
         # Thousands of small systems: `scipy.linalg.solve_banded` takes longer to check its arguments than to solve one.
         from scipy.linalg.lapack import dgbsv
 
         rate = (self._slope[:, :, None] * fit.rate[:, None, :])[self._free] / -self._length_weight
         band = self._fixed + np.bincount(self._to, np.concatenate([rate, rate]), minlength=len(self._fixed))
-        gradient = (fit.control - self._start) * self._control_weight**2
-        for axis in range(2):
-            along = self._value * fit.place_error[:, axis, None] / self._tolerance
-            gradient[:, axis] += np.bincount(self._at_points.ravel(), along.ravel(), minlength=len(gradient))
         right = np.empty(self._size)
-        right[self._of_control[1:-1]] = -gradient[1:-1]
+        right[self._of_control[1:-1]] = -gradient
         right[self._of_span] = fit.length_error / self._length_weight
         _, _, solved, failed = dgbsv(
             self._band, self._band, band.reshape(3 * self._band + 1, self._size), right, overwrite_ab=True
         )
         if failed:
             raise np.linalg.LinAlgError("the spline's equations are singular")
-        move = np.zeros_like(fit.control)
-        move[1:-1] = solved[self._of_control[1:-1]]
-        return move
+        moved: FloatArray = solved[self._of_control[1:-1]]
+        return moved
 
 
 def _cubic_basis(knots: FloatArray, at: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from warpflat.core.activity import report_activity
 from warpflat.core.beside import Beside
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_run
@@ -24,7 +23,7 @@ from warpflat.scene.load import (
     scene_wear,
 )
 from warpflat.scene.surface import scene_surface
-from warpflat.scene.write import SceneResult, write_pieces, write_surface
+from warpflat.scene.write import SceneResult, measure_fit, write_pieces, write_surface
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.mesh import Surface
 
@@ -93,7 +92,6 @@ def _run_surface(
     device: str | None,
     cuts: CutSequence | None,
 ) -> SceneResult:
-    from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
     from warpflat.garment.pattern_files import surface_files
     from warpflat.scene.drape import write_drape
@@ -119,8 +117,8 @@ def _run_surface(
                 return None if on_progress is None else on_progress(progress)
 
             result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
-            report_activity("measuring how it fits")
-            pieces = [advise(piece) for piece in separate(result)]
+            pieces = separate(result)
+            fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder)))
             pictures = beside.enter_context(Beside(partial(write_pieces, scene, pieces, folder)))
             drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
             pattern = beside.enter_context(Beside(drawn))
@@ -131,6 +129,7 @@ def _run_surface(
             folder,
             pictures=pictures,
             pattern=pattern,
+            fit=fit,
             more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
             files=drape_files,
             frames=wanted,

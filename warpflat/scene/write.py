@@ -15,7 +15,15 @@ if TYPE_CHECKING:
     from warpflat.garment.pattern_files import WrittenPattern
     from warpflat.scene.load import Scene
 
-__all__ = ["SceneResult", "packed_film", "packed_pictures", "review_files", "write_pieces", "write_surface"]
+__all__ = [
+    "SceneResult",
+    "measure_fit",
+    "packed_film",
+    "packed_pictures",
+    "review_files",
+    "write_pieces",
+    "write_surface",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,24 +42,40 @@ class SceneResult:
 
 
 def write_pieces(scene: Scene, pieces: Sequence[Flattening], folder: Path) -> list[str]:
-    """Write an OBJ per piece and the pictures of a flattened surface; return their names.
+    """Write an OBJ per piece and the picture of a flattened surface; return their names.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    from warpflat.flattening.result import write_files
+
+    return write_files(pieces, folder, picture=scene.settings.output.picture, frames=False)
+
+
+def measure_fit(
+    scene: Scene, pieces: Sequence[Flattening], folder: Path
+) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Measure how each piece fits, and draw it where a way of wearing was asked for.
+
+    Returns:
+        The entries of `metrics.json` by piece, and the names of the pictures.
 
     Raises:
         InputError: the folder cannot be written.
     """
     from warpflat.core.atomic_files import file_in
-    from warpflat.flattening.result import write_files
+    from warpflat.cutting.remedies import advise
 
-    settings = scene.settings
-    files = write_files(pieces, folder, picture=settings.output.picture, frames=False)
-    if settings.wear is not None and settings.output.picture:
+    advised = [advise(piece) for piece in pieces]
+    files = []
+    if scene.settings.wear is not None and scene.settings.output.picture:
         from warpflat.flattening.fit_picture import write_wear_picture
 
-        for piece in pieces:
+        for piece in advised:
             picture = file_in(folder, piece.surface.name, ".wear.png")
             write_wear_picture(picture, piece)
             files.append(picture.name)
-    return files
+    return {piece.surface.name: piece.measures for piece in advised}, files
 
 
 def write_surface(
@@ -61,6 +85,7 @@ def write_surface(
     *,
     pictures: Beside[list[str]],
     pattern: Beside[WrittenPattern],
+    fit: Beside[tuple[dict[str, dict[str, Any]], list[str]]],
     more: Mapping[str, Any],
     files: Sequence[str] = (),
     frames: bool,
@@ -72,7 +97,8 @@ def write_surface(
         scene: the scene.
         pieces: the pieces into which cuts have parted its surface.
         folder: an existing one.
-        pictures, pattern: write the pieces with their pictures, and the pattern.
+        pictures, pattern: write the pieces with their picture, and the pattern.
+        fit: measures how the pieces fit.
         more: entries of `metrics.json` besides the pieces.
         files: that have been written already, by name.
         frames: whether `frames.usdc` has been written.
@@ -86,9 +112,9 @@ def write_surface(
     from warpflat.flattening.result import run_metrics
 
     settings = scene.settings
-    entries = {piece.surface.name: piece.measures for piece in pieces}
     film = packed_film(scene, folder)
-    files = [*files, *pictures.result(), "metrics.json"]
+    entries, worn = fit.result()
+    files = [*files, *pictures.result(), *worn, "metrics.json"]
     if frames:
         files.append("frames.usdc")
     images = packed_pictures(scene, folder, files)  # while the pattern is written

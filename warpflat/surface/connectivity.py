@@ -1,8 +1,8 @@
 """Connected components of a mesh, fans around vertices, border loops and orientation.
 
-Faces are #F by 4 vertex indices with -1 in the last column of a triangle; #F by 3 stands for triangles only. No function changes
-its arguments. Unless a docstring says otherwise, the mesh may be wound inconsistently and an edge may have any number of faces: the
-same functions check a mesh that comes in and query it afterwards.
+Faces are #F by 4 vertex indices with -1 in the last column of a triangle; #F by 3 stands for triangles only. Half-edges that have been
+made before do instead of faces. No function changes its arguments. Unless a docstring says otherwise, the mesh may be wound inconsistently
+and an edge may have any number of faces: the same functions check a mesh that comes in and query it afterwards.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.surface.half_edges import (
     HalfEdges,
-    four_columns,
     half_edges,
     half_edges_of,
     paired_half_edges,
@@ -51,7 +50,7 @@ def join_labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> In
     return np.argsort(np.argsort(first))[inverse.reshape(-1)].astype(np.int32)
 
 
-def components(faces: ArrayLike, *, barrier: IntArray | None = None) -> IntArray:
+def components(faces: ArrayLike | HalfEdges, *, barrier: IntArray | None = None) -> IntArray:
     """Return #F, the connected component of each face, numbered from 0 by each component's first face.
 
     Faces are connected across shared edges; two faces that touch in a single vertex are not.
@@ -60,7 +59,8 @@ def components(faces: ArrayLike, *, barrier: IntArray | None = None) -> IntArray
         faces: #F by 4.
         barrier: #B by 2, edges that do not connect, such as those of a line that may part the surface.
     """
-    return _components(half_edges(faces), len(four_columns(faces)), barrier)
+    he = half_edges(faces)
+    return _components(he, len(he.faces), barrier)
 
 
 @once_per_faces
@@ -85,7 +85,7 @@ def _components(he: HalfEdges, size: int, barrier: IntArray | None) -> IntArray:
     return join_labels(size, a, b)
 
 
-def corner_fans(faces: ArrayLike) -> IntArray:
+def corner_fans(faces: ArrayLike | HalfEdges) -> IntArray:
     """Return #H, the fan of faces around its vertex to which each corner (tail of a half-edge) belongs.
 
     Corners at one vertex belong to one fan where their faces share an edge at that vertex. A vertex of a manifold has one
@@ -112,7 +112,7 @@ def non_manifold_vertices(faces: ArrayLike) -> IntArray:
     return vertex[count > 1].astype(np.int32)
 
 
-def border_loops(faces: ArrayLike, vertices: FloatArray | None = None) -> list[IntArray]:
+def border_loops(faces: ArrayLike | HalfEdges, vertices: FloatArray | None = None) -> list[IntArray]:
     """Return the closed loops of border edges, each a row of vertices that does *not* repeat its first.
 
     Args:
@@ -182,15 +182,15 @@ def coincident_vertices(vertices: FloatArray, faces: ArrayLike, *, border: IntAr
     return place
 
 
-def euler_characteristic(faces: ArrayLike) -> int:
+def euler_characteristic(faces: ArrayLike | HalfEdges) -> int:
     """Return vertices in use - edges + faces.
 
     It is 2 - 2 (handles) - (border loops) for one connected, orientable surface."""
     he = half_edges(faces)
-    return int(np.count_nonzero(np.bincount(he.tail))) - len(he.edges) + len(four_columns(faces))
+    return int(np.count_nonzero(np.bincount(he.tail))) - len(he.edges) + len(he.faces)
 
 
-def orient(faces: ArrayLike) -> tuple[IntArray, int]:
+def orient(faces: ArrayLike | HalfEdges) -> tuple[IntArray, int]:
     """Return faces wound consistently, and how many of them had to be turned over.
 
     In each component the winding of the majority is kept. Edges with more than two faces are not crossed.
@@ -198,12 +198,14 @@ def orient(faces: ArrayLike) -> tuple[IntArray, int]:
     Raises:
         InputError: if a component is one-sided, like a Möbius strip.
     """
-    quads = four_columns(faces)
-    he = half_edges(quads)
+    he = half_edges(faces)
+    quads = he.faces
     a, b = paired_half_edges(he)
     plain = he.count[he.edge[a]] == 2
     a, b = a[plain], b[plain]
     agree = he.tail[a] == he.head[b]
+    if agree.all():
+        return quads, 0
     size = len(quads)
     fa, fb = he.face[a].astype(np.int64), he.face[b].astype(np.int64)
     # Two copies of each face, one per side: neighbours that agree join like sides, others unlike ones. A component

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,9 @@ from warpflat.kernels.unfold import measure_triangles
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.multilevel_preconditioner import multilevel_preconditioner
 from warpflat.surface.triangles import corner_triangles
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 __all__ = [
     "EnergyMap",
@@ -32,7 +35,7 @@ __all__ = [
 ]
 
 # Relative tolerance of the diffusion, and the number of iterations after which it is solved directly, as slivers may need.
-_TOLERANCE = 1e-12
+_TOLERANCE = 1e-9
 _MOST_ITERATIONS = 1000
 # Surfaces of more vertices are smoothed with a preconditioner of several levels.
 _LARGE = 50_000
@@ -181,6 +184,14 @@ def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_l
     density = _checked_density(face_density, len(surface.faces), "face")
     if not (np.isfinite(smoothing_length) and smoothing_length >= 0):
         raise InputError(f"smoothing_length is a length in metres, 0 or more, got {smoothing_length!r}")
+    area, energy = _given_to_vertices(surface, density)
+    if smoothing_length > 0:
+        energy = area * _diffused(surface, area, energy, smoothing_length)
+    return np.divide(energy, area, out=np.zeros(len(area)), where=area > 0)
+
+
+def _given_to_vertices(surface: Surface, density: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the area [m2] and the energy [J] of each vertex, #V each."""
     count = len(surface.vertices)
     used = surface.faces >= 0
     part = _face_areas(surface) / used.sum(axis=1)
@@ -188,15 +199,12 @@ def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_l
     corner = surface.faces[used]
     held = spread * np.broadcast_to(density[:, None], used.shape)[used]
     area = np.bincount(corner, weights=spread, minlength=count).astype(np.float64)
-    energy = np.bincount(corner, weights=held, minlength=count).astype(np.float64)
-    if smoothing_length > 0:
-        energy = area * _diffused(surface, area, energy, smoothing_length)
-    return np.divide(energy, area, out=np.zeros(count), where=area > 0)
+    return area, np.bincount(corner, weights=held, minlength=count).astype(np.float64)
 
 
-def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: float) -> FloatArray:
+def _diffusion_matrix(surface: Surface, area: FloatArray, length: float) -> tuple[csr_array, float]:
+    """Return M + l^2/2 L, #V by #V, and the length of a typical edge [m]."""
     from scipy.sparse import coo_array, diags_array
-    from scipy.sparse.linalg import cg, spsolve
 
     triangles, _, weight = corner_triangles(surface.faces)
     triangle_area, product = _measured(surface, triangles)
@@ -210,14 +218,22 @@ def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: fl
     across = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, 1, axis=1).ravel()
     joined = coo_array((half.ravel(), across), shape=(count, count)).tocsr()
     joined = joined + joined.T
-    system = (diags_array(area + joined.sum(axis=1)) - joined).tocsr()
+    matrix = (diags_array(area + joined.sum(axis=1)) - joined).tocsr()
+    return matrix, float(np.sqrt(triangle_area.mean()))
+
+
+def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: float) -> FloatArray:
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import cg, spsolve
+
+    count = len(surface.vertices)
+    system, edge = _diffusion_matrix(surface, area, length)
     used = np.flatnonzero(area > 0)
     if len(used) < count:
         system = system[used][:, used]
     # Heat does not spread far in one step, so a few dozen iterations suffice, where a factorisation would grow faster than the mesh.
     # Where an edge is a small part of the length, sums over cubes save two thirds of them.
     first = energy[used] / area[used]
-    edge = float(np.sqrt(triangle_area.mean()))
     inverse = (
         diags_array(1.0 / system.diagonal())
         if len(used) < _LARGE
@@ -233,6 +249,8 @@ def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: fl
     )
     smooth = np.zeros(count)
     smooth[used] = solved if left == 0 else spsolve(system.tocsc(), energy[used])
+    # Spread evenly, what the iterations leave: the total is kept to rounding.
+    smooth[used] += (energy[used].sum() - area[used] @ smooth[used]) / area[used].sum()
     return smooth
 
 

@@ -82,8 +82,10 @@ class HalfEdges:
         return read_only_view(follow)
 
 
-def half_edges(faces: ArrayLike) -> HalfEdges:
-    """Make the half-edges of faces (#F by 4 or 3) and their unique edges."""
+def half_edges(faces: ArrayLike | HalfEdges) -> HalfEdges:
+    """Make the half-edges of faces (#F by 4 or 3) and their unique edges; those that are given are returned."""
+    if isinstance(faces, HalfEdges):
+        return faces
     quads = four_columns(faces)
     tail, head = sides_of(quads)
     low, high = np.minimum(tail, head), np.maximum(tail, head)
@@ -136,7 +138,7 @@ def sides_of(quads: IntArray) -> tuple[IntArray, IntArray]:
     return quads[there], after[there]
 
 
-def mesh_edges(faces: ArrayLike) -> IntArray:
+def mesh_edges(faces: ArrayLike | HalfEdges) -> IntArray:
     """Return #E by 2, the unique edges as (lower, higher) vertex, sorted by the first, then the second; no diagonals."""
     return half_edges(faces).edges
 

@@ -222,6 +222,8 @@ def _refuse_stray_vertex(raw: _Raw, scale: float, file: Path) -> None:
     Raises:
         InputError: there is one.
     """
+    if float(np.ptp(raw.vertices, axis=0).max(initial=0.0)) * scale <= _POSSIBLE[1]:
+        return
     used = np.unique(raw.polygons[raw.polygons >= 0])
     used = used[used < len(raw.vertices)]
     points = raw.vertices[used]

@@ -17,6 +17,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.surface.half_edges import half_edges
+from warpflat.surface.vectors import cross, norm, points_at
 
 __all__ = ["degenerate_faces", "merge_degenerate_faces"]
 
@@ -34,26 +35,24 @@ _MOST_ROUNDS = 20
 def _vertex_scale(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return #V, the mean length [m] of the edges at each vertex."""
     edges = half_edges(faces).edges
-    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    total = np.bincount(edges.ravel(), weights=np.repeat(length, 2), minlength=len(vertices))
+    a, b = points_at(vertices, edges.T).transpose(1, 0, 2)
+    length = norm(a - b)
+    total = sum(np.bincount(ends, weights=length, minlength=len(vertices)) for ends in edges.T)
     count = np.bincount(edges.ravel(), minlength=len(vertices))
     return total / np.maximum(count, 1)
 
 
 def _width(points: FloatArray) -> FloatArray:
-    """Return the least width [m] of faces given as ... by 3 or 4 by 3 (see :func:`degenerate_faces`)."""
-    sides = np.linalg.norm(np.roll(points, -1, axis=-2) - points, axis=-1)
-    if points.shape[-2] == 3:
-        area2 = np.linalg.norm(
-            np.cross(points[..., 1, :] - points[..., 0, :], points[..., 2, :] - points[..., 0, :]), axis=-1
-        )
-        longest = sides.max(axis=-1)
-        return area2 / np.where(longest > 0, longest, 1.0)
-    one = points[..., 2, :] - points[..., 0, :]
-    two = points[..., 3, :] - points[..., 1, :]
-    longest = np.maximum(np.linalg.norm(one, axis=-1), np.linalg.norm(two, axis=-1))
-    area2 = np.linalg.norm(np.cross(one, two), axis=-1)
-    return np.minimum(sides.min(axis=-1), area2 / np.where(longest > 0, longest, 1.0))
+    """Return the least width [m] of faces given as 3 by 3 or 4 corners by any shape (see :func:`degenerate_faces`)."""
+    corners = points.shape[1]
+    sides = [norm(points[:, (k + 1) % corners] - points[:, k]) for k in range(corners)]
+    if corners == 3:
+        area2 = norm(cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
+        longest = np.maximum.reduce(sides)
+        return np.asarray(area2 / np.where(longest > 0, longest, 1.0))
+    one, two = points[:, 2] - points[:, 0], points[:, 3] - points[:, 1]
+    longest = np.maximum(norm(one), norm(two))
+    return np.minimum(np.minimum.reduce(sides), norm(cross(one, two)) / np.where(longest > 0, longest, 1.0))
 
 
 def degenerate_faces(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IntArray:
@@ -66,7 +65,7 @@ def degenerate_faces(vertices: FloatArray, faces: IntArray, tolerance: float = 1
     around = np.empty(len(faces))
     for sides, chosen in ((3, faces[:, 3] < 0), (4, faces[:, 3] >= 0)):
         corners = faces[chosen, :sides]
-        width[chosen] = _width(vertices[corners])
+        width[chosen] = _width(points_at(vertices, corners.T))
         around[chosen] = scale[corners].mean(axis=1)
     return np.flatnonzero(width <= tolerance * around).astype(np.int32)
 
@@ -186,15 +185,15 @@ class _Patch:
 
     def width(self, face: int) -> float:
         ring = self.corners(face)
-        return float(_width(self.vertices[list(ring)])) if ring else np.inf
+        return float(_width(points_at(self.vertices, np.array(ring)))) if ring else np.inf
 
     def normal(self, ring: Iterable[int]) -> FloatArray:
         p = self.vertices[list(ring)]
         return np.cross(p[2] - p[0], p[-1] - p[1] if len(p) == 4 else p[2] - p[1])
 
     def is_narrow(self, ring: tuple[int, ...], factor: float = 1.0) -> bool:
-        points = list(ring)
-        return bool(_width(self.vertices[points]) <= factor * self.tolerance * self.scale[points].mean())
+        points = np.array(ring)
+        return bool(_width(points_at(self.vertices, points)) <= factor * self.tolerance * self.scale[points].mean())
 
     def is_degenerate(self, face: int) -> bool:
         ring = self.corners(face)
@@ -311,7 +310,9 @@ class _Patch:
     def _acceptable(self, old: tuple[int, ...], new: tuple[int, ...]) -> bool:
         """Return whether a face may get new corners: it is not degenerate then (or less than before) and not turned over."""
         if self.is_narrow(old):
-            return len(new) == len(old) and bool(_width(self.vertices[list(new)]) >= _width(self.vertices[list(old)]))
+            return len(new) == len(old) and bool(
+                _width(points_at(self.vertices, np.array(new))) >= _width(points_at(self.vertices, np.array(old)))
+            )
         return not self.is_narrow(new) and float(self.normal(old) @ self.normal(new)) > 0
 
     def remove_cap(self, face: int, side: int, *, check: bool = True) -> bool:

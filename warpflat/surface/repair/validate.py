@@ -7,9 +7,9 @@ are refused with advice. Vertices that stay keep their order and their exact pos
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_file_name, check_label
 from warpflat.core.text import format_count, quote_value
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
-from warpflat.surface.half_edges import half_edges, mesh_edges
+from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.polygons import (
     distinct_corners,
@@ -56,6 +56,27 @@ class _Mesh:
     origin: IntArray
     index: IntArray
     notes: list[str] = field(default_factory=list)
+    _made: dict[str, tuple[IntArray, Any]] = field(default_factory=dict)
+
+    @property
+    def half_edges(self) -> HalfEdges:
+        """The half-edges of the faces."""
+        made: HalfEdges = self._once("half_edges", lambda: half_edges(self.faces))
+        return made
+
+    @property
+    def part(self) -> IntArray:
+        """#F, the connected component of each face."""
+        made: IntArray = self._once("part", lambda: components(self.half_edges))
+        return made
+
+    def _once(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return what follows from the faces, made once for each array of them."""
+        faces, made = self._made.get(name, (None, None))
+        if faces is not self.faces:
+            made = make()
+            self._made[name] = self.faces, made
+        return made
 
     def keep(self, which: BoolArray) -> None:
         self.faces, self.origin = self.faces[which], self.origin[which]
@@ -126,13 +147,14 @@ def _checked_surface(
     _drop_double_faces(mesh)
     _choose_component(mesh, component)
     _refuse_crowded_edges(mesh)
-    mesh.faces, turned = orient(mesh.faces)
+    faces, turned = orient(mesh.half_edges)
     if turned:
+        mesh.faces = faces
         mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
     _separate_touching_fans(mesh)
     _drop_unused(mesh)
     kept_lines = _renumber_lines(mesh, {key: place[path] for key, path in paths.items()})
-    _check_border(mesh.faces)
+    _check_border(mesh.half_edges)
     return _finish(mesh, kept_lines, name, positions, tolerance)
 
 
@@ -172,18 +194,20 @@ def check_positions(vertices: ArrayLike) -> FloatArray:
 def _checked_faces(positions: FloatArray, polygons: ArrayLike | Sequence[Sequence[int]]) -> _Mesh:
     padded = pad_polygons(polygons)
     real = padded >= 0
-    gaps = np.flatnonzero((~real[:, :3]).any(axis=1) | (np.diff(real.astype(np.int8), axis=1) > 0).any(axis=1))
-    gaps = np.union1d(gaps, np.flatnonzero((padded < -1).any(axis=1)))
+    wrong = (padded < -1).any(axis=1)
+    for column in range(padded.shape[1]):
+        # The first three corners are there, and behind a gap there is none.
+        wrong |= ~real[:, column] if column < 3 else real[:, column] & ~real[:, column - 1]
+    gaps = np.flatnonzero(wrong)
     if len(gaps):
         raise InputError(f"face {gaps[0]} (counted from 0) has a negative vertex index or fewer than 3 corners")
-    outside = np.flatnonzero((padded >= len(positions)).any(axis=1))
-    if len(outside):
-        row = outside[0]
+    if padded.max() >= len(positions):
+        row = np.flatnonzero((padded >= len(positions)).any(axis=1))[0]
         raise InputError(
             f"face {row} (counted from 0) refers to vertex {padded[row].max()}, but there are {len(positions):,} "
             f"vertices (0 to {len(positions) - 1})"
         )
-    size = float(np.ptp(positions[padded[real]], axis=0).max())
+    size = float(np.ptp(positions[_used_vertices(padded)], axis=0).max())
     if size < _SMALLEST:
         raise InputError(f"all vertices of faces lie within {size:.3g} m of each other; positions are in metres")
     notes: list[str] = []
@@ -222,7 +246,12 @@ def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
 
 def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> IntArray:
     """Join vertices at the same place if the user or the mesh asks for it; return #V, the vertex that each one became."""
-    place, note = welding(mesh.vertices, mesh.faces, weld=weld, split_corners=split_corners, part_chosen=chosen)
+    place, note = None, ""
+    if weld is not False:
+        parts = int(mesh.part.max()) + 1
+        place, note = welding(
+            mesh.vertices, mesh.faces, parts=parts, weld=weld, split_corners=split_corners, part_chosen=chosen
+        )
     if note:
         mesh.notes.append(note)
     if place is None:
@@ -256,7 +285,7 @@ def _drop_double_faces(mesh: _Mesh) -> None:
 
 
 def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -> None:
-    label = components(mesh.faces)
+    label = mesh.part
     sizes = np.bincount(label)
     rank = np.argsort(-sizes, kind="stable")
     valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, largest first'
@@ -294,7 +323,7 @@ def _sizes(sizes: NDArray[np.int64]) -> str:
 
 
 def _refuse_crowded_edges(mesh: _Mesh) -> None:
-    he = half_edges(mesh.faces)
+    he = mesh.half_edges
     crowded = np.flatnonzero(he.count > 2)
     if len(crowded) == 0:
         return
@@ -309,8 +338,12 @@ def _refuse_crowded_edges(mesh: _Mesh) -> None:
 
 def _separate_touching_fans(mesh: _Mesh) -> None:
     """Give each fan of faces its own vertex where several touch in one point only."""
-    he = half_edges(mesh.faces)
-    fan = corner_fans(mesh.faces)
+    he = mesh.half_edges
+    tails = he.tail[he.count[he.edge] == 1]
+    if len(np.unique(tails)) == len(tails) and euler_characteristic(he) == 2 - len(border_loops(he)):
+        # With fans apart the characteristic would be greater, and no connected surface has a greater one.
+        return
+    fan = corner_fans(he)
     # Fans are numbered by their first corners.
     first = np.flatnonzero(np.diff(np.maximum.accumulate(fan), prepend=-1))
     vertex = he.tail[first]
@@ -344,7 +377,7 @@ def _drop_unused(mesh: _Mesh) -> None:
     mesh.vertices, mesh.index = mesh.vertices[used], mesh.index[used]
 
 
-def _used_vertices(faces: IntArray) -> NDArray[np.int64]:
+def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
     """Return the vertices that faces (filled up with -1) have, sorted."""
     return np.flatnonzero(np.bincount(faces.ravel() + 1)[1:])
 
@@ -357,7 +390,7 @@ def _renumber_lines(mesh: _Mesh, paths: Mapping[str, IntArray]) -> dict[str, lis
     wanted = np.isin(mesh.index, np.concatenate(list(paths.values())))
     for vertex in np.flatnonzero(wanted).tolist():
         places.setdefault(int(mesh.index[vertex]), []).append(vertex)
-    edges = {tuple(edge) for edge in mesh_edges(mesh.faces).tolist()}
+    edges = {tuple(edge) for edge in mesh.half_edges.edges.tolist()}
     lines = {}
     for name, path in paths.items():
         rows = [row for i, row in enumerate(path.tolist()) if i == 0 or row != path[i - 1]]
@@ -390,14 +423,14 @@ def _trace_line(
     return line
 
 
-def _check_border(faces: IntArray) -> None:
-    loops = border_loops(faces)
+def _check_border(he: HalfEdges) -> None:
+    loops = border_loops(he)
     if not loops:
         raise InputError(
             "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled there, or give the part that "
             "becomes one piece of cloth; [[cuts]] cut what is flat already"
         )
-    handles = (2 - len(loops) - euler_characteristic(faces)) // 2
+    handles = (2 - len(loops) - euler_characteristic(he)) // 2
     if handles:
         raise InputError(
             f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "

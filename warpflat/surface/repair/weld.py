@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +50,8 @@ def welding(
     vertices: FloatArray,
     faces: IntArray,
     *,
-    weld: bool | None,
+    parts: int,
+    weld: Literal[True] | None,
     split_corners: bool,
     part_chosen: bool,
 ) -> tuple[IntArray | None, str]:
@@ -57,6 +60,7 @@ def welding(
     Args:
         vertices: #V by 3, positions [m].
         faces: #F by 4.
+        parts: number of connected components of the faces.
         weld: the user's choice; None to decide by the mesh.
         split_corners: the format has a vertex per corner of a face or per texture coordinate: weld, unless the faces
             form one sheet as they stand and welding would close it.
@@ -65,9 +69,6 @@ def welding(
     Returns:
         #V, the vertex to use for each, or None to leave all; and a note ("" for none).
     """
-    if weld is False:
-        return None, ""
-    parts = int(components(faces).max()) + 1
     soup = parts > 1 and 2 * parts > len(faces)
     if weld is None and not split_corners and parts == 1:
         return None, ""
