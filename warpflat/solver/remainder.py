@@ -17,7 +17,7 @@ __all__ = ["CycleRemainder", "Remainder", "RemainderEstimate", "looked_back"]
 # though much is left. What follows releases at most so many times their energy, and moves the outline at most so many times as far. The
 # factors were chosen on draped meshes and forms; `benchmarks/stopping.py` measures on others what they are worth.
 _SHARE, _FEWEST = 0.15, 4
-_ENERGY_FACTOR, _OUTLINE_FACTOR = 1.0, 2.5
+_ENERGY_FACTOR, _OUTLINE_FACTOR = 1.0, 2.75
 # Multigrid cycles reduce what is left by about the same factor each: by no less than the first, and by no more than the second is assumed.
 # The sum of all that follow the last one, times this, is the estimate. On the irregular bodice of 200,000 vertices the energy that was
 # left after each cycle but the first was at most 0.45 of what that cycle had released; the estimate is three times or more.
