@@ -104,3 +104,24 @@ def test_a_dent_is_pushed_out_smoothly_and_negative_ease_is_not() -> None:
     assert pushed[row[3]] > 0.5 * pushed[row[2]]
     tight = body.form(form_from_mapping("tight", {"like": "bodice", "ease": {"bust": -6.0, "waist": -4.0}}))
     assert depth_inside(tight, body) > 0.003
+
+
+@needs_bodies
+@pytest.mark.parametrize("name", ["female", "male_heavy"])
+def test_a_t_shirt_on_a_scan_has_no_hook_under_the_arm_and_a_round_neck(name: str) -> None:
+    body = _body(f"scan {name}")
+    made = body.form("tshirt", half=True)
+    layout = body.layout
+    side = made.vertices[layout.rings[layout.level_row["underbust"] :, layout.quarter]]
+    # Seen from the side the seam runs straight into the armhole; seen from the front there is no ledge under the arm.
+    assert np.ptp(side[:, 2]) < 0.0047
+    assert abs(side[-1, 0] - side[-5, 0]) < 0.008
+    garment = flatten_form(body, made, fabric="interlock")
+    for key in ("front", "back"):
+        piece, flat = made.pieces[key], garment.pieces[key]
+        assert flat.flipped_faces == 0
+        assert sharpest_turn(flat.positions[piece.edges["armhole left"]]) < 32.0, key
+        corner = corner_degrees(flat.positions, piece.edges["armhole left"], piece.edges["side left"])
+        assert 75.0 < corner < 125.0, key
+        neck = next(ids for edge, ids in piece.edges.items() if "neck" in edge)
+        assert sharpest_turn(flat.positions[neck]) < 27.0, key

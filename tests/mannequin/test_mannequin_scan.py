@@ -434,3 +434,51 @@ def test_skirts_and_trousers_hang_outside_the_body(form: str, sex: str) -> None:
         place, distance, triangle = trimesh.proximity.closest_point_naive(mesh, made.vertices[moved])
         out = np.einsum("nd,nd->n", made.vertices[moved] - place, mesh.face_normals[triangle])
         assert (distance[out < 0.0] < 1e-4).all()
+
+
+@needs_bodies
+def test_one_foot_ahead_does_not_turn_the_trunk() -> None:
+    points, faces = scan("female")
+    ahead = points.copy()
+    step = np.clip((0.5 * 1.59 - (points[:, 1] - points[:, 1].min())) / (0.5 * 1.59), 0.0, 1.0)
+    ahead[:, 2] += 0.14 * step * (points[:, 0] > 0.0)
+    plain, body = _plain("female"), on_scan(ahead, faces)
+    upper = plain.layout.rings[plain.layout.level_row["waist"] :]
+    assert np.linalg.norm(body.vertices[upper] - plain.vertices[upper], axis=2).max() < 0.003
+
+
+@needs_bodies
+def test_a_childs_head_may_be_broader_than_its_waist_and_a_belly_is_no_bust() -> None:
+    points, faces = scan("child")
+    slim = points.copy()
+    at = np.exp(-0.5 * ((points[:, 1] - points[:, 1].min() - 0.8) / 0.08) ** 2) * (np.abs(points[:, 0]) < 0.15)
+    slim[:, [0, 2]] *= (1.0 - 0.12 * at)[:, None]
+    assert on_scan(slim, faces).measures["waist"].girth < 0.46
+    points, faces = scan("male_heavy")
+    fat = points.copy()
+    height = points[:, 1] - points[:, 1].min()
+    ahead = np.clip((points[:, 2] + 0.02) / 0.06, 0.0, 1.0)
+    fat[:, 2] += (
+        0.11 * ahead * np.exp(-0.5 * ((height - 1.0) / 0.094) ** 2) * np.exp(-0.5 * (points[:, 0] / 0.145) ** 2)
+    )
+    bust = on_scan(fat, faces).measures["bust"]
+    assert abs(bust.height - _plain("male_heavy").measures["bust"].height) < 0.02
+    assert abs(bust.girth - _plain("male_heavy").measures["bust"].girth) < 0.02
+
+
+@needs_bodies
+def test_tapes_that_noise_moves_say_that_they_are_guesses() -> None:
+    points, faces = scan("male")
+    noisy, plain = on_scan(changed(points, "noisy"), faces), _plain("male")
+    off = {
+        name
+        for name, tape in plain.measures.items()
+        if abs(noisy.measures[name].height - tape.height) > 0.006
+        or abs(noisy.measures[name].girth - tape.girth) > 0.009
+    }
+    guesses = {name for name, tape in noisy.measures.items() if tape.guess}
+    assert off
+    assert off <= guesses
+    # Others hold.
+    assert not guesses & {"head", "thigh left", "thigh right", "biceps left"}
+    assert any("noise of 1.8 mm moves it" in note for note in noisy.notes)

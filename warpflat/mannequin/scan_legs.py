@@ -25,6 +25,8 @@ _TOGETHER = 0.01
 # Room [m] between a leg that was moved inwards and the midplane.
 _BETWEEN = 0.001
 _COUNT, _HARMONICS, _UP_SIGMA = 240, 16, 1.5
+# The outseam lies in the middle of what is within so much [m] of the outermost, smoothed along the leg [rows].
+_OUTERMOST, _OUTSEAM_SIGMA = 0.004, 6.0
 # Share of the crotch curve's length ahead of the crotch point.
 _POINT = 0.40
 
@@ -172,6 +174,7 @@ def leg_curves(slicer: Slicer, legs: LegSections, levels: Mapping[str, float], h
     point = float(resample(crotch, _POINT)[2])
     thigh, knee = levels["leg_thigh"], levels["leg_knee"]
     curves: dict[str, FloatArray] = {}
+    outseams: dict[str, FloatArray] = {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         hulls = [legs.moved(side, i) * np.array([sign, 1.0]) for i in range(len(legs.y))]
         middle = gaussian_filter1d(np.array([0.5 * (h.min(axis=0) + h.max(axis=0)) for h in hulls]), 2.0, axis=0)
@@ -187,6 +190,13 @@ def leg_curves(slicer: Slicer, legs: LegSections, levels: Mapping[str, float], h
         rays = np.arange(_COUNT) * 2.0 * np.pi / _COUNT
         outward = np.column_stack([-np.cos(rays), np.sin(rays)])
         curves[side] = (radii[..., None] * outward + middle[:, None]) * np.array([sign, 1.0])
+        # The outer side is flat: the middle of what is outermost, smooth along the leg.
+        reach = sign * curves[side][..., 0]
+        outermost = np.maximum(reach - reach.max(axis=1, keepdims=True) + _OUTERMOST, 0.0)
+        places = (outermost * curves[side][..., 1]).sum(axis=1) / outermost.sum(axis=1)
+        foot = legs.y < levels["leg_ankle"]
+        places[foot] = places[~foot][0]
+        outseams[side] = gaussian_filter1d(places, _OUTSEAM_SIGMA, mode="nearest")
 
     def profile(side: str, height: float) -> LegProfile:
         at = float(np.clip(np.interp(height, legs.y, np.arange(len(legs.y))), 0.0, len(legs.y) - 1.001))
@@ -202,7 +212,9 @@ def leg_curves(slicer: Slicer, legs: LegSections, levels: Mapping[str, float], h
         share = near * float(np.clip(ahead / s[-1], -0.1, 0.1))
         curve = resample(curve, share + np.arange(_COUNT) / _COUNT, closed=True)
         girth = (1.0 - f) * legs.girths[side][i] + f * legs.girths[side][i + 1]
-        return profile_of_curve(curve, float(girth), near)
+        return profile_of_curve(
+            curve, float(girth), near, float((1.0 - f) * outseams[side][i] + f * outseams[side][i + 1])
+        )
 
     heights = {level: levels[level] for level in LEG_LEVELS[1:]}
     return LegCurves(

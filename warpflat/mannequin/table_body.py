@@ -29,7 +29,7 @@ _SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0)}
 _SIDE_BACK = 0.25
 _ARM_ANGLE = np.radians(40.0)
 # How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew.
-_SHORTEST_SLEEVE = 0.085
+_SHORTEST_SLEEVE = 0.092
 # How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
 _NOTCH = 0.22
 

@@ -66,7 +66,7 @@ def legs_from_measurements(m: Measurements, profile: Callable[[float], Profile])
         inseam = 0.75 + ahead / polyline_length(curve, closed=True)
         curve = resample(curve, inseam + np.arange(_SAMPLES) / _SAMPLES, closed=True) + np.array([x, z])
         down = (heights["leg_thigh"] - height) / (heights["leg_thigh"] - heights["leg_knee"])
-        return profile_of_curve(curve, float(girth), max(0.0, 1.0 - down))
+        return profile_of_curve(curve, float(girth), max(0.0, 1.0 - down), float(z))
 
     def leg(side: str, height: float) -> LegProfile:
         found = left(height)
@@ -75,16 +75,18 @@ def legs_from_measurements(m: Measurements, profile: Callable[[float], Profile])
     return LegCurves(heights=heights, profile=leg, crotch=crotch, point=_POINT)
 
 
-def profile_of_curve(curve: FloatArray, girth: float, spread: float) -> LegProfile:
-    """Return the profile of a leg whose outseam is its point furthest from the midplane.
+def profile_of_curve(curve: FloatArray, girth: float, spread: float, outseam_z: float) -> LegProfile:
+    """Return the profile of a leg.
 
     Args:
         curve: #P by 2, (x, z) [m], from the inseam forward.
         girth: what a tape reads around it [m].
         spread: 1 at the thigh, where the columns of the crotch curve arrive, 0 from the knee down.
+        outseam_z: z [m] of the outseam, on the outer side.
     """
     s = arc_lengths(curve, closed=True)
-    outseam = float(s[int(np.argmax(np.abs(curve[:, 0])))] / s[-1])
+    outside = slice(int(np.argmax(curve[:, 1])), int(np.argmin(curve[:, 1])) + 1)
+    outseam = float(np.interp(-outseam_z, -curve[outside, 1], s[:-1][outside]) / s[-1])
     return LegProfile(
         curve=curve,
         crease_front=0.5 * outseam,
