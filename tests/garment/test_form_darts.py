@@ -231,3 +231,10 @@ def test_sizes_lie_upon_each_other(sewn):
     pattern, _ = pattern_of_garment({"36": sewn, "38": replace(sewn, pieces=away)}, name="block")
     first, second = (pattern.piece("back_bodice", size).outline for size in ("36", "38"))
     np.testing.assert_allclose(first, second, atol=1e-12)
+
+
+def test_a_knit_smaller_than_the_body_keeps_its_girths(body):
+    form = body.form(form_from_mapping("knit", {"like": "bodice", "ease": {"bust": -5.0, "waist": -4.0}}))
+    girths = flatten_form(body, form, fabric="jersey").metrics()["girths"]
+    for level, ease in (("bust", -0.05), ("waist", -0.04)):
+        assert girths[level]["ease_m"] == pytest.approx(ease, abs=2e-3)

@@ -14,7 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.export.read_pattern_json import read_pattern_json
 from warpflat.garment.pattern_files import PatternOptions, garment_files
-from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart
+from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart, turn_dart
 from warpflat.scene.form_ledger import form_ledger, with_cut
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import make_scene
@@ -120,6 +120,16 @@ def test_edits_are_other_tables():
     assert mouths["waist dart left"] == mouths["second waist dart left"] == 20
     with pytest.raises(InputError, match=r"there is no dart 'front\.dart'"):
         rotate_dart(darted, "front.dart", "bust")
+
+
+def test_a_seam_takes_over_the_darts_that_a_scene_asks_for():
+    darted = scene(cuts=[{"piece": "front", "line": "bust"}, FRONT, {"piece": "back", "line": "princess back left"}])
+    seam = {"name": "princess seam", "piece": "front", "line": "princess front left", "part": [0.0, 1.0]}
+    for edited in (with_cut(darted, seam), turn_dart(darted, "front.princess front", "seam", None)):
+        assert [cut.line for cut in edited.settings.cuts] == ["princess back left", "princess front left"]
+        assert set(scene_form(edited)[1].pieces) == {"front_centre", "front_side_left", "front_side_right", "back"}
+    with pytest.raises(InputError, match="takes in what it would"):
+        scene_form(scene(cuts=[{"piece": "front", "line": "bust"}, seam]))
 
 
 def test_a_dart_turned_into_gathers_lengthens_its_seam():

@@ -130,6 +130,8 @@ def plan_curves(
     plans = []
     for name, piece in form.pieces.items():
         bound = bounds[name]
+        if bound == 0.0:
+            continue
         on_fold = set() if piece.fold is None else set(piece.edges[piece.fold].tolist())
         for edge, vertices in _open_edges(form, name, positions[name]):
             part = piece.parts.get(edge, edge)
@@ -196,7 +198,12 @@ def _open_edges(form: FormResult, name: str, flat: FloatArray) -> Iterator[tuple
     for edge, vertices in piece.edges.items():
         if edge == piece.fold or edge in legs:
             continue
-        corners = np.flatnonzero(np.abs(turning_angles(flat[vertices])) > CORNER) + 1
+        angles = np.abs(turning_angles(flat[vertices]))
+        sharp = angles > CORNER
+        if np.allclose(angles, angles[::-1], atol=np.radians(2.0)):
+            # On a piece with both sides of the body a corner of just this angle is one on both.
+            sharp |= sharp[::-1]
+        corners = np.flatnonzero(sharp) + 1
         for first, last in zip([0, *corners], [*corners, len(vertices) - 1], strict=True):
             yield edge, vertices[first : last + 1]
 

@@ -302,9 +302,20 @@ def flatten_form(
     result = sew(pieces, pairs, constraints=held, folds=folds, options=relax)
     garment = Garment(name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, wished=wished)
     again = _SewAgain(pairs=pairs, held=held, folds=folds, options=relax)
-    if form.ease and not is_knit(next(iter(pieces.values())).fabric):
-        garment, again = again.with_girths(garment)
-    return again.with_curves(garment, 1e-3 * curves_mm) if curves_mm else garment
+
+    def drawn(own: Garment, under: _SewAgain) -> Garment:
+        return under.with_curves(own, 1e-3 * curves_mm) if curves_mm else own
+
+    knit = is_knit(next(iter(pieces.values())).fabric)
+    # A knit gives: its girths matter where they are to be smaller than the body.
+    if min(form.ease.values(), default=0.0) >= 0.0 if knit else not form.ease:
+        return drawn(garment, again)
+    kept = drawn(*again.with_girths(garment))
+    strained = _strained(garment, kept) if knit else []
+    if not strained:
+        return kept
+    words = f"girths are as the cloth has them: as asked for they would strain {', '.join(strained)} beyond the cloth's limit"
+    return drawn(replace(garment, remarks=(*garment.remarks, words)), again)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -345,19 +356,17 @@ class _SewAgain:
     def with_curves(self, garment: Garment, bound: float) -> Garment:
         """Return the garment with its borders drawn as by hand, within a bound [m].
 
-        Pieces that fit as the cloth rests and are strained beyond its limit as they are drawn get half the bound, and half of that.
+        Pieces that fit as the cloth rests, and are strained beyond its limit as they are drawn, get half the bound, then none.
         """
         bounds = dict.fromkeys(garment.pieces, bound)
-        for last in (False, False, True):
+        for share in (0.5, 0.0, None):
             drawn = self._drawn(garment, bounds)
             if drawn.curves is None:
                 return drawn
-            strained = [
-                name for name, piece in drawn.pieces.items() if not piece.fit.fits and garment.pieces[name].fit.fits
-            ]
-            if last or not strained:
+            strained = _strained(garment, drawn)
+            if share is None or not strained:
                 break
-            bounds |= {name: 0.5 * bounds[name] for name in strained}
+            bounds |= {name: share * bounds[name] for name in strained}
         less = [f"{name} {1e3 * own:.3g} mm" for name, own in bounds.items() if own < bound]
         if not less:
             return drawn
@@ -380,6 +389,11 @@ class _SewAgain:
         assert drawn.sewn is not None
         bound = max(bounds.values())
         return replace(drawn, curves=Curves(bound_mm=1e3 * bound, price_j=drawn.sewn.drawing_cost, lines=lines))
+
+
+def _strained(before: Garment, after: Garment) -> list[str]:
+    """Return the pieces that fit before and do not after."""
+    return [name for name, piece in after.pieces.items() if not piece.fit.fits and before.pieces[name].fit.fits]
 
 
 def _positions(garment: Garment) -> dict[str, FloatArray]:

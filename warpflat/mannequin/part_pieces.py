@@ -16,7 +16,7 @@ from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.layout import Layout
 from warpflat.surface.connectivity import join_labels
 
-__all__ = ["part_pieces", "princess_seams"]
+__all__ = ["part_pieces", "princess_seams", "taken_over"]
 
 
 def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> Form:
@@ -52,6 +52,16 @@ def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequenc
         if dart.line not in lines.get(dart.piece, [])
     ]
     return replace(form, pieces=pieces, darts=tuple(dart for dart in darts if dart is not None))
+
+
+def taken_over(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> list[FormDart]:
+    """Return the darts of a form that go when its pieces are parted: along a seam, or with no place in a part.
+
+    Args and errors as of :func:`part_pieces`.
+    """
+    left = {(dart.name, dart.line, dart.at) for dart in part_pieces(layout, vertices, form, seams).darts}
+    pieces = {seam.piece for seam in seams}
+    return [dart for dart in form.darts if dart.piece in pieces and (dart.name, dart.line, dart.at) not in left]
 
 
 def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[FormDart]:

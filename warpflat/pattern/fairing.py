@@ -37,10 +37,19 @@ class FairLine:
 
 
 def count_inflections(points: FloatArray) -> int:
-    """Return how often a line (#P by 2 [m]) changes between bending left and bending right, by a degree or more each."""
+    """Return how often a line (#P by 2 [m]) changes between bending left and bending right, by a degree or more each.
+
+    A line and its mirror image have as many: it is counted from both ends, and the lower count is taken.
+    """
     steps = np.diff(_evenly(points)[1], axis=0)
+    angles = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])).tolist()
+    return min(_changes_of_bend(angles), _changes_of_bend(angles[::-1]))
+
+
+def _changes_of_bend(angles: list[float]) -> int:
+    """Return how often the direction [rad] of a line turns back by more than :data:`LEAST_BEND`."""
     count, sign, low, high = 0, 0, np.inf, -np.inf
-    for angle in np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])).tolist():
+    for angle in angles:
         low, high = min(low, angle), max(high, angle)
         turned = 1 if angle - low > LEAST_BEND else -1 if high - angle > LEAST_BEND else 0
         if turned:
@@ -96,15 +105,15 @@ def best_wave(
     mirrored: tuple[bool, bool] = (False, False),
 ) -> float | None:
     """Return the wave that makes the fewest inflections for the least shift; None if every wave breaks the bound [m]."""
-    best: tuple[float, float] | None = None
+    best: tuple[int, float, float] | None = None
     for wave in FIRST_WAVE * GROWTH ** np.arange(WAVES):
         tried = fair_line(points, float(wave), straight=straight, mirrored=mirrored)
         if tried.shift > bound:
             break
         cost = tried.shift + WORTH * tried.inflections
-        if best is None or cost < best[0]:
-            best = cost, float(wave)
-    return None if best is None else best[1]
+        if best is None or (tried.inflections < best[0] and cost < best[1]):
+            best = tried.inflections, cost, float(wave)
+    return None if best is None else best[2]
 
 
 def bend_one_way(points: FloatArray, wave: float, *, straight: BoolArray | None = None) -> FairLine | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,11 +10,11 @@ from warpflat.core.errors import InputError
 from warpflat.mannequin.darts import FormDart
 from warpflat.mannequin.forms import Form
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.part_pieces import part_pieces
+from warpflat.mannequin.part_pieces import part_pieces, taken_over
 from warpflat.scene.cut_tables import CutTable
 from warpflat.scene.load import Scene, make_scene
 
-__all__ = ["cut_form", "cut_of_dart", "scene_with"]
+__all__ = ["cut_form", "cut_of_dart", "cuts_beside", "place_of", "scene_with"]
 
 
 def cut_form(mannequin: Mannequin, form: Form, tables: Sequence[CutTable]) -> Form:
@@ -49,12 +49,35 @@ def cut_form(mannequin: Mannequin, form: Form, tables: Sequence[CutTable]) -> Fo
     seams = [dart for dart, table in zip(asked, tables, strict=True) if dart.parts_piece and not table.omit]
     if not seams:
         return form
-    parted = part_pieces(mannequin.layout, mannequin.vertices, form, seams)
-    left = {(dart.name, dart.line, dart.at) for dart in parted.darts}
-    for dart in darts:
-        if dart in asked and (dart.name, dart.line, dart.at) not in left:
-            raise InputError(f"dart {dart.name!r}: no part of piece {dart.piece!r} has a place for it beside the seam")
-    return parted
+    for dart in taken_over(mannequin.layout, mannequin.vertices, form, seams):
+        if dart in asked:
+            raise InputError(
+                f"dart {dart.name!r}: a seam through piece {dart.piece!r} takes in what it would; leave the dart or the seam out"
+            )
+    return part_pieces(mannequin.layout, mannequin.vertices, form, seams)
+
+
+def cuts_beside(
+    mannequin: Mannequin, form: Form, cuts: Sequence[Mapping[str, Any]], seam: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Return the tables of cuts that a seam leaves: it takes over the darts along it, and those that point to it.
+
+    Args:
+        mannequin: the body.
+        form: with the darts of the cuts.
+        cuts: tables of `[[cuts]]`.
+        seam: the table of a cut along a whole line of a piece.
+    """
+    whole = _dart(CutTable.model_validate(dict(seam)))
+    if not whole.parts_piece:
+        return [dict(cut) for cut in cuts]
+    gone = {dart.place for dart in taken_over(mannequin.layout, mannequin.vertices, form, [whole])}
+    return [dict(cut) for cut in cuts if cut.get("omit") or place_of(cut) not in gone]
+
+
+def place_of(cut: Mapping[str, Any]) -> tuple[str | None, ...]:
+    """Return where a table puts its dart; see `FormDart.place`."""
+    return tuple(cut.get(key) for key in ("piece", "line", "towards", "at"))
 
 
 def _dart(table: CutTable) -> FormDart:

@@ -15,8 +15,7 @@ from warpflat.core.toml_file import tables_as_toml
 from warpflat.garment.form_plan import plan_form
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.darts import FormDart, PlacedDart
-from warpflat.scene.form_cuts import cut_of_dart, scene_with
-from warpflat.scene.form_ledger import place_of
+from warpflat.scene.form_cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import Scene
 from warpflat.scene.run_garment import plan_garment, scene_form, scene_recipe
@@ -159,7 +158,7 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
         # The book's dart there goes with the piece.
         kept = [cut for cut in cuts if not (cut.get("omit") and place_of(cut) == old.place)]
         seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0]}
-        return scene_with(scene, cuts=[*kept, seam])
+        return scene_with(scene, cuts=[*cuts_beside(*scene_recipe(scene), kept, seam), seam])
     seams = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.seams]
     for name, (longer, share) in _shares(old, garment).items():
         how = {"fullness": round(share, 4)} if into == "ease" else {"gather": round(1.0 + share, 4)}

@@ -21,7 +21,7 @@ from warpflat.mannequin.forms import Form
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.part_pieces import princess_seams
-from warpflat.scene.form_cuts import cut_of_dart, scene_with
+from warpflat.scene.form_cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.load import Scene
 from warpflat.scene.run_garment import GarmentPlan, plan_garment, scene_form, scene_recipe
 
@@ -31,7 +31,6 @@ __all__ = [
     "FormTrial",
     "candidate_cuts",
     "form_ledger",
-    "place_of",
     "trial_of_scene",
     "try_cuts",
     "with_cut",
@@ -236,16 +235,23 @@ def _cuts_along_lines(base: FormTrial, name: str, piece: Flattening, bricks: Seq
             yield dart
 
 
-def with_cut(scene: Scene, cut: Mapping[str, Any]) -> Scene:
-    """Return a scene with one cut more; one that is left out in the scene is put back instead."""
+def with_cut(scene: Scene, cut: Mapping[str, Any], mannequin: Mannequin | None = None) -> Scene:
+    """Return a scene with one cut more; one that is left out in the scene is put back instead.
+
+    A seam takes over darts of the scene.
+
+    Args:
+        scene: with a form.
+        cut: a table of `[[cuts]]`.
+        mannequin: the scene's, if it has been made.
+    """
     own = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
     kept = [table for table in own if not (table.get("omit") and place_of(table) == place_of(cut))]
-    return scene_with(scene, cuts=kept if len(kept) < len(own) else [*own, dict(cut)])
-
-
-def place_of(cut: Mapping[str, Any]) -> tuple[str | None, ...]:
-    """Return where a table puts its dart; see `FormDart.place`."""
-    return tuple(cut.get(key) for key in ("piece", "line", "towards", "at"))
+    if len(kept) < len(own):
+        return scene_with(scene, cuts=kept)
+    if set(cut.get("part") or ()) == {0.0, 1.0}:
+        own = cuts_beside(*scene_recipe(scene, mannequin), own, cut)
+    return scene_with(scene, cuts=[*own, dict(cut)])
 
 
 def try_cuts(base: FormTrial, cuts: Sequence[Mapping[str, Any]], *, by: RankedBy) -> FormLedger:
@@ -263,7 +269,7 @@ def try_cuts(base: FormTrial, cuts: Sequence[Mapping[str, Any]], *, by: RankedBy
 
 
 def _try(base: FormTrial, cut: Mapping[str, Any]) -> FormEntry:
-    scene = with_cut(base.plan.scene, cut)
+    scene = with_cut(base.plan.scene, cut, base.mannequin)
     form = scene_form(scene, base.mannequin)[1]
     before = base.plan.form.pieces
     darts = [dart for dart in form.darts if dart.asked.place == place_of(cut) and dart.piece in form.pieces]

@@ -12,7 +12,7 @@ from warpflat.garment.finishing import FINISHES, Finishing
 from warpflat.garment.openings import CENTRES, Buttons, Opening
 from warpflat.garment.pockets import Pocket
 from warpflat.mannequin.forms import FormResult
-from warpflat.scene.schema import FinishingTable, OpeningTable, PocketTable
+from warpflat.scene.making_up_tables import FinishingTable, OpeningTable, PocketTable
 
 __all__ = ["scene_finishing", "scene_openings", "scene_pockets", "sewn_centres", "straight_stands"]
 
