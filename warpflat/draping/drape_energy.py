@@ -33,8 +33,9 @@ _LONGEST_STEP = 0.05
 # and no step of dynamic relaxation longer than this [m].
 _LONGEST_EXPLICIT_STEP = 1e-3
 _REACH = 0.15  # [m]
-# Least share of the tensile stiffness under compression in the metric. Steps by a softer one are too long where cloth becomes taut.
-_METRIC_COMPRESSION = 0.3
+# A metric for far steps: least share of the tensile stiffness under compression, and a tension that is added in all directions [N/m].
+# Steps by a softer one are too long where cloth becomes taut, and across cloth without tension.
+_FAR_COMPRESSION, _FAR_PULL = 0.3, 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +71,9 @@ class DrapeEnergy:
         self._pattern = _BlockPattern(corner, count)
         fabric, vertex_area = cloth.fabric, cloth.vertex_areas()
         law = _law(fabric, options.compression, device)
-        self._metric_law = _law(fabric, max(options.compression, _METRIC_COMPRESSION), device)
+        self._far_law = _law(fabric, max(options.compression, _FAR_COMPRESSION), device)
+        # Of the shortest waves on the mesh, two edges long, bending holds as much as this tension.
+        self._near_pull = fabric.bending * np.pi**2 / float(vertex_area.mean())
         self.weight = fabric.areal_density * options.gravity * vertex_area
         self.motion = Motion()
         self.motion.position, self.motion.velocity = self._zeros(wp.vec3d), self._zeros(wp.vec3d)
@@ -147,21 +150,21 @@ class DrapeEnergy:
         """Return the gradient of the energy, #V by 3 [N]."""
         return -point.force
 
-    def factor(self, positions: FloatArray, pull: float) -> None:
-        """Factor the stiffness of the cloth under an additional tension in all directions, from where on it is the metric.
+    def factor(self, positions: FloatArray, *, near: bool) -> None:
+        """Factor the stiffness of the cloth somewhere, from where on it is the metric.
 
-        Bending is left out: it would treble the entries of the factor, and L-BFGS learns it as fast.
+        Bending enters as a tension only: as it is, it would treble the entries of the factor.
 
         Args:
             positions: #V by 3, where the cloth is [m].
-            pull: [N/m].
+            near: whether rest is near, for steps by Newton's method; else the metric is stiffer, for L-BFGS.
         """
         self.motion.position.assign(positions)
         cells = wp.zeros(9 * len(self._cell_energy), wp.mat33d, self.device)
         vertices = self._zeros(wp.mat33d)
         least = float(self.weight.mean()) / _LONGEST_STEP
         at = {"device": self.device, "least": 512}
-        inputs = [*self._cells[:-1], self._metric_law, pull]
+        inputs = [*self._cells[:-1], *((self._cells[-1], self._near_pull) if near else (self._far_law, _FAR_PULL))]
         launch_each(stiffen_cloth, len(self._cell_energy), inputs, [cells], **at)
         launch_each(stiffen_contact, self._count, [self.motion, self.contact, least], [vertices], **at)
         matrix = self._pattern.matrix(cells.numpy(), vertices.numpy())

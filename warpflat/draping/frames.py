@@ -31,14 +31,26 @@ _RATE, _HEIGHT, _PAPER, _MARGIN = 12, 420, 249, 8
 _BESIDE = 0.3
 
 
+# Way from one frame to the next below which nothing is seen to move [m].
+_SEEN = 1e-4
+
+
 def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) -> list[int]:
-    """Return the numbers of frames between which the cloth moves about equally far, the first and the last among them."""
-    if len(frames) <= count:
-        return list(range(len(frames)))
-    ways = [0.0, *(float(np.linalg.norm(b - a, axis=1).mean()) for a, b in pairwise(frames))]
+    """Return the numbers of frames between which the cloth moves about equally far, without those in which it does not move.
+
+    The first and the last are among them.
+    """
+    moving = [0]
+    for number, frame in enumerate(frames):
+        if np.abs(frame - frames[moving[-1]]).max() > _SEEN:
+            moving.append(number)
+    moving = sorted({*moving[: max(len(moving) - 1, 1)], len(frames) - 1})
+    if len(moving) <= count:
+        return moving
+    ways = [0.0, *(float(np.linalg.norm(frames[b] - frames[a], axis=1).mean()) for a, b in pairwise(moving))]
     # Half by the way and half by time, for what creeps is worth a look too.
-    way = np.cumsum(ways) / max(sum(ways), 1e-12) + np.linspace(0.0, 1.0, len(frames))
-    return sorted({int(np.abs(way - share).argmin()) for share in np.linspace(0.0, 2.0, count)})
+    way = np.cumsum(ways) / max(sum(ways), 1e-12) + np.linspace(0.0, 1.0, len(moving))
+    return sorted({moving[int(np.abs(way - share).argmin())] for share in np.linspace(0.0, 2.0, count)})
 
 
 def write_drape_frames(path: Path, drape: Drape) -> None:

@@ -1,10 +1,10 @@
 """The sewn cloth comes to rest on the body: minimisation over a sparse factor, and dynamic relaxation.
 
 Dynamic relaxation brings the cloth out of the body first. Rounds of an augmented Lagrangian follow (Simo and Laursen 1992): each
-minimises by L-BFGS over the factor of a stiffness (`warpflat.draping.drape_energy`), with the normal forces and the bounds of friction
-of the round before; then body and friction take over the forces that they had at its end, whether the cloth lies a micrometre in the
-body or beside it. What would swing for ten thousand explicit steps takes some dozens. Dynamic relaxation does the rest, and says
-whether the cloth is at rest.
+minimises over the factor of a stiffness (`warpflat.draping.drape_energy`), by L-BFGS at first and by Newton's method where rest is
+near, with the normal forces and the bounds of friction of the round before; then body and friction take over the forces that they had
+at its end, whether the cloth lies a micrometre in the body or beside it. What would swing for ten thousand explicit steps takes some
+dozens. Dynamic relaxation says whether the cloth is at rest, and does the rest if it is not.
 
 Each step of dynamic relaxation gathers the forces at every vertex, lets the body and its friction act on them, and moves the
 vertex by its velocity. Masses are fictitious: the sums of the stiffness around each vertex, so that any step is stable. The body is one
@@ -47,11 +47,11 @@ _FIRST_STEPS = 300
 _LONGEST_ROUND = 0.1
 # A garment that is held by nothing and whose top has sunk by this much has left its place on the body [m].
 _FALLEN = 0.4
-# Rounds of the augmented Lagrangian, after which dynamic relaxation goes on alone, and steps of L-BFGS in each.
-_MOST_ROUNDS, _STEPS_PER_ROUND = 80, 40
-# Tension that is added to the factor [N/m]. Cloth without tension has next to no stiffness across its plane: steps would be too long.
-_PULL = 10.0
-# A round ends when the mean force is at most this share of what is allowed; dynamic relaxation takes over from so many times that.
+# Rounds of the augmented Lagrangian, after which dynamic relaxation goes on alone; steps of L-BFGS in each, and of Newton's method.
+_MOST_ROUNDS, _STEPS_PER_ROUND, _NEWTON_STEPS = 80, 40, 4
+# Corrections that L-BFGS remembers; hanging cloth has more soft ways than 8.
+_MEMORY = 20
+# A round ends when the mean force is at most this share of what is allowed; Newton's method takes over from so many times that.
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
 # It goes on while a hundred steps of it leave less than this share.
 _EASES = 0.8
@@ -176,7 +176,7 @@ def relax_drape(
     energy = DrapeEnergy(cloth, body, options, np.zeros(len(start), bool) if held is None else held)
     relaxation = _DynamicRelaxation(cloth, energy)
     energy.motion.position.assign(start)
-    steps, rounds, residual, converged = 0, 0, np.inf, False
+    steps, rounds, residual, left, converged = 0, 0, np.inf, np.inf, False
     observe = observer or (lambda _: None)
     observe(start)
     lowest = -np.inf if energy.is_held else float(start[:, 1].max()) - _FALLEN
@@ -186,10 +186,10 @@ def relax_drape(
             if rounds == 0:
                 energy.load_contact()
             rounds += 1
-            left = _minimise(energy, options.tolerance)
+            left = _minimise(energy, options.tolerance, near=left <= _NEARLY_AT_REST * options.tolerance)
             observe(energy.motion.position.numpy())
             fell_off = float(energy.motion.position.numpy()[:, 1].max()) < lowest
-            if fell_off or left > _NEARLY_AT_REST * options.tolerance:
+            if fell_off or left > options.tolerance:
                 continue
         before = residual if eases else np.inf
         relaxation.run(_STEPS_PER_CHECK)
@@ -208,26 +208,30 @@ def relax_drape(
     )  # fmt: skip
 
 
-def _minimise(energy: DrapeEnergy, tolerance: float) -> float:
-    """Take a round of the augmented Lagrangian: some steps of L-BFGS, then body and friction take over the forces that they had.
+def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
+    """Take a round of the augmented Lagrangian: some steps, then body and friction take over the forces that they had.
 
     Args:
         energy: of the cloth, which is moved.
         tolerance: as of the options.
+        near: whether rest is near. Then each step has a factor of its own (Newton's method). L-BFGS over one factor goes
+            farther in the same time, but wanders along the soft ways of hanging cloth without lowering the force.
 
     Returns:
         the mean force that was left, over the mean weight of a vertex.
     """
     x = energy.motion.position.numpy().copy()
-    energy.factor(x, _PULL)
     energy.bound(x, _LONGEST_ROUND)
-    descent, weight = Descent(energy, energy.at(x)), float(energy.weight.mean())
-
-    def left() -> float:
-        return float(np.linalg.norm(descent.point.force, axis=1).mean()) / weight
-
-    while descent.iterations < _STEPS_PER_ROUND and left() > _ROUND_ENDS * tolerance and descent.step():
-        pass
-    energy.carry_contact(descent.point.positions)
+    point, weight, left = energy.at(x), float(energy.weight.mean()), np.inf
+    steps, factors = (1, _NEWTON_STEPS) if near else (_STEPS_PER_ROUND, 1)
+    for _ in range(factors):
+        energy.factor(point.positions, near=near)
+        descent = Descent(energy, point, memory=min(steps, _MEMORY))
+        while descent.iterations < steps and left > _ROUND_ENDS * tolerance and descent.step():
+            left = float(np.linalg.norm(descent.point.force, axis=1).mean()) / weight
+        point = descent.point
+        if descent.is_stuck or left <= _ROUND_ENDS * tolerance:
+            break
+    energy.carry_contact(point.positions)
     energy.motion.velocity.zero_()
-    return left()
+    return float(np.linalg.norm(point.force, axis=1).mean()) / weight

@@ -145,12 +145,12 @@ class Metric:
 class _Memory:
     """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4), all of them in one product (Byrd et al. 1994)."""
 
-    def __init__(self, numbers: int) -> None:
+    def __init__(self, numbers: int, most: int) -> None:
         # Rows are used in turn; the oldest is overwritten.
-        self._steps, self._changes = np.empty((2, _MEMORY, numbers))
+        self._steps, self._changes = np.empty((2, most, numbers))
         self._order: list[int] = []
         # Scalar product of the step in each row with the change in each.
-        self._table = np.zeros((_MEMORY, _MEMORY))
+        self._table = np.zeros((most, most))
 
     @property
     def is_empty(self) -> bool:
@@ -166,8 +166,9 @@ class _Memory:
         curvature = dot(step, change)
         if curvature <= 1e-12 * math.sqrt(dot(step, step) * dot(change, change)):
             return
-        row = self._order[0] if len(self._order) == _MEMORY else len(self._order)
-        self._order = [*self._order[-_MEMORY + 1 :], row]
+        most = len(self._table)
+        row = self._order[0] if len(self._order) == most else len(self._order)
+        self._order = [*self._order[-most + 1 :], row]
         self._steps[row], self._changes[row] = step.ravel(), change.ravel()
         used = len(self._order)
         self._table[:used, row] = _products(self._steps[:used], change)
@@ -204,10 +205,15 @@ class Descent(Generic[P]):
         is_stuck: whether no step makes the energy fall any more.
     """
 
-    def __init__(self, problem: Problem[P], start: P) -> None:
+    def __init__(self, problem: Problem[P], start: P, *, memory: int = _MEMORY) -> None:
+        """Begin at a point; L-BFGS remembers the last `memory` corrections."""
         self._problem = problem
         self.point, self.history = start, [start.energy]
-        self._gradient, self._memory, self._fraction = problem.gradient(start), _Memory(start.positions.size), 1.0
+        self._gradient, self._memory, self._fraction = (
+            problem.gradient(start),
+            _Memory(start.positions.size, memory),
+            1.0,
+        )
         self.tried, self.release, self.is_stuck = 1, np.inf, False
 
     @property
