@@ -101,6 +101,8 @@ def time_edits(scene: warpflat.Scene, folder: Path, cuts: list[Cut], *, grain: b
             edit(f"cut: {line}", lambda at=(before, piece, line, part): session.try_cut(cut_along(*at)))
             edit("leave the cut", session.drop_preview)
         edit("undo", session.undo)
+        session.redo()  # the second time begins as the first one did
+        wait(page)
     page.close()
 
 

@@ -52,7 +52,9 @@ def _math(display: str) -> Any:
     """Return a visitor that writes an equation as MathML, which browsers show without a script from elsewhere."""
 
     def visit(translator: Any, node: Any) -> None:
-        translator.body.append(convert(node.astext(), display=display))
+        # Room below, so that a browser does not offer to scroll an equation up and down.
+        style = '<math style="padding-bottom: 0.4em; overflow-y: hidden" ' if display == "block" else "<math "
+        translator.body.append(convert(node.astext(), display=display).replace("<math ", style, 1))
         raise SkipNode
 
     return visit

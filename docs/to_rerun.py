@@ -23,14 +23,14 @@ def log_film(source: str, target: str) -> int:
             points = np.array(mesh.GetPointsAttr().Get(frame))
             counts = np.array(mesh.GetFaceVertexCountsAttr().Get(frame))
             corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(frame))
-            colours = np.array(mesh.GetDisplayColorAttr().Get(frame))
-            # A fan of triangles for each face. Colours are one for each face, and rerun has one for each vertex.
+            colours = mesh.GetDisplayColorPrimvar()
+            shade = np.array(colours.ComputeFlattened(frame))  # one for each vertex, or one for all
+            if colours.GetInterpolation() == UsdGeom.Tokens.constant:
+                shade = np.tile(shade, (len(points), 1))
+            # A fan of triangles for each face.
             first = np.repeat(np.cumsum(counts) - counts, counts - 2)
             step = np.concatenate([np.arange(1, count - 1) for count in counts])
             triangles = np.column_stack([corners[first], corners[first + step], corners[first + step + 1]])
-            face = np.repeat(np.arange(len(counts)), counts)
-            shade = np.ones((len(points), 3))
-            shade[corners] = colours[face] if len(colours) == len(counts) else colours[0]
             path = UsdGeom.Xformable(mesh).ComputeLocalToWorldTransform(frame)
             world = np.c_[points, np.ones(len(points))] @ np.array(path)
             rr.log(

@@ -49,22 +49,13 @@ def run_and_report(
 
 
 def start_warp_silently() -> None:
-    """Start Warp without its greeting: standard output is for results, and a mistake is one line on standard error.
-
-    That a machine has no CUDA driver is printed by Warp's native part straight to the file descriptor, whatever the log
-    level; anything else that it says there is passed on.
-    """
+    """Start Warp without its greeting: standard output is for results, and a mistake is one line on standard error."""
     import warp
 
     from warpflat.core.compile import start_warp
-    from warpflat.core.native_output import native_errors
 
     warp.config.log_level = warp.LOG_ERROR
-    with native_errors() as lines:
-        start_warp()
-    for line in lines:
-        if "Could not find or load the NVIDIA CUDA driver" not in line:
-            click.echo(line, err=True)
+    start_warp()
 
 
 def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as_json: bool) -> int:

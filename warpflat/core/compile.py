@@ -6,20 +6,30 @@ Warp compiles a module when its first kernel is launched, one after the other, a
 from __future__ import annotations
 
 import pkgutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import warp as wp
 
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory
+from warpflat.core.native_output import native_errors
 from warpflat.core.threads import thread_count
 
-__all__ = ["compile_all_modules", "compile_common_modules", "kernel_cache_errors", "start_warp"]
+__all__ = [
+    "compile_all_modules",
+    "compile_common_modules",
+    "kernel_cache_errors",
+    "launch_quietly",
+    "quiet_warp",
+    "start_warp",
+]
 
 # Modules that nearly every run needs. Those that take longest come first, so that no thread is left with one at the end.
 _COMMON_MODULES = (
@@ -43,6 +53,8 @@ _COMMON_MODULES = (
 _MAX_THREADS = 4
 # What the kernels and the compiler's temporary files need [bytes].
 _REQUIRED_BYTES = 32 << 20
+
+_is_started = False
 
 
 def compile_common_modules(module: wp.Module, device: wp.Device) -> None:
@@ -93,24 +105,55 @@ def compile_all_modules() -> None:
 
 
 def start_warp() -> None:
-    """Initialise Warp, which makes the folder of its kernel cache.
+    """Initialise Warp, which makes the folder of its kernel cache; its greeting is left out, see :func:`quiet_warp`.
+
+    That a machine has no CUDA driver is printed by Warp's native part straight to the file descriptor, whatever the log
+    level; anything else that it says there is passed on.
 
     Raises:
         InputError: the folder cannot be made.
     """
-    with kernel_cache_errors():
+    global _is_started
+    if _is_started:
+        return
+    with native_errors() as lines, kernel_cache_errors():
         wp.init()
+    _is_started = True
+    for line in lines:
+        if "Could not find or load the NVIDIA CUDA driver" not in line or wp.config.log_level < wp.LOG_INFO:
+            print(line, file=sys.stderr)
+
+
+@contextmanager
+def quiet_warp() -> Iterator[None]:
+    """Leave out Warp's greeting and its news of modules in the block, unless the user has set another log level than Warp's own."""
+    if wp.config.log_level != wp.LOG_INFO:
+        yield
+        return
+    wp.config.log_level = wp.LOG_WARNING
+    try:
+        yield
+    finally:
+        wp.config.log_level = wp.LOG_INFO
+
+
+def launch_quietly(kernel: wp.Kernel, **arguments: Any) -> None:
+    """Launch a kernel as ``wp.launch`` does, once; see :func:`kernel_cache_errors`."""
+    start_warp()
+    with kernel_cache_errors():
+        wp.launch(kernel, **arguments)
 
 
 @contextmanager
 def kernel_cache_errors() -> Iterator[None]:
-    """Report a file error in the block as an error of the kernel cache.
+    """Let Warp load kernels quietly in the block, and report a file error as an error of the kernel cache.
 
     Raises:
         InputError: there was a file error.
     """
     try:
-        yield
+        with quiet_warp():
+            yield
     except OSError as error:
         if is_out_of_memory(error):
             raise

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from warpflat.core.compile import start_warp
 from warpflat.core.launch_arguments import Command, launch_commands
 from warpflat.core.threads import thread_count
 
@@ -119,6 +120,7 @@ def record(
         least: shortest range worth a thread of its own.
         turns: ranges that each thread takes, every so many-th, where some may take much longer than others.
     """
+    start_warp()
     where = wp.get_device(device)
     least = _LEAST_RANGE if least is None else max(least, 1)
     if where.is_cuda or dim < 2 * least:

@@ -9,6 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, nearest
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
@@ -52,6 +53,7 @@ def drape(
         InputError: no piece, pieces of different cloths, half pieces, mirrored faces, an unknown line, or nothing holds the garment.
     """
     cloth = sew_cloth(garment)
+    start_warp()
     where = wp.get_device(device)
     designed = Body(cloth.designed, cloth.faces, device=where)
     if body is None:

@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
@@ -89,6 +90,7 @@ def drape_pattern(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
     meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
+    start_warp()
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
     lifted = set(meshes) <= set(lifts)

@@ -16,6 +16,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.compile import launch_quietly, start_warp
 from warpflat.kernels.raster import put_nearest, shade_pixels
 
 __all__ = ["Lighting", "Samples", "rasterise", "shade"]
@@ -57,12 +58,13 @@ def rasterise(points: FloatArray, triangles: IntArray, shape: tuple[int, int]) -
         triangles: #T by 3, of either winding; those without area cover nothing.
         shape: rows and columns of samples.
     """
+    start_warp()
     front = np.full(shape, -1, dtype=np.int64)
     depth = points[:, 2]
     back, nearest = (float(depth.min()), float(depth.max())) if len(points) else (0.0, 0.0)
     step = (nearest - back) / _DEPTHS or 1.0
     inputs = [_shared(points, wp.vec3d), _shared(triangles, wp.vec3i), wp.float64(back), wp.float64(1.0 / step)]
-    wp.launch(put_nearest, dim=len(triangles), inputs=inputs, outputs=[_shared(front, wp.int64)], device="cpu")
+    launch_quietly(put_nearest, dim=len(triangles), inputs=inputs, outputs=[_shared(front, wp.int64)], device="cpu")
     return Samples(front=front, back=back, step=step)
 
 
@@ -124,7 +126,7 @@ def shade(
         wp.vec3f(*direction),
         wp.vec3f(*lighting.back),
     ]
-    wp.launch(shade_pixels, dim=(rows, columns), inputs=inputs, outputs=[_shared(pixels, wp.vec4ub)], device="cpu")
+    launch_quietly(shade_pixels, dim=(rows, columns), inputs=inputs, outputs=[_shared(pixels, wp.vec4ub)], device="cpu")
     return pixels
 
 

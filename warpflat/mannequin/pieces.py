@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,20 +180,22 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
 
     Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
     """
-    count = len(faces) * 4
-    owners: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for corner in range(count):
-        f, k = divmod(corner, 4)
-        a, b = int(faces[f, k]), int(faces[f, (k + 1) % 4])
-        owners.setdefault((min(a, b), max(a, b)), []).append((corner, 4 * f + (k + 1) % 4))
-    joined: list[tuple[int, int]] = []
-    flat = faces.reshape(-1)
-    for edge, sides in owners.items():
-        if len(sides) != 2 or edge in cut:
-            continue
-        (a0, b0), (a1, b1) = sides
-        joined += [(a0, b1), (b0, a1)] if flat[a0] == flat[b1] else [(a0, a1), (b0, b1)]
-    links = np.array(joined, int).reshape(-1, 2)
+    flat, count = faces.reshape(-1), faces.size
+    begin = np.arange(count)
+    end = begin - begin % 4 + (begin + 1) % 4
+    # Sides of faces in the order of their edges, so that the two sides of one lie side by side.
+    edge = _edge_codes(np.column_stack([flat[begin], flat[end]]))
+    order = np.argsort(edge, kind="stable")
+    _, place, sides = np.unique(edge[order], return_index=True, return_counts=True)
+    one = order[place[sides == 2]]
+    other = order[place[sides == 2] + 1]
+    closed = ~np.isin(edge[one], _edge_codes(np.array(sorted(cut), dtype=np.int64).reshape(-1, 2)))
+    one, other = one[closed], other[closed]
+    crossed = flat[one] == flat[end[other]]
+    links = np.concatenate([
+        np.column_stack([one, np.where(crossed, end[other], other)]),
+        np.column_stack([end[one], np.where(crossed, other, end[other])]),
+    ])  # fmt: skip
     label = join_labels(count, links[:, 0], links[:, 1])
     # Numbered in the mannequin's order, so that a piece is the same in every size.
     order = np.lexsort((np.arange(count), flat))
@@ -203,6 +206,12 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
     grid_vertices = np.empty(label.max() + 1, np.int32)
     grid_vertices[corners] = flat
     return corners.reshape(-1, 4), grid_vertices
+
+
+def _edge_codes(ends: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+    """Return a number for each edge (#E by 2), whatever its direction."""
+    low, high = np.sort(ends.astype(np.int64), axis=1).T
+    return np.asarray((low << 32) | high)
 
 
 def _border(corners: IntArray, name: str, *, opened: bool, darts: Collection[str]) -> NDArray[np.int64]:

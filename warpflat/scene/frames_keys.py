@@ -131,10 +131,10 @@ class KeyFile:
             content += self._file.read(4 * count - len(content))
         return np.frombuffer(content, dtype=np.float32)
 
-    def displacement(self, stage: FilmStage) -> float:
-        """Return how far the vertex that moves farthest comes from its place at the start of a stage [m]."""
+    def displacement(self, stage: FilmStage, keys: Sequence[Key]) -> float:
+        """Return how far the vertex that moves farthest comes in these layouts from its place at the start of a stage [m]."""
         first = self.positions(stage, stage.keys[0])
-        return max(_largest_move(first, self.positions(stage, key)) for key in stage.keys)
+        return max(_largest_move(first, self.positions(stage, key)) for key in keys)
 
     def thin(self, stage: FilmStage, spacing: float) -> tuple[list[Key], list[float]]:
         """Return keys at least `spacing` apart [m], the first and the last among them, and the distances between them [m]."""
@@ -166,13 +166,14 @@ class KeyFile:
             steps: into so many frames the stage's largest displacement is parted, or more.
             at_least, at_most: limits on the number of frames; the latter goes before all else.
         """
-        way = self.displacement(stage)
+        way = self.displacement(stage, stage.keys)
         if way <= _STILL:
             return [stage.keys[0], stage.keys[-1]], min(at_least, at_most)
         spacing = 2.0 * way / steps
         while True:
             keys, distances = self.thin(stage, spacing)
-            wanted = 1 + sum(math.ceil(steps * distance / way) for distance in distances)
+            shown = max(self.displacement(stage, keys), _STILL)  # the layout farthest out may be left out
+            wanted = 1 + sum(math.ceil(steps * distance / shown) for distance in distances)
             if len(keys) <= 2 or (len(keys) <= at_most and wanted <= 4 * at_least):
                 return keys, min(max(wanted, at_least), max(at_most, 2))
             spacing *= 1.5

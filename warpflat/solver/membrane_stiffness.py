@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
+from warpflat.core.compile import launch_quietly
 from warpflat.kernels.membrane import bound_membrane
 from warpflat.model.membrane import corner_sums
 from warpflat.model.network import SpringNetwork
@@ -31,7 +32,7 @@ class TangentMatrix:
         """Set the k_ij to a bound of the membrane's stiffness at positions (#V vec2d [m]) without mirrored cells."""
         network = self._network
         assert network.cloth is not None
-        wp.launch(
+        launch_quietly(
             bound_membrane,
             dim=network.face_count,
             inputs=[position, network.cells, network.cloth, 0],

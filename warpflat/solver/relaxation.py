@@ -19,6 +19,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.compile import launch_quietly
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
 from warpflat.core.sums import dot
@@ -230,7 +231,7 @@ class Relaxation:
             return
         for own in (self.vertex_ranges[piece] for piece in np.flatnonzero(pieces)):
             given = [base, direction, fraction, freedom, own.start]
-            wp.launch(correct, dim=own.stop - own.start, inputs=given, outputs=[self.position], device=device)
+            launch_quietly(correct, dim=own.stop - own.start, inputs=given, outputs=[self.position], device=device)
 
     def hold_grain(self) -> None:
         """Turn each piece so that the chord of its datum points up, and hold it there.

@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import BoolArray, IntArray
+from warpflat.core.compile import launch_quietly
 from warpflat.kernels.grid_lists import number_faces
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.half_edges import half_edges_of, opposite_half_edges
@@ -66,7 +67,7 @@ def find_lattice(surface: Surface) -> Lattice | None:
         wp.empty(len(faces), dtype=wp.int32, device="cpu"),
     )
     given = wp.array(twin, dtype=wp.int32, device="cpu", copy=False)
-    wp.launch(number_faces, dim=1, inputs=[given], outputs=[place, queue], device="cpu")
+    launch_quietly(number_faces, dim=1, inputs=[given], outputs=[place, queue], device="cpu")
     face_row, face_column, turn = (np.ascontiguousarray(values) for values in place.numpy().T)
     if turn.min() < 0:
         return None

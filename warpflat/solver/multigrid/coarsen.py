@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.compile import launch_quietly
 from warpflat.core.launch import record
 from warpflat.core.sums import range_offsets
 from warpflat.core.threads import thread_count
@@ -274,7 +275,7 @@ def _collapse_edges(surface: Surface, layout: FloatArray | None) -> Coarsening |
     target, beside, gone = (wp.zeros(count, dtype=wp.int32, device="cpu") for _ in range(3))
     passes, remain = np.zeros(1, dtype=np.int32), np.full(1, count, dtype=np.int32)
     for least in _LEAST_QUALITIES:
-        wp.launch(
+        launch_quietly(
             collapse,
             dim=1,
             inputs=[ring, least, _GOOD, int(_SHARE_LEFT * count), _PASSES],
@@ -319,7 +320,7 @@ def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: in
     while offset[-1] == 0:
         column, value = np.empty(capacity, dtype=np.int32), np.empty(capacity)
         given, made = [gone, parent, weight, passes], [row, offset, column, value]
-        wp.launch(compose_rows, dim=1, inputs=given, outputs=made, device="cpu")
+        launch_quietly(compose_rows, dim=1, inputs=given, outputs=made, device="cpu")
         capacity *= 2
     kept, end = count - np.count_nonzero(gone.numpy()), offset[-1]
     return csr_array(csr_array((value[:end], column[:end], offset), shape=(count, kept))[row])
@@ -337,7 +338,7 @@ def _make_ring(vertices: FloatArray, layout: FloatArray | None, triangles: IntAr
     ring.neighbor = wp.empty(int(slots[-1]), dtype=wp.int32, device="cpu")
     side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
     begin, corners = _as_input(sides, wp.int32), _as_input(triangles, wp.vec3i)
-    wp.launch(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
+    launch_quietly(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
     order = record(
         order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=[ring.degree, ring.neighbor], device="cpu"
     )

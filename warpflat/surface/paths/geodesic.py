@@ -14,10 +14,10 @@ of the line, where the nearest point is one end for all, the direction in which 
 from __future__ import annotations
 
 import numpy as np
-import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.compile import launch_quietly
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
 from warpflat.core.polyline import arc_lengths
@@ -186,7 +186,7 @@ class _GeodesicField:
         self._paths = self._here.copy(), self._here.copy(), np.zeros(len(order)), np.zeros(len(order))
         for _ in range(_MOST_ROUNDS):
             shortened[0] = 0
-            wp.launch(
+            launch_quietly(
                 find_ways,
                 dim=1,
                 inputs=[offset, ends, seen, int(_REACH * len(order)), tolerance],
@@ -231,7 +231,7 @@ class _GeodesicField:
         change = np.empty(value.shape[1])
         for _ in range(_MOST_ROUNDS):
             change[:] = 0.0
-            wp.launch(
+            launch_quietly(
                 carry_along,
                 dim=1,
                 inputs=[*self._paths, self._order, fixed, grows],
@@ -283,7 +283,7 @@ def _directions_at_line(
     room, count = 4 * len(sides), np.empty(1, dtype=np.int32)
     visited, at, lies = np.empty(room, dtype=np.int32), np.empty(room, dtype=np.int32), np.empty((room, 3))
     given, made = [path, on_path, offset, sides, angle, away], [visited, at, lies, count]
-    wp.launch(go_around, dim=1, inputs=given, outputs=made, device="cpu")
+    launch_quietly(go_around, dim=1, inputs=given, outputs=made, device="cpu")
     visited, at, (right, passed, far) = visited[: count[0]], at[: count[0]], lies[: count[0]].T
     beside, number = np.unique(visited, return_inverse=True)
     known = np.concatenate([path, beside]).astype(np.int64)
