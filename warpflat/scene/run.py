@@ -118,10 +118,12 @@ def _run_surface(
 
             result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
             pieces = separate(result)
-            fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder)))
-            pictures = beside.enter_context(Beside(partial(write_pieces, scene, pieces, folder)))
+            fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
+            pictures = beside.enter_context(
+                Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
+            )
             drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
-            pattern = beside.enter_context(Beside(drawn))
+            pattern = beside.enter_context(Beside(drawn, "drafting the pattern"))
         drape_metrics, drape_files = write_drape(scene, result, folder, device=device)
         return write_surface(
             scene,
