@@ -13,7 +13,6 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
-from warpflat.core.activity import report_activity
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, expect, expect_callback, nearest
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
@@ -177,7 +176,6 @@ def develop_piece(
     Raises:
         InputError: it cannot be developed.
     """
-    report_activity(f"developing {surface.name}")
     line, line_name, notes = resolve_datum(surface, datum)
     begun = time.perf_counter()
     task = RelaxationTask(
