@@ -115,8 +115,9 @@ def write_surface(
 
     settings = scene.settings
     film = packed_film(scene, folder)
+    files = [*files, *pictures.result()]
     entries, worn = fit.result()
-    files = [*files, *pictures.result(), *worn, "metrics.json"]
+    files += [*worn, "metrics.json"]
     if frames:
         files.append("frames.usdc")
     images = packed_pictures(scene, folder, files)  # while the pattern is written
