@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -62,6 +63,7 @@ def test_the_bar_shows_what_is_being_done_and_then_steps_again(monkeypatch: pyte
     look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy=0.0021, residual=0.5)
     monkeypatch.setattr("sys.stderr", stream)
     monkeypatch.setattr("warpflat.cli.progress_bar._REFRESH", 0.0)
+    monkeypatch.setattr("warpflat.cli.progress_bar._TICK", 0.05)
     with ProgressBar("cap") as bar:
         report_activity("compiling kernels")
         assert re.search(r"\rcap: compiling kernels \[00:\d\d\]", stream.getvalue())
@@ -69,6 +71,10 @@ def test_the_bar_shows_what_is_being_done_and_then_steps_again(monkeypatch: pyte
         assert "cap: relax: 7 steps" in stream.getvalue()
         report_activity("sewing")
         assert re.search(r"\rcap: sewing \[00:\d\d\]", stream.getvalue())
+        begun, shown = time.monotonic(), len(stream.getvalue())
+        while len(stream.getvalue()) == shown:
+            assert time.monotonic() - begun < 30, "the bar stands still"
+            time.sleep(0.01)
     before = stream.getvalue()
     report_activity("nothing that is shown")
     assert stream.getvalue() == before

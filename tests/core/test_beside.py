@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from warpflat.core.activity import activity_listener
 from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.beside import Beside, work_beside
 from warpflat.core.errors import InputError
@@ -81,9 +82,11 @@ def test_a_process_ends_with_its_block():
         os.kill(work.process, 0)
 
 
-def test_a_result_larger_than_a_pipe_arrives():
-    with work_beside(), Beside(lambda: b"x" * 1_000_000) as work:
+def test_a_result_larger_than_a_pipe_arrives_and_the_wait_is_reported():
+    heard: list[str] = []
+    with activity_listener(heard.append), work_beside(), Beside(lambda: b"x" * 1_000_000, "writing") as work:
         assert len(work.result()) == 1_000_000
+    assert heard == ["writing"]
 
 
 def test_a_process_dies_with_its_parent(tmp_path: Path):

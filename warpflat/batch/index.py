@@ -25,7 +25,8 @@ _STYLE = """
 main { max-width: none; } td, th { vertical-align: middle; } th { cursor: pointer; user-select: none; }
 th.text { text-align: left; } th:hover { color: var(--ink); } th[aria-sort=ascending]::after { content: " ↑"; }
 th[aria-sort=descending]::after { content: " ↓"; }
-td img { height: 90px; width: auto; margin: 0; border-radius: 4px; } td.message { white-space: normal; min-width: 240px; max-width: 420px; }
+td img { height: 96px; width: 128px; max-width: none; object-fit: cover; object-position: top; margin: 0; border-radius: 4px; }
+td.message { white-space: normal; min-width: 240px; max-width: 420px; }
 """
 
 

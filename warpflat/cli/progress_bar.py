@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import threading
 from contextlib import ExitStack
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ __all__ = ["ProgressBar"]
 
 
 _REFRESH = 0.1  # [s]
+_TICK = 0.5  # [s] between refreshes of the time while nothing else changes
 _STEPS = "{desc}: {n_fmt} steps [{elapsed}{postfix}]"
 _ACTIVITY = "{desc} [{elapsed}]"
 
@@ -36,6 +38,7 @@ class ProgressBar:
         self._bar: Any = None
         self._stage = ""
         self._listening = ExitStack()
+        self._ended = threading.Event()
 
     def __enter__(self) -> ProgressBar:
         if not self._hidden:
@@ -49,14 +52,23 @@ class ProgressBar:
                 bar_format=_ACTIVITY,
             )
             self._listening.enter_context(activity_listener(self.show_activity))
+            threading.Thread(target=self._tick, name="warpflat-bar", daemon=True).start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._listening.close()
+        self._ended.set()
         if self._bar is not None:
             self._bar.close()
+
+    def _tick(self) -> None:
+        """Let the time go on while a long step says nothing."""
+        while not self._ended.wait(_TICK):
+            with self._bar.get_lock():
+                if not self._ended.is_set():
+                    self._bar.refresh()
 
     def show_activity(self, activity: str) -> None:
         """Show what the run does."""

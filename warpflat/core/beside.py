@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import Any, Generic, TypeVar
 
-from warpflat.core.activity import activity_listener
+from warpflat.core.activity import activity_listener, report_activity
 from warpflat.core.atomic_files import adopt_files, files_written
 from warpflat.core.threads import thread_count
 
@@ -49,9 +49,14 @@ class Beside(Generic[Result]):
         process: the number of the other process; 0 if there was none.
     """
 
-    def __init__(self, function: Callable[[], Result]) -> None:
-        """Prepare a function; it runs from the beginning of the block, or in `result` where there is no other process."""
-        self._function = function
+    def __init__(self, function: Callable[[], Result], activity: str = "") -> None:
+        """Prepare a function; it runs from the beginning of the block, or in `result` where there is no other process.
+
+        Args:
+            function: what is to be done.
+            activity: reported while the other process is waited for.
+        """
+        self._function, self._activity = function, activity
         self.process = self._child = 0
         self._pipe = -1
 
@@ -87,6 +92,8 @@ class Beside(Generic[Result]):
         """
         if not self._child:
             return self._function()
+        if self._activity:
+            report_activity(self._activity)
         parts = []
         while part := os.read(self._pipe, 1 << 20):
             parts.append(part)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
@@ -150,6 +151,7 @@ def _level_line(surface: Surface, point: FloatArray, normal: FloatArray) -> IntA
 def resolve_datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, str, list[str]]:
     """Return the datum as vertex indices, its name, and a note if it was chosen here."""
     if datum is None:
+        report_activity("developing the piece")
         line, along = choose_and_name_datum(surface)
         return line, "datum", [f"datum chosen: {along}, {datum_extent(surface, line)}"]
     if isinstance(datum, str):

@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from warpflat.scene.frames import FrameRecorder
     from warpflat.scene.schema import SceneTable
 
+# From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
+_MANY = 500_000
+
 __all__ = ["files_of_run", "flatten_scene", "run_scene", "scene_cuts", "scene_ledger"]
 
 
@@ -118,10 +121,13 @@ def _run_surface(
 
             result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
             pieces = separate(result)
-            fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder)))
-            pictures = beside.enter_context(Beside(partial(write_pieces, scene, pieces, folder)))
+            fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
+            pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
             drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
-            pattern = beside.enter_context(Beside(drawn))
+            pattern = Beside(drawn, "drafting the pattern")
+            if len(sequence.surface.vertices) < _MANY:
+                beside.enter_context(pictures)
+                beside.enter_context(pattern)
         drape_metrics, drape_files = write_drape(scene, result, folder, device=device)
         return write_surface(
             scene,

@@ -208,13 +208,13 @@ def run_garment(
             garment = _flatten_with_frames(plan, film, on_progress=on_progress)
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
-            pictures = beside.enter_context(Beside(partial(_write_pieces, plan, garment, out)))
+            pictures = beside.enter_context(Beside(partial(_write_pieces, plan, garment, out), "drawing the pictures"))
             graded = {
                 size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
                 for size, (body, form) in others.items()
             }
             pattern = beside.enter_context(
-                Beside(partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out))
+                Beside(partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out), "drafting the pattern")
             )
         draped = write_drape(scene, garment, out, device=device)
         return _finish(plan, garment, graded, out, draped=draped, pictures=pictures, pattern=pattern)

@@ -63,9 +63,11 @@ def measure_fit(
     Raises:
         InputError: the folder cannot be written.
     """
+    from warpflat.core.activity import report_activity
     from warpflat.core.atomic_files import file_in
     from warpflat.cutting.remedies import advise
 
+    report_activity("measuring how it fits")
     advised = [advise(piece) for piece in pieces]
     files = []
     if scene.settings.wear is not None and scene.settings.output.picture:
@@ -113,8 +115,9 @@ def write_surface(
 
     settings = scene.settings
     film = packed_film(scene, folder)
+    files = [*files, *pictures.result()]
     entries, worn = fit.result()
-    files = [*files, *pictures.result(), *worn, "metrics.json"]
+    files += [*worn, "metrics.json"]
     if frames:
         files.append("frames.usdc")
     images = packed_pictures(scene, folder, files)  # while the pattern is written

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, expect, nearest
 from warpflat.core.file_names import check_file_name, make_file_name, plain_label
@@ -84,6 +85,7 @@ def read_surface(
     expect(path, (str, PathLike), "path", "that of a mesh file")
     file = Path(path)
     note_read(file)
+    report_activity(f"reading {file.name}")
     sources = [file.absolute()]
     try:
         if name:
@@ -94,6 +96,7 @@ def read_surface(
         raise InputError(f"{file}: {error}") from error
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    report_activity("checking the mesh")
     if component is None:
         _refuse_stray_vertex(raw, scale, file)
     surface = make_surface(

@@ -262,8 +262,9 @@ def _along_edges(surface: Surface, line: NDArray[np.int64]) -> FloatArray:
     length = np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny)
     # Edges are sorted by their first vertex.
     offset = np.searchsorted(edges[:, 0], np.arange(size + 1)).astype(np.int32)
-    graph = csr_array((length, edges[:, 1], offset), shape=(size, size))
-    return np.asarray(dijkstra(graph, directed=False, indices=line, min_only=True))
+    # Copies: SciPy 1.12 takes no read-only arrays here.
+    graph = csr_array((length, edges[:, 1].copy(), offset), shape=(size, size))
+    return np.asarray(dijkstra(graph, directed=False, indices=line.copy(), min_only=True))
 
 
 def _directions_at_line(
