@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from pxr import Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 import warpflat
 from warpflat.cli.tables import warnings_of
 from warpflat.core.errors import InputError
-from warpflat.draping.frames import choose_frames
+from warpflat.draping.frames import choose_frames, write_drape_frames
 from warpflat.draping.hollows import HOLLOW_REACH, hollow_depths
 from warpflat.draping.sewn_cloth import sew_cloth
 
@@ -95,6 +95,23 @@ def test_a_drape_writes_worn_pieces_and_a_picture(worn: warpflat.Drape, tmp_path
     np.testing.assert_array_equal(np.array(cloth.Get(times[0])), worn.cloth.designed.astype(np.float32))
     np.testing.assert_array_equal(np.array(cloth.Get(times[-1])), worn.positions.astype(np.float32))
     assert stage.GetPrimAtPath("/World/drape").GetAttribute("warpflat:stage").Get(times[0]) == "drape"
+
+
+def test_frames_that_refer_to_a_file_not_yet_there_are_added_to_silently(
+    worn: warpflat.Drape, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    path = tmp_path / "frames.usdc"
+    layer = Sdf.Layer.CreateNew(str(path))
+    layer.endTimeCode = 7
+    body = Sdf.CreatePrimInLayer(layer, "/World/mannequin")
+    body.referenceList.prependedItems.append(Sdf.Reference("mannequin.usdc"))
+    layer.Save()
+    write_drape_frames(path, worn)
+    assert capfd.readouterr().err == ""
+    written = Sdf.Layer.FindOrOpen(str(path))
+    written.Reload()
+    assert written.GetPrimAtPath("/World/mannequin").referenceList.prependedItems[0].assetPath == "mannequin.usdc"
+    assert written.ListTimeSamplesForPath("/World/drape/cloth.points")[0] == 8
 
 
 def test_a_cut_is_closed_again():

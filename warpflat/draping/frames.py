@@ -65,11 +65,14 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
     from pxr import Gf, Kind, Sdf, Usd, UsdGeom
 
     with usd_errors(path):
-        stage = Usd.Stage.CreateInMemory()
+        layer = Sdf.Layer.CreateAnonymous(".usda")
         own = latest_file(path)
+        if own.is_file():
+            layer.TransferContent(Sdf.Layer.FindOrOpen(str(own)))
+        # The rest may refer to files that lie beside the finished file, not yet beside this one.
+        stage = Usd.Stage.OpenMasked(layer, Usd.StagePopulationMask(["/World/drape"]))
         begin = 1
         if own.is_file():
-            stage.GetRootLayer().TransferContent(Sdf.Layer.FindOrOpen(str(own)))
             begin = int(stage.GetEndTimeCode()) + 1
         else:
             UsdGeom.SetStageMetersPerUnit(stage, 1.0)
