@@ -15,8 +15,9 @@ from warpflat.surface.injective import overlap_area
 
 __all__ = ["keep_apart"]
 
-# Where contact costs much, relaxation also starts from its layout swirled by these angles about the middle [rad].
-_SWIRLS = (-1.5, 1.5)
+# Where contact costs much, relaxation also starts from its layout swirled by these angles about the middle [rad]. A spiral of 2.5 turns
+# needs the wide ones.
+_SWIRLS = (-3.0, -1.5, 1.5, 3.0)
 
 
 def keep_apart(
