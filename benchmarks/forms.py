@@ -20,7 +20,6 @@ from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.mannequin.forms import form_names
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.scan_pose import ScanOptions
 from warpflat.surface.io.read import read_scan
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mannequin"))
@@ -51,7 +50,7 @@ def bodies(resolution: float, names: list[str]) -> Iterator[tuple[str, Mannequin
     for name in SCANS if folder else ():
         if not names or name in names:
             points, faces = read_scan(Path(str(folder)) / f"body_{name}.obj")
-            yield name, Mannequin.from_scan(points, faces, options=ScanOptions(mirror=True), resolution_mm=resolution)
+            yield name, Mannequin.from_scan(points, faces, resolution_mm=resolution)
 
 
 def measure(garment: Garment, inside: float) -> str:

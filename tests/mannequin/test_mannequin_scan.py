@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -237,8 +238,15 @@ def test_landmarks_and_mirroring() -> None:
     lopsided = points + np.outer(
         0.02 * np.exp(-0.5 * ((points[:, 1] - 1.1) / 0.1) ** 2) * (points[:, 0] > 0.05), [1, 0, 0]
     )
-    even = on_scan(lopsided, faces, mirror=True)
+    even, kept = on_scan(lopsided, faces), on_scan(lopsided, faces, symmetric=False)
     assert np.abs(even.vertices[even.layout.mirror] * [-1, 1, 1] - even.vertices).max() < 1e-9
+    assert np.abs(kept.vertices[kept.layout.mirror] * [-1, 1, 1] - kept.vertices).max() > 0.015
+    for form, done in ((even, "their average is taken"), (kept, "they are kept")):
+        (note,) = (note for note in form.notes if "left and right differ" in note)
+        # The bump is 20 mm high at 1.1 m.
+        assert re.search(r"trunk by up to (1[5-9]|2[0-2]) mm at a height of 1\.(0[5-9]|1[0-5]) m", note)
+        assert done in note
+    assert not any("left and right differ" in note for note in _plain("female").notes)
     with pytest.raises(InputError, match="does not lie above"):
         on_scan(points, faces, landmarks={"waist": 0.6})
 

@@ -112,10 +112,10 @@ DOME = "[surface]\nshape = 'dome'\n"
         ("name = 'x'\nname = 'y'\n", r"is not valid TOML: Cannot overwrite a value \(at line 2"),
         ("fabric = 'woven'\n", r"a scene needs either a \[surface\] table or a \[mannequin\] table with a form"),
         ("[mannequin]\nsize = 'EU 38'\n", r"a mannequin and a form go together"),
-        ("form = 'bodice'\n[mannequin]\nmirror = true\n", r"give the body in one way: size"),
+        ("form = 'bodice'\n[mannequin]\nsymmetric = false\n", r"give the body in one way: size"),
         (
-            "form = 'bodice'\n[mannequin]\nsize = 'EU 38'\nmirror = true\nlandmarks = { bust = 1.3 }\n",
-            r"mannequin: given with size, but of a scan only: landmarks, mirror; leave it out, or give a scan",
+            "form = 'bodice'\n[mannequin]\nsize = 'EU 38'\nsymmetric = false\nlandmarks = { bust = 1.3 }\n",
+            r"mannequin: given with size, but of a scan only: landmarks, symmetric; leave it out, or give a scan",
         ),
         ("half = true\n" + DOME, r"half belongs to a form's pieces; on a \[surface\] give the half's mesh"),
         ("fabrik = 'woven'\n" + DOME, r"fabrik: unknown key 'fabrik'; did you mean 'fabric'\? valid: "),

@@ -27,7 +27,7 @@ __all__ = ["mannequin"]
 @click.option("--facing", metavar="AXIS", help="Where the scan looks, such as +z.  [default: told from its shape]")
 @click.option("--up", metavar="AXIS", help="Where the scan's head is, such as +y.  [default: told from its shape]")
 @click.option("--landmark", "landmarks", multiple=True, metavar="NAME=METRES", help="A height known better.")
-@click.option("--mirror", is_flag=True, help="Average the scan's left and right.")
+@click.option("--keep-sides", is_flag=True, help="Keep the scan's left and right; else they are averaged.")
 @click.option(
     "--resolution", type=click.FloatRange(2, 40), metavar="MM", help="Wished edge of the quads.  [default: 10]"
 )
@@ -62,6 +62,8 @@ def mannequin(
     require_memory_for_usd()  # mannequin.usdc is always written
     tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}
     _check_body(tables, size=size, measures=measures, landmarks=landmarks)
+    if tables.pop("keep_sides", False):
+        tables["symmetric"] = False
     if size is not None:
         tables["size"] = size
     if measures:
@@ -95,7 +97,9 @@ def _check_body(
         raise InputError(
             "command line: give the body in one way: --size or --measure, or both, which replaces some of the size's; or --scan"
         )
-    of_scan = [f"--{key}" for key in options if key not in ("scan", "table")] + ["--landmark"] * bool(landmarks)
+    of_scan = [f"--{key.replace('_', '-')}" for key in options if key not in ("scan", "table")] + ["--landmark"] * bool(
+        landmarks
+    )
     if scan is None and of_scan:
         raise InputError(f"command line: {of_scan[0]} is about a --scan; leave it out")
     if scan is not None and "table" in options:

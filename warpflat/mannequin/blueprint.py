@@ -127,7 +127,6 @@ class Blueprint:
         neck: length of the neck base along its curve [m].
         collar: #P by 3 [m], closed curve at the upper end of the neck, from centre front over the left.
         attract: maps #P by 3 points of chest and shoulder to the places [m] on the body to draw them to; None for none.
-        mirror: true to average the left and the right side.
     """
 
     profile: Callable[[float], Profile]
@@ -138,4 +137,3 @@ class Blueprint:
     neck: float
     collar: FloatArray
     attract: Callable[[FloatArray], FloatArray] | None = None
-    mirror: bool = False

@@ -50,20 +50,7 @@ def build_vertices(layout: Layout, blueprint: Blueprint, trunk: FloatArray | Non
     _set_arms(vertices, layout, blueprint)
     _set_neck(vertices, layout, blueprint)
     _set_sheet(vertices, layout, blueprint)
-    return _mirrored(vertices, layout) if blueprint.mirror else vertices
-
-
-def _mirrored(vertices: FloatArray, layout: Layout) -> FloatArray:
-    """Return the average of the body and its mirror image, girths kept."""
-    other = vertices[layout.mirror] * np.array([-1.0, 1.0, 1.0])
-    out = 0.5 * (vertices + other)
-    for ring in layout.rings[: layout.level_row["bust"] + 1]:
-        out[ring] = scale_to_girth(out[ring], convex_girth(vertices[ring]))
-    for grid in layout.legs.values():
-        for row in grid[layout.leg_row["leg_thigh"] :]:
-            girth = 0.5 * (convex_girth(vertices[row]) + convex_girth(vertices[layout.mirror[row]]))
-            out[row] = scale_to_girth(out[row], girth)
-    return out
+    return vertices
 
 
 def quarter_fractions(layout: Layout, princess: float) -> FloatArray:

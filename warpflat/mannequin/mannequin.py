@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
+from warpflat.mannequin.both_sides import average_sides, sides_note
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_trunk, build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout, make_layout
@@ -109,7 +110,7 @@ class Mannequin:
         Args:
             vertices: #V by 3, in any unit and pose that can be found from the shape (see :class:`ScanOptions`).
             faces: #F by 3 or 4 (-1 in the last column for a triangle).
-            options: unit, facing, landmarks, mirroring.
+            options: unit, facing, landmarks, symmetry.
             resolution_mm: wished quad edge [mm].
 
         Raises:
@@ -119,9 +120,12 @@ class Mannequin:
         from warpflat.mannequin.scan_pose import ScanOptions
 
         layout = make_layout(resolution_mm)
-        found = blueprint_from_scan(np.asarray(vertices, float), np.asarray(faces), options or ScanOptions())
+        options = options or ScanOptions()
+        found = blueprint_from_scan(np.asarray(vertices, float), np.asarray(faces), options)
+        scanned = build_vertices(layout, found.blueprint)
         return cls(
-            layout=layout, vertices=build_vertices(layout, found.blueprint), source=found.source, notes=found.notes,
+            layout=layout, vertices=average_sides(scanned, layout) if options.symmetric else scanned,
+            source=found.source, notes=(*found.notes, *sides_note(scanned, layout, averaged=options.symmetric)),
             sections=found.sections, measures=found.measures, scan=found.scan,
         )  # fmt: skip
 

@@ -76,7 +76,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     blueprint = Blueprint(
         profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
         legs=leg_curves(slicer, legs, levels, profile(levels["hip"])), neck=body.upper.neck, collar=body.upper.collar,
-        attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
+        attract=_attractor(slicer, levels, trunk.armpits),
     )  # fmt: skip
     measures = guess_by_noise(slicer, body.measures, lambda copy: _slice_body(copy, options).measures)
     sections = {level: float(np.interp(levels[level], trunk.y, trunk.length)) for level in RING_LEVELS}

@@ -48,14 +48,14 @@ class ScanOptions:
         up: axis that points to the head, as ``+y``.
         facing: axis towards which the body looks, as ``+z``.
         landmarks: known heights above the floor [m]: bust, waist, hip, armpit, ...
-        mirror: average the left and the right side.
+        symmetric: whether the mannequin is the average of left and right; else each side is kept.
     """
 
     unit: str | None = None
     up: str | None = None
     facing: str | None = None
     landmarks: Mapping[str, float] = field(default_factory=dict)
-    mirror: bool = False
+    symmetric: bool = True
 
     def check(self) -> None:
         """Check the values.

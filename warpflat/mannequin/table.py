@@ -34,7 +34,7 @@ class MannequinTable(Table):
     up: str | None = None
     facing: str | None = None
     landmarks: dict[str, float] = Field(default_factory=dict)
-    mirror: bool = False
+    symmetric: bool = True
     resolution_mm: Annotated[float, Field(ge=2.0, le=40.0)] = 10.0
 
     @model_validator(mode="after")
@@ -46,7 +46,8 @@ class MannequinTable(Table):
             )
         if self.scan is not None and self.table is not None:
             raise ValueError("table completes measurements; a scan has its own: leave it out")
-        of_scan = [key for key in ("units", "up", "facing", "landmarks", "mirror") if getattr(self, key)]
+        of_scan = [key for key in ("units", "up", "facing", "landmarks") if getattr(self, key)]
+        of_scan += [] if self.symmetric else ["symmetric"]
         if self.scan is None and of_scan:
             body = "size" if self.size is not None else "measurements"
             raise ValueError(
@@ -83,7 +84,7 @@ def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path
     if table.measurements is not None:
         return Mannequin.from_measurements(table=table.table or "women", resolution_mm=table.resolution_mm, **given)
     options = ScanOptions(
-        unit=table.units, up=table.up, facing=table.facing, landmarks=table.landmarks, mirror=table.mirror
+        unit=table.units, up=table.up, facing=table.facing, landmarks=table.landmarks, symmetric=table.symmetric
     )
     return mannequin_from_scan_file(path_of(str(table.scan)), options=options, resolution_mm=table.resolution_mm)
 

@@ -114,7 +114,7 @@ def read_surface(
     return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
 
 
-def read_scan(path: Path) -> tuple[FloatArray, IntArray]:
+def read_scan(path: str | PathLike[str]) -> tuple[FloatArray, IntArray]:
     """Read any mesh as it stands, closed or in several parts, such as the scan of a body.
 
     Returns:
@@ -123,15 +123,16 @@ def read_scan(path: Path) -> tuple[FloatArray, IntArray]:
     Raises:
         InputError: one line that names the file.
     """
+    file = Path(path)
     try:
-        _check_file(path)
-        raw = _read(path, None, None)
+        _check_file(file)
+        raw = _read(file, None, None)
         polygons, keep, _ = distinct_corners(raw.polygons)
         return raw.vertices, split_polygons(check_positions(raw.vertices), polygons[keep])[0]
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(f"{file}: {error}") from error
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
 
 
 def _read_with_unit(file: Path, units: str | None, prim: str | None) -> tuple[_Raw, float]:
