@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.export.read_pattern_json import read_pattern_json
 from warpflat.garment.pattern_files import PatternOptions, garment_files
+from warpflat.scene.closed_darts import without_closed_darts
 from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart, turn_dart
 from warpflat.scene.form_ledger import form_ledger, with_cut
 from warpflat.scene.form_shaping import settle_shape
@@ -201,3 +202,25 @@ def test_the_advice_of_a_run_can_be_pasted(tmp_path: Path):
     form = scene_form(scene(mannequin={"size": "EU 38", "resolution_mm": 20}, cuts=[best["table"]]))[1]
     lengths = [arc_lengths(form.vertices[dart.row])[-1] for dart in form.darts]
     assert lengths == pytest.approx([best["length_m"]] * 2, rel=1e-6)
+
+
+def test_a_dart_that_the_body_does_not_want_is_left_out(tmp_path: Path):
+    # Her belly stands out below the waist, so that a dart of the front skirt would overlap.
+    belly = {"measurements": {"bust": 1.12, "waist": 1.02, "hip": 1.08}, "resolution_mm": 40}
+    tables = {
+        "form": "skirt",
+        "output": {"picture": False, "frames": 0},
+        "shape": "darts",
+        "ease": "close",
+        "mannequin": belly,
+    }
+    result = run_scene(scene(**tables), tmp_path)
+    (note,) = (note for note in result.notes if "left out" in note)
+    assert note.startswith("front: the waist dart is left out, since the cloth would not open it")
+    assert "not_drawn" not in result.metrics["pattern"]
+    assert "darts" not in result.metrics["pieces"]["front"]
+    assert result.metrics["pieces"]["back"]["darts"]
+    # What a scene asks for itself is made as it is asked for.
+    own = {"piece": "front", "line": "princess front left", "mouth_mm": 8}
+    kept = plan_garment(scene(**tables, cuts=[own], curves_mm=0)).flatten()
+    assert without_closed_darts(scene(**tables, cuts=[own]), [kept])[1] == ()

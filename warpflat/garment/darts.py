@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,11 +11,19 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.garment.constraints import DartMouth
 from warpflat.garment.sewn import SeamPair
+from warpflat.surface.cut.dart_legs import open_length
 
 if TYPE_CHECKING:
+    from warpflat.mannequin.darts import FormDart
     from warpflat.mannequin.forms import FormResult
 
-__all__ = ["dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
+__all__ = ["CLOSED", "closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
+
+
+#: Legs of a dart that overlap by no more than this [m] before its tip are closed there.
+CLOSED = 1e-4
+# A mouth narrower than this [m] is no dart that anybody would sew.
+_NARROW = 3e-3
 
 
 def dart_pairs(form: FormResult) -> list[SeamPair]:
@@ -52,6 +61,25 @@ def dart_constraints(form: FormResult) -> list[DartMouth]:
         elif dart.asked.like is not None:
             side = dart.name.removeprefix(dart.asked.name)
             found.append(DartMouth(piece=dart.piece, dart=dart.name, like=f"{dart.asked.like}{side}"))
+    return found
+
+
+def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[FormDart]:
+    """Return the darts that do not open on one side of the body at least: their mouth is narrower than 3 mm, or their legs overlap.
+
+    Args:
+        form: whose darts they are.
+        positions: by piece, #V by 2, its pattern [m].
+    """
+    found = []
+    for dart in form.darts:
+        piece = form.pieces.get(dart.piece)
+        if piece is None or dart.name not in piece.darts or dart.asked in found:
+            continue
+        left, right = (positions[dart.piece][piece.edges[edge]] for edge in piece.darts[dart.name])
+        count, overlap = open_length(left, right[::-1])
+        if count == 0 or overlap > CLOSED or np.linalg.norm(left[0] - right[-1]) < _NARROW:
+            found.append(dart.asked)
     return found
 
 

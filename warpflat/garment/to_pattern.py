@@ -16,7 +16,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
-from warpflat.garment.darts import pleat_depths
+from warpflat.garment.darts import CLOSED, pleat_depths
 from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.facings import STAND, Stand
@@ -48,8 +48,6 @@ __all__ = ["grain_of", "pattern_of_garment"]
 
 #: A datum that strays from the grain by no more than this [m] carries the grain line.
 ON_DATUM = 1e-3
-#: Legs of a dart that overlap by no more than this [m] before its tip are closed there.
-CLOSED = 1e-4
 
 
 def pattern_of_garment(

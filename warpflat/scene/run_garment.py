@@ -30,6 +30,7 @@ from warpflat.mannequin.forms import Form, FormResult, form_from_mapping, shippe
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
+from warpflat.scene.closed_darts import ClosedDarts, require_open_darts
 from warpflat.scene.drape import write_drape
 from warpflat.scene.form_cuts import cut_form, cut_of_dart
 from warpflat.scene.frames import MANNEQUIN, Film, FrameSchedule
@@ -193,6 +194,24 @@ def run_garment(
     device: str | None = None,
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
+    notes: tuple[str, ...] = ()
+    while True:
+        try:
+            result = _run_garment(scene, out, on_progress=on_progress, device=device)
+            return replace(result, notes=(*notes, *result.notes))
+        except ClosedDarts as closed:
+            scene, left_out = closed.without, closed.notes
+            notes += left_out
+
+
+def _run_garment(
+    scene: Scene, out: Path, *, on_progress: Callable[[Progress], bool | None] | None, device: str | None
+) -> SceneResult:
+    """Run a scene's garment as it is asked for.
+
+    Raises:
+        ClosedDarts: some darts of its shape do not open.
+    """
     from warpflat.core.atomic_files import expect_files
 
     plan = plan_garment(scene, device=device)
@@ -206,6 +225,7 @@ def run_garment(
     with ExitStack() as beside:
         with _film(plan, out) as film:
             garment = _flatten_with_frames(plan, film, on_progress=on_progress)
+            require_open_darts(scene, [garment])
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
             pictures = beside.enter_context(Beside(partial(_write_pieces, plan, garment, out), "drawing the pictures"))
@@ -213,6 +233,7 @@ def run_garment(
                 size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
                 for size, (body, form) in others.items()
             }
+            require_open_darts(scene, graded.values())
             pattern = beside.enter_context(
                 Beside(partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out), "drafting the pattern")
             )

@@ -17,6 +17,7 @@ from warpflat.garment.darts import measure_darts
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
+from warpflat.scene.closed_darts import without_closed_darts
 from warpflat.scene.cuts import CutSequence
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_relax_options
@@ -146,6 +147,10 @@ def _solve_garment(
         form = scene_form(settled, mannequin)[1]
     plan = plan_garment(settled, built=(mannequin, form))
     garment = plan.flatten(callback=callback)
+    while (opened := without_closed_darts(settled, [garment]))[1]:
+        settled, notes = opened[0], (*notes, *opened[1])
+        plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin)[1]))
+        garment = plan.flatten(callback=callback)
     return Solution(scene=scene, pieces=garment.pieces, plan=plan, garment=garment, notes=(*notes, *garment.notes))
 
 
