@@ -112,6 +112,10 @@ def test_armholes_get_a_binding_each(parted: Garment):
     assert binding.edge("lower").length == pytest.approx(
         front.edge("armhole left").length + back.edge("armhole left").length
     )
+    # Where its ends come to lie no seam of the garment is turned to meet them.
+    places = [corner.place for corner in draft_garment(pattern).corners]
+    assert not [place for place in places if place.startswith("armhole binding:")]
+    assert [place for place in places if place.startswith("side left:")]
 
 
 def test_edge_that_is_not_free_is_named(parted: Garment):

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
+from warpflat.garment.darts import EYE_CLOSED, closed_darts
 from warpflat.garment.garment import flatten_form
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.darts import FormDart
@@ -13,6 +15,8 @@ from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.half_pieces import halved
 from warpflat.scene.load import make_scene
 from warpflat.scene.run_garment import plan_garment
 from warpflat.surface.cut.dart_legs import open_length
@@ -146,8 +150,9 @@ def test_a_dart_without_an_end_of_its_own_takes_its_part(body):
         ({"piece": "front_bodice", "line": "bustt"}, "line 'bustt' is unknown"),
         ({"piece": "front_bodice", "line": "hip"}, "does not run from the border into piece 'front_bodice'"),
         ({"piece": "front_bodice", "line": "underbust"}, "give its part"),
-        ({"piece": "front_bodice", "line": "bust", "part": (0.2, 0.4)}, "begin at 0 or 1"),
-        ({"piece": "front_bodice", "line": "bust", "part": (0.0, 1.0)}, "end inside it"),
+        ({"piece": "front_bodice", "line": "bust", "part": (0.2, 0.2)}, "has no length"),
+        ({"piece": "front_bodice", "line": "bust", "part": (0.2, 0.21)}, "two mesh edges away"),
+        ({"piece": "front_bodice", "line": "bust", "part": (0.0, 1.0)}, "inside it"),
     ],
 )
 def test_darts_that_cannot_be(body, dart, message):
@@ -162,6 +167,61 @@ def test_legs_that_overlap_close_where_they_meet():
     assert count == 3
     assert overlap == pytest.approx(4e-5, rel=0.05)
     assert open_length(np.column_stack([x, 0.01 - 0.1 * x]), np.column_stack([x, 0.1 * x - 0.01])) == (6, 0.0)
+
+
+def test_a_dress_has_darts_with_two_tips(body):
+    eased = replace(shipped_form("dress"), ease=ease_from("close", "test"))
+    darts = shaped_form(body.layout, eased, "darts").darts
+    assert [(d.piece, d.name) for d in darts] == [
+        ("front", "bust dart"),
+        ("front", "waist dart"),
+        ("back", "waist dart"),
+    ]
+    form = body.form(shaped_form(body.layout, eased, "darts"))
+    waist, bust = (body.layout.lines[level] for level in ("waist", "bust"))
+    for piece in form.pieces.values():
+        assert set(piece.eyes) == {"waist dart left", "waist dart right"}
+        for left, right in piece.eyes.values():
+            # The legs part at one tip and meet at the other.
+            assert (left[0], left[-1]) == (right[0], right[-1])
+            assert not set(left[1:-1]) & set(right)
+            row = piece.grid_vertices[left]
+            assert np.array_equal(row, piece.grid_vertices[right])
+            assert np.isin(row[1:-1], waist).sum() == 1
+            heights = form.vertices[row, 1]
+            assert heights[0] < form.vertices[bust, 1].mean() - 0.01
+            assert form.vertices[waist, 1].mean() - heights[-1] == pytest.approx(0.12, abs=0.03)
+
+    sewn = flatten_form(body, form)
+    plain = flatten_form(body, body.form(eased))
+    energy = [sum(p.stages[-1].model_energy_j for p in garment.pieces.values()) for garment in (sewn, plain)]
+    assert energy[0] < 0.4 * energy[1]
+    for name, piece in form.pieces.items():
+        flat = sewn.pieces[name].positions
+        for left, right in piece.eyes.values():
+            assert np.linalg.norm(flat[left] - flat[right], axis=1).max() > 0.01
+            assert polyline_length(flat[left]) == pytest.approx(polyline_length(flat[right]), abs=1e-4)
+            assert open_length(flat[left], flat[right])[1] < EYE_CLOSED
+    assert closed_darts(form, {name: piece.positions for name, piece in sewn.pieces.items()}) == []
+
+    pattern, _ = pattern_of_garment({"": sewn}, name="dress")
+    assert {(hole.name, hole.kind) for hole in pattern.piece("back", "").holes} == {
+        ("waist dart left", "dart"), ("waist dart right", "dart")
+    }  # fmt: skip
+    # On the fold of the cloth half of the piece is drawn, with its own dart.
+    half = next(p for p in halved(draft_garment(pattern)).pieces[""] if p.name == "back")
+    assert half.piece.on_fold
+    assert list(half.fisheyes) == ["waist dart"]
+
+
+def test_the_width_of_a_dart_with_two_tips_can_be_asked_for(body):
+    dart = FormDart(name="eye", piece="front", line="princess front left", part=(0.5, 0.8), mouth_mm=12.0)
+    form = body.form(replace(shipped_form("a_line_skirt"), darts=(dart,)))
+    sewn = flatten_form(body, form, curves_mm=0)
+    left, right = form.pieces["front"].eyes["eye left"]
+    middle = len(left) // 2
+    flat = sewn.pieces["front"].positions
+    assert np.linalg.norm(flat[left[middle]] - flat[right[middle]]) == pytest.approx(0.012, abs=2e-4)
 
 
 def test_princess_seams_part_the_pieces(body):

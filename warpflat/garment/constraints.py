@@ -109,7 +109,7 @@ class DartMouth:
 
     Attributes:
         piece, dart: names.
-        width: between the ends of its legs on the border [m]; None with `like`.
+        width: between the ends of its legs on the border, or half-way between its two tips [m]; None with `like`.
         like: the other dart's name; None with `width`.
     """
 
@@ -228,7 +228,10 @@ def _mouth_equations(constraint: DartMouth, piece: Flattening) -> ConstraintEqua
         if f"{dart}.left" not in lines:
             known = [line.removesuffix(".left") for line in lines if line.endswith(".left")]
             raise InputError(f"piece {constraint.piece!r} has no dart {dart!r}; {nearest(dart, known)}")
-        mouths.append(np.array([lines[f"{dart}.left"][0], lines[f"{dart}.right"][-1]], dtype=np.int32))
+        left, right = lines[f"{dart}.left"], lines[f"{dart}.right"]
+        # A fish-eye dart's legs both run from its first tip to its second.
+        ends = (0, -1) if left[0] != right[0] else (len(left) // 2, len(left) // 2)
+        mouths.append(np.array([left[ends[0]], right[ends[1]]], dtype=np.int32))
     if constraint.width is not None:
         return length_equations(mouths[0], np.array([constraint.width]))
     return seam_equations(mouths[0], mouths[1])

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from warpflat.mannequin.darts import FormDart
     from warpflat.mannequin.forms import FormResult
 
-__all__ = ["CLOSED", "closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
+__all__ = ["CLOSED", "EYE_CLOSED", "closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
 
 
-#: Legs of a dart that overlap by no more than this [m] before its tip are closed there.
-CLOSED = 1e-4
+#: Legs of a dart, and of one with two tips, that overlap by no more than this [m] before a tip are closed there.
+CLOSED, EYE_CLOSED = 1e-4, 5e-4
 # A mouth narrower than this [m] is no dart that anybody would sew.
 _NARROW = 3e-3
 
@@ -31,8 +31,7 @@ def dart_pairs(form: FormResult) -> list[SeamPair]:
     pleats = pleat_depths(form)
     found = []
     for name, piece in form.pieces.items():
-        for dart, (left, right) in piece.darts.items():
-            legs = piece.edges[left], piece.edges[right][::-1]
+        for dart, legs in piece.legs().items():
             along = arc_lengths(piece.surface.vertices[legs[0]])
             # One edge of the mesh at least.
             count = max(2, int(np.searchsorted(along, pleats.get((name, dart), along[-1]) + 1e-9, "right")))
@@ -54,7 +53,7 @@ def dart_constraints(form: FormResult) -> list[DartMouth]:
     found = []
     for dart in form.darts:
         # A half piece has the left darts only.
-        if dart.piece not in form.pieces or dart.name not in form.pieces[dart.piece].darts:
+        if dart.piece not in form.pieces or dart.name not in form.pieces[dart.piece].legs():
             continue
         if dart.asked.mouth_mm is not None:
             found.append(DartMouth(piece=dart.piece, dart=dart.name, width=1e-3 * dart.asked.mouth_mm))
@@ -73,12 +72,14 @@ def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[
     """
     found = []
     for dart in form.darts:
-        piece = form.pieces.get(dart.piece)
-        if piece is None or dart.name not in piece.darts or dart.asked in found:
+        legs = {} if dart.piece not in form.pieces else form.pieces[dart.piece].legs()
+        if dart.name not in legs or dart.asked in found:
             continue
-        left, right = (positions[dart.piece][piece.edges[edge]] for edge in piece.darts[dart.name])
-        count, overlap = open_length(left, right[::-1])
-        if count == 0 or overlap > CLOSED or np.linalg.norm(left[0] - right[-1]) < _NARROW:
+        left, right = (positions[dart.piece][leg] for leg in legs[dart.name])
+        # The tips of a fish-eye dart may close a little.
+        overlap = open_length(left, right)[1]
+        most = EYE_CLOSED if dart.name in form.pieces[dart.piece].eyes else CLOSED
+        if overlap > most or np.linalg.norm(left - right, axis=1).max() < _NARROW:
             found.append(dart.asked)
     return found
 
@@ -95,13 +96,15 @@ def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[di
     placed = {dart.name: dart for dart in form.darts if dart.piece == name}
     pleats = pleat_depths(form)
     found = []
-    for dart, (left, right) in piece.darts.items():
-        legs = [positions[piece.edges[edge]] for edge in (left, right)]
+    for dart, ids in piece.legs().items():
+        legs = [positions[leg] for leg in ids]
+        # A fish-eye dart is widest inside.
+        width = np.linalg.norm(legs[0] - legs[1], axis=1)
         found.append(
             {
                 "name": dart,
                 "line": placed[dart].asked.line,
-                "intake_m": float(np.linalg.norm(legs[0][0] - legs[1][-1])),
+                "intake_m": float(width.max() if dart in piece.eyes else width[0]),
                 "legs_m": [polyline_length(leg) for leg in legs],
                 "tip_to_point_m": placed[dart].to_point,
                 **({"pleat_m": pleats[name, dart]} if (name, dart) in pleats else {}),

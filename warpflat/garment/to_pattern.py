@@ -35,7 +35,7 @@ from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
-from warpflat.pattern.pieces import FOLD_STRAIGHT, Dart, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import FOLD_STRAIGHT, Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
 from warpflat.surface.cut.dart_legs import are_curved, open_length
 
 if TYPE_CHECKING:
@@ -317,7 +317,11 @@ def _piece(
         )
         for dart, (left, right) in piece.darts.items()
     ]
-    border = list(piece.edges.values())
+    holes = [
+        Hole(name=eye, points=np.vstack([flat.positions[left], flat.positions[right[-2:0:-1]]])[::-1], kind="dart")
+        for eye, (left, right) in piece.eyes.items()
+    ]
+    border = [*piece.edges.values(), *(leg for legs in piece.eyes.values() for leg in legs)]
     along = _inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
     return Piece(
         name=name,
@@ -326,6 +330,7 @@ def _piece(
         quantity=quantity,
         edges=edges,
         darts=darts,
+        holes=holes,
         internal_lines=_inner_lines(piece.surface.lines, border, flat.positions),
         grain=grain_of(
             np.concatenate([edge.points[:-1] for edge in edges]),

@@ -1,4 +1,4 @@
-"""Darts of a form: which stretch of the grid is slit, from the border of a piece to the dart's tip."""
+"""Darts of a form: which stretch of the grid is slit, from the border of a piece to the dart's tip, or between two tips inside."""
 
 from __future__ import annotations
 
@@ -36,11 +36,12 @@ class FormDart:
             or the waist.
         towards: another line: it lies between the two, at the share `between` of the way. Only for lines that run up and down.
         between: 0 to 1.
-        part: shares of the line's length within the piece, from the mouth, 0 or 1, to the tip; None for the default.
-        tip_mm: how far before the bust point, or below the waist in a skirt or the shoulder in a back, it ends [mm]; None for
-            the default.
+        part: shares of the line's length within the piece, from the mouth, 0 or 1, to the tip; between the two tips of a fish-eye dart;
+            None for the default.
+        tip_mm: of a dart with one tip, how far before the bust point, or below the waist in a skirt or the shoulder in a back, it ends
+            [mm]; None for the default.
         mirrored: its mirror image is a dart, too, in the same piece or in the mirror image of that.
-        mouth_mm: how wide it opens at the border [mm]; None leaves it to the cloth.
+        mouth_mm: how wide it opens at the border, or half-way between two tips [mm]; None leaves it to the cloth.
         like: name of another dart of the piece that opens as wide; None leaves it to the cloth.
         pleat_mm: it is a pleat, sewn this far from its mouth [mm], and hangs open below; None for a dart.
     """
@@ -76,7 +77,7 @@ class PlacedDart:
     Attributes:
         name, piece: names.
         asked: what was asked for.
-        row: the mannequin's vertices from the mouth to the tip.
+        row: the mannequin's vertices from the mouth to the tip; of a fish-eye dart from its upper tip to its lower one.
         to_point: distance from the tip to the bust point or to the bust's level along the line [m]; None where it points to
             neither.
     """
@@ -152,10 +153,9 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
             dart = FormDart(name="waist dart", piece=piece, line=f"princess {face} left")
             run = _longest_run(_grid_line(layout, dart), cloth)
             at_waist = {int(run[at]) for at in (0, -1)} & set(layout.lines["waist"].tolist()) if len(run) else set()
-            if not at_waist:
-                continue
-            found.append(dart)
-            if int(run[-1]) in at_waist and face == "back":
+            if at_waist or _waist_of_eye(layout, run) is not None:
+                found.append(dart)
+            if at_waist and int(run[-1]) in at_waist and face == "back":
                 found.append(replace(dart, name="second waist dart", towards="side left", like=dart.name))
     return tuple(found)
 
@@ -172,11 +172,10 @@ def _cloth(layout: Layout, bricks: Sequence[str]) -> _Cloth:
 
 
 def _holds(cloth: _Cloth, row: IntArray) -> bool:
-    """Return whether a row begins on the border of a piece and runs on inside."""
+    """Return whether a row begins on the border of a piece, or two edges of the mesh long inside, and runs on inside."""
     ids = row.tolist()
-    return (
-        ids[0] in cloth.border and cloth.border.isdisjoint(ids[1:]) and cloth.inner.issuperset(itertools.pairwise(ids))
-    )
+    begins = ids[0] in cloth.border or len(ids) > 2
+    return begins and cloth.border.isdisjoint(ids[1:]) and cloth.inner.issuperset(itertools.pairwise(ids))
 
 
 def _lies_left(layout: Layout, row: IntArray) -> bool:
@@ -230,6 +229,8 @@ def _place(layout: Layout, vertices: FloatArray, cloth: _Cloth, dart: FormDart) 
     point: int | None = None
     if dart.part is not None:
         row = _part_of(vertices, run, dart)
+    elif dart.at is None and (waist := _waist_of_eye(layout, run)) is not None:
+        row = _default_eye(layout, vertices, run, waist, dart)
     else:
         run, point, length = _default_run(layout, vertices, cloth, run, dart)
         arc = arc_lengths(vertices[run])
@@ -238,7 +239,9 @@ def _place(layout: Layout, vertices: FloatArray, cloth: _Cloth, dart: FormDart) 
         row = run[: max(1, last if point is None else min(last, run.index(point) - 1)) + 1]
     row_ids = np.array(row, np.int32)
     if not _holds(cloth, row_ids):
-        raise InputError(f"{where}: it must begin at the border of piece {dart.piece!r} and end inside it")
+        raise InputError(
+            f"{where}: it must begin at the border of piece {dart.piece!r}, or inside, and end two mesh edges away inside it"
+        )
     to_point = None
     if point is not None:
         whole = vertices[run[: run.index(point) + 1]]
@@ -247,20 +250,48 @@ def _place(layout: Layout, vertices: FloatArray, cloth: _Cloth, dart: FormDart) 
 
 
 def _part_of(vertices: FloatArray, run: list[int], dart: FormDart) -> list[int]:
-    """Return the part of a run between two shares of its length, from the mouth."""
+    """Return the part of a run between two shares of its length, from the mouth, or from tip to tip.
+
+    Raises:
+        InputError: the shares are the same.
+    """
     assert dart.part is not None
     first, last = dart.part
-    if first not in (0.0, 1.0):
-        first, last = last, first
-    if first not in (0.0, 1.0) or first == last:
-        raise InputError(
-            f"dart {dart.name!r}: part = [{dart.part[0]:g}, {dart.part[1]:g}] does not reach the border of piece "
-            f"{dart.piece!r}; begin at 0 or 1"
-        )
-    if first == 1.0:
-        run, last = run[::-1], 1.0 - last
+    if first == last:
+        raise InputError(f"dart {dart.name!r}: part = [{first:g}, {last:g}] has no length; give two different shares")
+    if 1.0 in (first, last):
+        run, first, last = run[::-1], 1.0 - first, 1.0 - last
+    first, last = sorted((first, last))
     arc = arc_lengths(vertices[run])
-    return run[: max(1, int(np.abs(arc - last * arc[-1]).argmin())) + 1]
+    begin, end = (int(np.abs(arc - share * arc[-1]).argmin()) for share in (first, last))
+    return run[begin : max(begin + 1, end) + 1]
+
+
+def _waist_of_eye(layout: Layout, run: Sequence[int]) -> int | None:
+    """Return where in a run that goes on below the waist, as in a dress, the waist lies between two tips; None if nowhere."""
+    waist, bust = (set(layout.lines[level].tolist()) for level in ("waist", "bust"))
+    at = next((place for place, vertex in enumerate(run) if vertex in waist), 0)
+    return at if 0 < at < len(run) - 1 and any(vertex in bust for vertex in run) else None
+
+
+def _default_eye(layout: Layout, vertices: FloatArray, run: list[int], waist: int, dart: FormDart) -> list[int]:
+    """Return the fish-eye dart of a dress: its upper tip where a bodice's waist dart ends, its lower one where a skirt's does.
+
+    Raises:
+        InputError: it has a `tip_mm`, which is of a dart with one tip.
+    """
+    if dart.tip_mm is not None:
+        raise InputError(
+            f"dart {dart.name!r}: it has two tips in piece {dart.piece!r}; in place of tip_mm give both, as part = [0.3, 0.6]"
+        )
+    if vertices[run[0], 1] < vertices[run[-1], 1]:
+        run, waist = run[::-1], len(run) - 1 - waist
+    face = "front" if "front" in dart.line else "back"
+    bust = next(place for place, vertex in enumerate(run) if vertex in set(layout.lines["bust"].tolist()))
+    arc = arc_lengths(vertices[run])
+    ends = arc[bust] + _tip(dart, face), arc[waist] + _tip(dart, f"{face} skirt")
+    upper, lower = (int(np.abs(arc - end).argmin()) for end in ends)
+    return run[max(upper, bust + 1) : min(lower, len(run) - 2) + 1]
 
 
 def dart_along(

@@ -28,7 +28,7 @@ _CONTINUED = {
 
 #: For each piece its brick patterns, its datum line, and the lines along which it is cut open.
 Recipes = Mapping[str, tuple[Sequence[str], str, Sequence[str]]]
-#: By piece and dart the mannequin's vertices along a dart, from the border of the piece to the tip.
+#: By piece and dart the mannequin's vertices along a dart, from the border of the piece to the tip; of a fish-eye dart from tip to tip.
 Darts = Mapping[str, Mapping[str, IntArray]]
 
 
@@ -46,6 +46,8 @@ class FormPiece:
         grid_vertices: #V, for each vertex of the piece its vertex on the mannequin.
         face_brick: #F, for each face its brick's name.
         darts: by name, the edges along the left leg, from the border to the tip, and along the right one, back to the border.
+        eyes: fish-eye darts by name, the vertices along their left and right leg, both from the first tip to the second. They are there in
+            `surface.lines`, too, as "NAME.left" and "NAME.right".
         parts: where darts interrupt an edge, the name of the whole edge by each of its parts.
     """
 
@@ -56,7 +58,13 @@ class FormPiece:
     grid_vertices: IntArray
     face_brick: tuple[str, ...]
     darts: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    eyes: Mapping[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
     parts: Mapping[str, str] = field(default_factory=dict)
+
+    def legs(self) -> dict[str, tuple[IntArray, IntArray]]:
+        """Return by dart the vertices along its left and right leg, from the border to the tip; of a fish-eye dart from tip to tip."""
+        darts = {dart: (self.edges[left], self.edges[right][::-1]) for dart, (left, right) in self.darts.items()}
+        return {**darts, **self.eyes}
 
 
 def cut_pieces(
@@ -130,9 +138,14 @@ def _piece(
     darts = {dart: row for dart, row in darts.items() if own.issuperset(row.tolist())}
     slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}
     corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened) | slits)
-    loop = _border(corners, name, opened=bool(opened), darts=darts)
+    loop, holes = _borders(corners, name, opened=bool(opened), darts=darts)
+    eyes = _eyes(holes, grid_vertices, darts)
+    if len(eyes) != len(holes):
+        raise InputError(_not_one_disk(name, opened=bool(opened), darts=darts))
+    darts = {dart: row for dart, row in darts.items() if dart not in eyes}
     edges, parts = _edges(layout, loop, grid_vertices, darts)
     lines = _lines(layout, corners, grid_vertices, edges)
+    lines |= {leg: ids for eye, legs in eyes.items() for leg, ids in zip(_legs(eye), legs, strict=True)}
     fold = fold_among(edges, opened, name) if folded else None
     surface = Surface(
         vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
@@ -143,7 +156,7 @@ def _piece(
     return FormPiece(
         surface=surface, edges=edges, datum=line, fold=fold, grid_vertices=grid_vertices,
         face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
-        darts={dart: _legs(dart) for dart in darts},
+        darts={dart: _legs(dart) for dart in darts}, eyes=eyes,
     )  # fmt: skip
 
 
@@ -214,31 +227,61 @@ def _edge_codes(ends: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
     return np.asarray((low << 32) | high)
 
 
-def _border(corners: IntArray, name: str, *, opened: bool, darts: Collection[str]) -> NDArray[np.int64]:
-    """Return the one border loop of a disk, counter-clockwise from outside."""
+def _borders(
+    corners: IntArray, name: str, *, opened: bool, darts: Collection[str]
+) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
+    """Return the border loop of a disk, counter-clockwise from outside, and those of its holes, clockwise.
+
+    Raises:
+        InputError: the faces are no disk, with or without holes.
+    """
     ahead = np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2)
     key = np.sort(ahead, axis=1)
     edges, inverse, counts = np.unique(key, axis=0, return_inverse=True, return_counts=True)
     border = ahead[counts[np.ravel(inverse)] == 1]
     follow = dict(border.tolist())
-    vertex_count = int(corners.max()) + 1
-    if darts and (len(follow) != len(border) or vertex_count - len(edges) + len(corners) != 1):
-        raise InputError(
-            f"form: piece {name} is not one disk: its darts ({', '.join(darts)}) meet or part it; let each begin at the border "
+    if len(follow) != len(border) or not follow:
+        raise InputError(_not_one_disk(name, opened=opened, darts=darts))
+    loops: list[list[int]] = []
+    while follow:
+        start = min(follow)
+        loops.append([start])
+        while (ahead_of := follow.pop(loops[-1][-1])) != start:
+            loops[-1].append(ahead_of)
+    loops.sort(key=len, reverse=True)
+    # By Euler: every further loop is a hole of the one disk.
+    if int(corners.max()) + 1 - len(edges) + len(corners) != 2 - len(loops):
+        raise InputError(_not_one_disk(name, opened=opened, darts=darts))
+    return np.array(loops[0]), [np.array(loop) for loop in loops[1:]]
+
+
+def _not_one_disk(name: str, *, opened: bool, darts: Collection[str]) -> str:
+    if darts:
+        return (
+            f"form: piece {name} is not one disk: its darts ({', '.join(darts)}) meet or part it; let each begin at the border or inside "
             "and end inside, two mesh edges from any other"
         )
-    if len(follow) != len(border) or vertex_count - len(edges) + len(corners) != 1 or not follow:
-        raise InputError(
-            f"form: piece {name} is not one disk (its bricks touch at a point, fall apart, or close to a tube); "
-            f"choose neighbouring bricks, or name {'another' if opened else 'a'} line to open it along"
-        )
-    start = min(follow)
-    loop = [start]
-    while (ahead_of := follow[loop[-1]]) != start:
-        loop.append(ahead_of)
-    if len(loop) != len(border):
-        raise InputError(f"form: piece {name} is not one disk: it falls into parts; choose neighbouring bricks")
-    return np.array(loop)
+    return (
+        f"form: piece {name} is not one disk (its bricks touch at a point, fall apart, or close to a tube); "
+        f"choose neighbouring bricks, or name {'another' if opened else 'a'} line to open it along"
+    )
+
+
+def _eyes(
+    holes: Sequence[NDArray[np.int64]], grid_vertices: IntArray, darts: Mapping[str, IntArray]
+) -> dict[str, tuple[IntArray, IntArray]]:
+    """Return by fish-eye dart the vertices along its left and right leg, both from its first tip to its second."""
+    found = {}
+    for hole in holes:
+        on_grid = grid_vertices[hole]
+        for dart, row in darts.items():
+            if not np.array_equal(np.unique(on_grid), np.unique(row)):
+                continue
+            ids = np.roll(hole, -int(np.flatnonzero(on_grid == row[0])[0])).astype(np.int32)
+            middle = len(row)
+            # Along the border the cloth lies on the left, and so the wedge on the right of the left leg.
+            found[dart] = ids[:middle], np.concatenate([ids[:1], ids[middle - 1 :][::-1]])
+    return found
 
 
 def _line_of_edge(layout: Layout) -> dict[tuple[int, int], str]:

@@ -32,7 +32,7 @@ def shaped_form(layout: Layout, form: Form, shape: Literal["none", "darts", "pri
         darts = standard_darts(layout, bricks)
         # Legs are straight where the cloth hangs straight over the hollows of the body.
         ruled = [_UNDER_BUST] if any(dart.line == "bust" for dart in darts) else []
-        bridged = [_SMALL_OF_BACK] if any(dart.towards is not None for dart in darts) else []
+        bridged = [_SMALL_OF_BACK] if any(dart.line == "princess back left" for dart in darts) else []
         return replace(
             form,
             darts=(*form.darts, *darts),

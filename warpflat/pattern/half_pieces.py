@@ -12,7 +12,7 @@ from warpflat.core.text import without_side
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.draft import draft_half
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
-from warpflat.pattern.pieces import Edge, Piece, Seam
+from warpflat.pattern.pieces import Edge, Hole, Piece, Seam
 
 __all__ = ["halved", "is_symmetric"]
 
@@ -45,7 +45,7 @@ def is_symmetric(piece: DraftedPiece) -> bool:
     """Return whether a whole piece is its own mirror image about a line along its grain, darts and holes included."""
     import shapely
 
-    if piece.piece.on_fold or len(piece.piece.edges) < 2 or piece.cutouts or piece.fisheyes:
+    if piece.piece.on_fold or len(piece.piece.edges) < 2 or piece.cutouts:
         return False
     axis = _axis(piece)
 
@@ -70,8 +70,11 @@ def is_symmetric(piece: DraftedPiece) -> bool:
     marks = np.array([hole.at for hole in piece.drill_holes]).reshape(-1, 2)
     if any(np.linalg.norm(marks - mark, axis=1).min() > INNER for mark in marks * mirror + [2 * axis, 0]):
         return False
-    lines = list(piece.internal_lines.values())
-    return all(min(strays(line * mirror + [2 * axis, 0], other) for other in lines) <= INNER for line in lines)
+    return all(
+        min(strays(line * mirror + [2 * axis, 0], other) for other in lines) <= INNER
+        for lines in (list(piece.internal_lines.values()), list(piece.fisheyes.values()))
+        for line in lines
+    ) and not any(np.ptp(np.sign(line[:, 0] - axis)) for line in piece.fisheyes.values())
 
 
 def _axis(piece: DraftedPiece) -> float:
@@ -118,6 +121,11 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         for dart in piece.darts
         if dart.dart.left in names
     ]
+    holes = [
+        Hole(name=without_side(name), points=line + shift, kind="dart")
+        for name, line in piece.fisheyes.items()
+        if side * (line[0, 0] - axis) > 0.0
+    ]
     half = Piece(
         name=piece.name,
         size=piece.size,
@@ -125,6 +133,7 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         quantity=piece.piece.quantity,
         edges=[edge.edge for edge in edges],
         darts=darts,
+        holes=holes,
         internal_lines=_kept_lines(piece.internal_lines, axis, side, shift),
         marks={
             hole.name: hole.at + shift
@@ -138,8 +147,21 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         units=piece.piece.units,
     )
     notches = _kept_notches(piece, garment.garment.seams, side, names, [(e.name, e.line - shift) for e in edges[:-1]])
-    notches = tuple(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base)) for n in notches)
+    notches = tuple(
+        _along_fold(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base))) for n in notches
+    )
     return replace(draft_half(half, garment.name, tuple(edges), notches, piece.notes), enlarged=piece.enlarged)
+
+
+def _along_fold(notch: Notch) -> Notch:
+    """Return a notch with its slit along the fold, x = 0, if it lies there."""
+    if abs(notch.at[0]) > SYMMETRIC or len(notch.base) > 1:
+        return notch
+    upright = np.array([0.0, 1.0])
+    return replace(
+        notch, at=notch.at * upright, base=(notch.base[0] * upright,),
+        direction=np.sign(notch.direction[1]) * upright,
+    )  # fmt: skip
 
 
 def _kept_notches(

@@ -184,6 +184,9 @@ def _corner_between(pieces: Mapping[str, Piece], seam: str, sides: Sequence[tupl
         seam: its name.
         sides: each side's edge, and whether its last point is the corner.
     """
+    # The ends of a strip are cut straight across, wherever on a piece they come to lie.
+    if len({pieces[side.piece].role == "strip" for side, _ in sides}) > 1:
+        return None
     pairs, outer = [], []
     for side, at_end in sides:
         edges = pieces[side.piece].edges

@@ -52,8 +52,9 @@ class CutTable(Table):
     the waist in a skirt, the dart ends. `at` names the line on which its mouth lies, as "shoulder left". `towards` puts it
     between two lines, `between` at that share of the way. `mouth_mm` is how wide it opens, or `like` another dart of its
     piece; the energy that this costs is told. With `pleat_mm` it is a pleat: folded, sewn this far from its mouth, and open
-    below. It is `mirrored` unless that is false. A `part` of [0, 1] is a seam, which parts the piece. `omit` leaves out the
-    dart that the form's `shape` has there.
+    below. It is `mirrored` unless that is false. A `part` of [0, 1] is a seam, which parts the piece; one with both shares
+    inside is a dart with two tips, and `mouth_mm` its width half-way between them. `omit` leaves out the dart that the form's
+    `shape` has there.
     """
 
     name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None

@@ -151,6 +151,11 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
     cuts = _cuts_without(scene, old)
     if into == "nothing":
         return scene_with(scene, cuts=cuts)
+    eyes = {f"{name}.{eye}" for name, piece in garment.form.pieces.items() for eye in piece.eyes}
+    if into != "seam" and any(f"{old.piece}.{old.name}{side}" in eyes for side in ("", " left", " right")):
+        raise InputError(
+            f"dart {dart!r} has no mouth on the border, so it cannot become {into}; turn it into seam or nothing"
+        )
     if into == "pleat":
         pleat = cut_of_dart(replace(old, pleat_mm=PLEAT_MM))
         return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), pleat])

@@ -298,10 +298,11 @@ def _try(base: FormTrial, cut: Mapping[str, Any]) -> FormEntry:
 
 
 def _mouth(garment: Garment, dart: PlacedDart) -> float:
-    """Return how wide a dart opens on the border [m], negative where its legs overlap."""
+    """Return how wide a dart opens at most [m], negative where its legs overlap."""
     piece, positions = garment.form.pieces[dart.piece], garment.pieces[dart.piece].positions
-    left, right = (positions[piece.edges[leg]] for leg in piece.darts[dart.name])
-    inwards, across = left[-1] - left[0], right[-1] - left[0]
+    left, right = (positions[leg] for leg in piece.legs()[dart.name])
+    widest = int(np.linalg.norm(left - right, axis=1).argmax())
+    inwards, across = left[-1] - left[0], right[widest] - left[widest]
     # Along the border, counter-clockwise, the gap lies on the right of the left leg.
     open_ = inwards[0] * across[1] - inwards[1] * across[0] < 0.0
     return float(np.linalg.norm(across)) * (1.0 if open_ else -1.0)
