@@ -23,7 +23,12 @@ from warpflat.draping.mesh_pieces import FlatMesh, Weld
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["draw_together", "wrap_pieces"]
+__all__ = ["UNITS", "draw_together", "wrap_pieces"]
+
+#: Where a file's units stand.
+UNITS = "are its units right (in DXF the text UNITS or $INSUNITS, in SVG width and viewBox)?"
+# Cloth around less than this share of the body's waist is no garment for it.
+_LEAST_GIRTH = 0.5
 
 # The trunk is rolled up as an ellipse so many times as wide as deep.
 _WIDTH_OVER_DEPTH = 1.4
@@ -72,7 +77,7 @@ def wrap_pieces(
         top: the highest point of what does not hang from the shoulders: a level of the body or a height [m]; its waist if not given.
 
     Raises:
-        InputError: a piece hangs together with no other, or a level is unknown.
+        InputError: a piece hangs together with no other, the pieces go around half the waist only, or a level is unknown.
     """
     at = dict(at or {})
     for name in meshes:
@@ -92,6 +97,11 @@ def wrap_pieces(
     else:
         level = _height(body, "waist" if top is None else top)
     waist = body.line("waist")
+    girth = float(np.linalg.norm(np.diff(waist, axis=0, append=waist[:1]), axis=1).sum())
+    if width < _LEAST_GIRTH * girth:
+        raise InputError(
+            f"the pattern goes {1e3 * width:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {UNITS} Is a piece missing?"
+        )
     origin = np.array([0.0, level - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
     frame = _Frame(origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     placed = {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in plane.items()}
