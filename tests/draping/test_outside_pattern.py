@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from warpflat.draping.lift import read_lift, whole_lifts
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.whole_pieces import whole_pieces
+from warpflat.draping.wrap_pieces import wrap_pieces
 from warpflat.export.dxf import write_dxf
 from warpflat.export.read_dxf import read_dxf
 from warpflat.export.read_svg import read_svg
@@ -259,6 +261,28 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(Garment(name="rag", pieces={"": list(pattern.pieces[""])}), body, fabric=worn.cloth.fabric)
     with pytest.raises(InputError, match=r"has no designed surface; name a body"):
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
+
+
+def test_a_gathered_skirt_goes_around_the_body_by_its_own_width():
+    """Front and back lie before and behind the body, above each other, though the skirt is 1.6 times as wide as its top."""
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    top, skirt = tube(0.45, 0.2), tube(0.72, 0.5)
+    names = {"front": "front skirt", "back": "back skirt"}
+    lower = [replace(piece, name=names[piece.name]) for piece in skirt.pieces[""]]
+    sides = [
+        seam(f"skirt {a}", f"{b} skirt.e2", f"{c} skirt.e4")
+        for a, b, c in (("left", "front", "back"), ("right", "back", "front"))
+    ]
+    waists = [seam(f"waist {name}", f"{name}.e1", f"{name} skirt.e3", ease=0.45 / 0.72 - 1.0) for name in names]
+    pieces, seams, _ = whole_pieces([*top.pieces[""], *lower], [*top.seams, *sides, *waists])
+    meshes, welds = mesh_pieces(pieces, seams, 0.03)
+    placed = wrap_pieces(meshes, welds, body)
+    for name, points in placed.items():
+        assert np.sign(points[:, 2].mean()) == (1.0 if name.startswith("front") else -1.0)
+        assert abs(points[:, 0].mean()) < 0.01
+    widths = {name: np.ptp(points[:, 0]) for name, points in placed.items()}
+    assert widths["back skirt"] == pytest.approx(1.6 * widths["back"], rel=0.02)
+    assert placed["front skirt"][:, 1].max() == pytest.approx(placed["front"][:, 1].min(), abs=1e-6)
 
 
 def test_a_tube_that_nothing_holds_falls_off():
