@@ -221,21 +221,25 @@ def _tiers(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> list[list
 def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[bool, float, bool]:
     """Return whether the pieces hang from seams over the shoulders, the way around, and whether an upright seam meets behind the body.
 
-    The way around is how far apart the edges lie that meet there [m], or the width of all pieces.
+    The way around is how far apart the edges lie that meet there [m], or the width of all pieces. Edges half as far apart are those
+    of shoulders or, upright, those inside a leg.
     """
-    points = np.concatenate(list(plane.values()))
-    whole, middle = float(np.ptp(points[:, 0])), 0.5 * float(points[:, 1].min() + points[:, 1].max())
-    around, shoulders, meets = [(0.0, whole)], False, False
+    whole = float(np.ptp(np.concatenate(list(plane.values()))[:, 0]))
+    around, shoulders = list[float](), False
     for join in joins:
         rows = join.points(plane)
         apart = abs(float((rows[0] - rows[1])[:, 0].mean()))
-        if apart > _FAR * whole:
-            around.append((float(min(np.ptp(row[:, 1]) for row in rows)), apart))
-            meets = meets or all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in rows)
-            level = float(min(row[:, 1].mean() for row in rows))
+        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in rows):
+            around += [apart] if apart > _FAR * whole else []
+        elif apart > _FAR * whole:
             flat = all(np.ptp(row[:, 0]) > 0.5 * np.ptp(row[:, 1]) for row in rows)
-            shoulders = shoulders or (flat and level > middle)
-    return shoulders, max(around)[1], meets
+            # A waistband's seam is at the top of what it holds, but not of itself.
+            on_top = all(
+                row[:, 1].mean() > 0.5 * (plane[name][:, 1].min() + plane[name][:, 1].max())
+                for name, row in zip(join.pieces, rows, strict=True)
+            )
+            shoulders = shoulders or (flat and on_top)
+    return shoulders, max(around, default=whole), bool(around)
 
 
 def _height(body: Mannequin, top: str | float) -> float:
