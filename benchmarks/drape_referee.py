@@ -18,15 +18,20 @@ import numpy as np
 import warp as wp
 
 import warpflat
+from warpflat.draping.body import Body
+from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.surface.triangles import triangulate
 
 
-def newton_drape(drape: warpflat.Drape, *, steps: int, step_s: float = 1.0 / 600.0, iterations: int = 10) -> np.ndarray:
-    """Let Newton's Style3D bring the cloth of a drape to rest from its start; return its places, #V by 3 [m]."""
+def newton_drape(
+    cloth: SewnCloth, body: Body | None, *, steps: int, friction: float = 0.3, held: np.ndarray | None = None,
+    step_s: float = 1.0 / 600.0, iterations: int = 10,
+) -> np.ndarray:  # fmt: skip
+    """Let Newton's Style3D bring cloth to rest from its designed surface; return its places, #V by 3 [m]."""
     import newton
     from newton.solvers import style3d
 
-    cloth, body, fabric = drape.cloth, drape.body, drape.cloth.fabric
+    fabric = cloth.fabric
     faces, _ = triangulate(cloth.faces)
     panel, _ = triangulate(cloth.flat_faces)
     # Style3D's first axis is x of the panel, the weft.
@@ -39,11 +44,13 @@ def newton_drape(drape: warpflat.Drape, *, steps: int, step_s: float = 1.0 / 600
         tri_aniso_ke=wp.vec3(fabric.stiffness_weft, fabric.stiffness_warp, fabric.shear_stiffness),
         edge_aniso_ke=wp.vec3(fabric.bending),
     )  # fmt: skip
-    mesh: Any = newton.Mesh(
-        body.vertices.astype(np.float32), body.triangles.ravel().astype(np.int32), compute_inertia=False
-    )
-    friction = drape.options.friction
-    builder.add_shape_mesh(body=-1, mesh=mesh, cfg=newton.ModelBuilder.ShapeConfig(mu=friction))
+    for vertex in [] if held is None else np.flatnonzero(held):
+        builder.particle_flags[vertex] &= ~newton.ParticleFlags.ACTIVE
+    if body is not None:
+        mesh: Any = newton.Mesh(
+            body.vertices.astype(np.float32), body.triangles.ravel().astype(np.int32), compute_inertia=False
+        )
+        builder.add_shape_mesh(body=-1, mesh=mesh, cfg=newton.ModelBuilder.ShapeConfig(mu=friction))
     model = builder.finalize("cpu")
     model.soft_contact_ke, model.soft_contact_kd, model.soft_contact_mu = 1e3, 1e-5, friction
     solver = newton.solvers.SolverStyle3D(model, config=newton.solvers.SolverStyle3D.Config(iterations=iterations))
@@ -51,7 +58,8 @@ def newton_drape(drape: warpflat.Drape, *, steps: int, step_s: float = 1.0 / 600
     contacts = pipeline.contacts()
     now, after, control = model.state(), model.state(), model.control()
     for number in range(steps):
-        pipeline.collide(now, contacts)
+        if body is not None:
+            pipeline.collide(now, contacts)
         now.clear_forces()
         solver.step(now, after, control, contacts, step_s)
         now, after = after, now
@@ -94,7 +102,7 @@ def main() -> None:
     garment = warpflat.flatten_form(body, body.form("bodice"), fabric=given.fabric)
     ours = warpflat.drape(garment, options=warpflat.DrapeOptions(compression=given.compression))
     began = time.process_time()
-    places = newton_drape(ours, steps=given.steps)
+    places = newton_drape(ours.cloth, ours.body, steps=given.steps, friction=ours.options.friction)
     print(f"processor seconds: ours {ours.worn.seconds:.1f} (wall), Newton {time.process_time() - began:.1f}")
     theirs = replace(ours, worn=replace(ours.worn, positions=places))
     show(f"warpflat, {'at rest' if ours.converged else 'NOT AT REST'}", ours)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from warpflat.draping.drape_garment import drape
     from warpflat.draping.drape_pattern import Placement, drape_pattern
     from warpflat.draping.options import DrapeOptions
+    from warpflat.draping.recover_pattern import Recovery, recover_pattern
     from warpflat.draping.result import Drape
     from warpflat.draping.write import save_drape
     from warpflat.export.read_dxf import read_dxf
@@ -112,6 +113,7 @@ _HOME = {
     "PatternOptions": "garment.pattern_files",
     "Placement": "draping.drape_pattern",
     "Progress": "flattening.progress",
+    "Recovery": "draping.recover_pattern",
     "RelaxOptions": "solver.options",
     "RelaxationStep": "flattening.step_by_step",
     "Remedy": "flattening.fit_report",
@@ -155,6 +157,7 @@ _HOME = {
     "read_pattern_json": "export.read_pattern_json",
     "read_surface": "surface.io.read",
     "read_svg": "export.read_svg",
+    "recover_pattern": "draping.recover_pattern",
     "relaxation": "flattening.step_by_step",
     "run_scene": "scene.run",
     "save_comparison": "scene.compare",
@@ -186,6 +189,7 @@ __all__ = [
     "PatternOptions",
     "Placement",
     "Progress",
+    "Recovery",
     "RelaxOptions",
     "RelaxationStep",
     "Remedy",
@@ -230,6 +234,7 @@ __all__ = [
     "read_pattern_json",
     "read_surface",
     "read_svg",
+    "recover_pattern",
     "relaxation",
     "run_scene",
     "save_comparison",

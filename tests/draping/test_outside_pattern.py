@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import ezdxf
@@ -16,6 +18,7 @@ from warpflat.draping.lift import read_lift, whole_lifts
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.whole_pieces import whole_pieces
+from warpflat.draping.wrap_pieces import wrap_pieces
 from warpflat.export.dxf import write_dxf
 from warpflat.export.read_dxf import read_dxf
 from warpflat.export.read_svg import read_svg
@@ -197,6 +200,44 @@ def test_cad_files_of_other_habits_are_read(header: int, text: str, scale: float
         assert 0.4 < lengths[2] < 0.41
 
 
+def test_an_open_outline_is_refused_beside_a_closed_one(tmp_path: Path):
+    """It would be lost without a word; lines that belong to a piece or go around nothing are left alone."""
+    document, corners = ezdxf.new("R2010"), [(0, 0), (500, 0), (470, 600), (30, 600)]
+    document.header["$INSUNITS"] = 4
+    space = document.modelspace()
+    space.add_lwpolyline(corners, close=True)
+    space.add_line((250, 100), (250, 500))
+    space.add_lwpolyline([(100, 400), (100, 300), (200, 300), (200, 400)])
+    space.add_line((-100, 0), (-100, 600))
+    shifted = [(x + 700, y) for x, y in corners]
+    for a, b in pairwise(shifted):
+        space.add_line(a, b)
+    file = tmp_path / "skirt.dxf"
+    last = space.add_line(shifted[-1], shifted[0])
+    document.saveas(file)
+    assert len(read_dxf(file).pieces[""]) == 2
+    last.dxf.end = (700, 4)
+    document.saveas(file)
+    with pytest.raises(InputError, match=r"an outline is open by 4.0 mm at \(700, [04]\) mm; join its ends"):
+        read_dxf(file)
+    paths = '<path id="a" d="M0,0 H500 V600 H0 {}"/><path id="b" d="M700,0 H1200 V600 H700 {}"/>'
+    page = '<svg xmlns="http://www.w3.org/2000/svg" width="1300mm" viewBox="0 0 1300 700">{}</svg>'
+    drawing = tmp_path / "skirt.svg"
+    drawing.write_text(page.format(paths.format("Z", "Z")))
+    assert [piece.name for piece in read_svg(drawing).pieces[""]] == ["a", "b"]
+    drawing.write_text(page.format(paths.format("Z", "")))
+    with pytest.raises(InputError, match=r"an outline is open by 600.0 mm"):
+        read_svg(drawing)
+
+
+def test_a_pattern_in_the_wrong_units_is_refused():
+    body, fabric = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0), warpflat.find_fabric("woven")
+    with pytest.raises(InputError, match=r"the largest, is 0.5 by 0.2 mm; .* are its units right"):
+        drape_pattern(tube(0.475e-3, 0.25e-3), body, fabric=fabric)
+    with pytest.raises(InputError, match=r"goes 242 mm around the body, whose waist has 7\d\d mm: are its units right"):
+        drape_pattern(tube(0.121, 0.064), body, fabric=fabric)
+
+
 def test_a_tube_is_put_around_the_body():
     body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
     pattern = tube(0.475, 0.25)  # a little tight, so that it stays on the hips
@@ -220,6 +261,28 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(Garment(name="rag", pieces={"": list(pattern.pieces[""])}), body, fabric=worn.cloth.fabric)
     with pytest.raises(InputError, match=r"has no designed surface; name a body"):
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
+
+
+def test_a_gathered_skirt_goes_around_the_body_by_its_own_width():
+    """Front and back lie before and behind the body, above each other, though the skirt is 1.6 times as wide as its top."""
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    top, skirt = tube(0.45, 0.2), tube(0.72, 0.5)
+    names = {"front": "front skirt", "back": "back skirt"}
+    lower = [replace(piece, name=names[piece.name]) for piece in skirt.pieces[""]]
+    sides = [
+        seam(f"skirt {a}", f"{b} skirt.e2", f"{c} skirt.e4")
+        for a, b, c in (("left", "front", "back"), ("right", "back", "front"))
+    ]
+    waists = [seam(f"waist {name}", f"{name}.e1", f"{name} skirt.e3", ease=0.45 / 0.72 - 1.0) for name in names]
+    pieces, seams, _ = whole_pieces([*top.pieces[""], *lower], [*top.seams, *sides, *waists])
+    meshes, welds = mesh_pieces(pieces, seams, 0.03)
+    placed = wrap_pieces(meshes, welds, body)
+    for name, points in placed.items():
+        assert np.sign(points[:, 2].mean()) == (1.0 if name.startswith("front") else -1.0)
+        assert abs(points[:, 0].mean()) < 0.01
+    widths = {name: np.ptp(points[:, 0]) for name, points in placed.items()}
+    assert widths["back skirt"] == pytest.approx(1.6 * widths["back"], rel=0.02)
+    assert placed["front skirt"][:, 1].max() == pytest.approx(placed["front"][:, 1].min(), abs=1e-6)
 
 
 def test_a_tube_that_nothing_holds_falls_off():

@@ -25,6 +25,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
+from warpflat.draping.moved_pattern import edge_lengths, largest_share, pieces_of, seam_edges, seam_rows, with_pattern
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
@@ -42,8 +43,6 @@ _LEAST_SHEAR = 0.05
 _SEAM, _HOLD = 1e3, 1e-8
 # A round that lowers the misfit by less than this share is the last; a step that does not lower it is halved so often.
 _LEAST_GAIN, _HALVINGS = 0.02, 2
-# No cell shrinks below this share of its area in a round.
-_LEAST_AREA = 0.5
 # So much more of the area may be strained beyond the cloth's limit.
 _MORE_STRAINED = 0.01
 
@@ -90,7 +89,7 @@ class Correction:
         """Return by "piece.edge" how far the outline moves outwards [m], on the mean and at most, and how much longer it becomes [m]."""
         old, new, moved = self.before.cloth, self.after.cloth, self.moved()
         found = {}
-        for name, piece in _pieces(garment).items():
+        for name, piece in pieces_of(garment).items():
             begin = old.piece_vertices[name].start
             on_outline = set(np.unique(outline_edges(piece.faces)).tolist())
             for edge, ids in piece.network.surface.lines.items():
@@ -106,22 +105,17 @@ class Correction:
     def seam_difference(self) -> float:
         """Return by how much the two sides of any edge of a seam differ more in length than before [m]."""
         old, new = self.before.cloth, self.after.cloth
-        seams = _seam_edges(old)
+        seams = seam_edges(old)
         if not len(seams):
             return 0.0
         before, after = (
-            _edge_lengths(each.flat, seams[:, 0]) - _edge_lengths(each.flat, seams[:, 1]) for each in (old, new)
+            edge_lengths(each.flat, seams[:, 0]) - edge_lengths(each.flat, seams[:, 1]) for each in (old, new)
         )
         return float(np.abs(after - before).max())
 
     def apply(self, garment: Garment | Flattening) -> Garment | Flattening:
         """Return the garment, or the piece, with the corrected pattern."""
-        cloth = self.after.cloth
-        pieces = {
-            name: replace(piece, positions=cloth.flat[cloth.piece_vertices[name]], fabric=cloth.fabric)
-            for name, piece in _pieces(garment).items()
-        }
-        return replace(garment, pieces=pieces) if isinstance(garment, Garment) else next(iter(pieces.values()))
+        return with_pattern(garment, self.after.cloth)
 
     def measures(self, garment: Garment | Flattening) -> dict[str, object]:
         """Return the entry `correction` of `metrics.json`."""
@@ -146,7 +140,6 @@ def correct_pattern(
     hold: Sequence[str] = (),
     fabric: Fabric | None = None,
     worn_shape: bool = False,
-    bridging: bool = True,
     rounds: int = 6,
     wanted: float = 0.0,
     callback: Callable[[int, Round], None] | None = None,
@@ -160,7 +153,6 @@ def correct_pattern(
         hold: lines that stay where they are, as in :func:`warpflat.drape`.
         fabric: another cloth for the corrected pattern; that of the drape if not given.
         worn_shape: whether the shape as it is worn in `drape` is wanted, rather than the designed one.
-        bridging: whether the designed surface may have hollows that cloth cannot follow; without effect for a worn shape.
         rounds: the most.
         wanted: misfit on the mean at which it ends [m].
         callback: called with the number of each round and its misfit.
@@ -170,8 +162,7 @@ def correct_pattern(
     """
     if not drape.converged:
         raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
-    bridging = bridging and not worn_shape
-    device, held = drape.body.device, held_vertices(drape.cloth, hold)
+    bridging, device, held = not worn_shape, drape.body.device, held_vertices(drape.cloth, hold)
     shape = drape.positions if worn_shape else drape.cloth.designed
     cloth = replace(drape.cloth, designed=shape, fabric=fabric or drape.cloth.fabric)
     designed = Body(shape, cloth.faces, device=device) if worn_shape else drape.designed
@@ -183,15 +174,15 @@ def correct_pattern(
     if worn_shape or fabric is not None:
         drape = wear(cloth)
     before = drape
-    seams = _seam_edges(cloth)
-    difference = _edge_lengths(cloth.flat, seams[:, 0]) - _edge_lengths(cloth.flat, seams[:, 1])
+    seams = seam_edges(cloth)
+    difference = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
     history, reason = [_round(drape, 0.0, bridging)], f"{rounds} rounds"
     for number in range(1, rounds + 1):
         if history[-1].misfit <= wanted:
             reason = "the misfit is as wanted"
             break
         step = _step(drape, seams, difference, bridging)
-        best, share = None, _largest_share(drape.cloth, step)
+        best, share = None, largest_share(drape.cloth, step)
         for _ in range(_HALVINGS + 1):
             trial = wear(replace(drape.cloth, flat=drape.cloth.flat + share * step))
             now = _round(trial, share, bridging)
@@ -214,10 +205,6 @@ def correct_pattern(
             reason = "the misfit hardly falls any more"
             break
     return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
-
-
-def _pieces(garment: Garment | Flattening) -> dict[str, Flattening]:
-    return dict(garment.pieces) if isinstance(garment, Garment) else {garment.surface.name: garment}
 
 
 def _round(drape: Drape, share: float, bridging: bool) -> Round:
@@ -267,8 +254,8 @@ def _step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool)
         matrix = matrix + b.T @ weighted
         right += weighted.T @ target
     if len(seams):
-        b = _seam_rows(cloth.flat, seams)
-        now = _edge_lengths(cloth.flat, seams[:, 0]) - _edge_lengths(cloth.flat, seams[:, 1])
+        b = seam_rows(cloth.flat, seams)
+        now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
         weight = _SEAM * threads
         matrix = matrix + weight * (b.T @ b)
         right += weight * (b.T @ (difference - now))
@@ -284,51 +271,6 @@ def _lengths(x: FloatArray, gradient: FloatArray) -> FloatArray:
     weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
     products = [0.5 * (warp * warp).sum(axis=1), 0.5 * (weft * weft).sum(axis=1), (warp * weft).sum(axis=1)]
     return np.stack(products, axis=1)
-
-
-def _seam_edges(cloth: SewnCloth) -> IntArray:
-    """Return the edges of the outlines that are sewn together, #S by 2 edges by 2 vertices of `flat` in corresponding order."""
-    edges = outline_edges(cloth.flat_faces)
-    sewn = cloth.welded[edges]
-    turned = sewn[:, 0] > sewn[:, 1]
-    edges[turned], sewn[turned] = edges[turned][:, ::-1], sewn[turned][:, ::-1]
-    order = np.lexsort((sewn[:, 1], sewn[:, 0]))
-    same = (sewn[order][1:] == sewn[order][:-1]).all(axis=1) & (sewn[order][1:, 0] != sewn[order][1:, 1])
-    first = np.flatnonzero(same)
-    return np.stack([edges[order[first]], edges[order[first + 1]]], axis=1)
-
-
-def _edge_lengths(flat: FloatArray, edges: IntArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1))
-
-
-def _seam_rows(flat: FloatArray, seams: IntArray) -> coo_array:
-    """Return the change of the difference in length of the two sides by the displacement of the vertices, #S by 2 #P."""
-    rows, columns, values = [], [], []
-    for side, sign in ((0, 1.0), (1, -1.0)):
-        ends = seams[:, side]
-        along = flat[ends[:, 1]] - flat[ends[:, 0]]
-        unit = sign * along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)
-        for end, of_end in ((0, -unit), (1, unit)):
-            rows.append(np.repeat(np.arange(len(seams)), 2))
-            columns.append((2 * ends[:, end, None] + np.arange(2)).ravel())
-            values.append(of_end.ravel())
-    shape = (len(seams), 2 * len(flat))
-    return coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape).tocsr()
-
-
-def _largest_share(cloth: SewnCloth, step: FloatArray) -> float:
-    """Return the largest share of a step, of 1, 1/2, 1/4 ..., that leaves every cell enough of its area."""
-    corner, _, _ = corner_triangles(cloth.flat_faces)
-
-    def areas(flat: FloatArray) -> FloatArray:
-        a, b = flat[corner[:, 1]] - flat[corner[:, 0]], flat[corner[:, 2]] - flat[corner[:, 0]]
-        return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-
-    before, share = areas(cloth.flat), 1.0
-    while share > 1e-3 and (areas(cloth.flat + share * step) < _LEAST_AREA * before).any():
-        share *= 0.5
-    return share
 
 
 def _directed(edges: IntArray, faces: IntArray) -> IntArray:

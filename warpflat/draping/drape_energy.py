@@ -70,7 +70,7 @@ class DrapeEnergy:
         laplacian, stiffness = cloth.laplacian()
         self._pattern = _BlockPattern(corner, count)
         fabric, vertex_area = cloth.fabric, cloth.vertex_areas()
-        law = _law(fabric, options.compression, device)
+        self._law = law = _law(fabric, options.compression, device)
         self._far_law = _law(fabric, max(options.compression, _FAR_COMPRESSION), device)
         # Of the shortest waves on the mesh, two edges long, bending holds as much as this tension.
         self._near_pull = fabric.bending * np.pi**2 / float(vertex_area.mean())
@@ -153,23 +153,35 @@ class DrapeEnergy:
     def factor(self, positions: FloatArray, *, near: bool) -> None:
         """Factor the stiffness of the cloth somewhere, from where on it is the metric.
 
-        Bending enters as a tension only: as it is, it would treble the entries of the factor.
-
         Args:
             positions: #V by 3, where the cloth is [m].
             near: whether rest is near, for steps by Newton's method; else the metric is stiffer, for L-BFGS.
         """
-        self.motion.position.assign(positions)
-        cells = wp.zeros(9 * len(self._cell_energy), wp.mat33d, self.device)
-        vertices = self._zeros(wp.mat33d)
-        least = float(self.weight.mean()) / _LONGEST_STEP
-        at = {"device": self.device, "least": 512}
-        inputs = [*self._cells[:-1], *((self._cells[-1], self._near_pull) if near else (self._far_law, _FAR_PULL))]
-        launch_each(stiffen_cloth, len(self._cell_energy), inputs, [cells], **at)
-        launch_each(stiffen_contact, self._count, [self.motion, self.contact, least], [vertices], **at)
-        matrix = self._pattern.matrix(cells.numpy(), vertices.numpy())
+        matrix = self.stiffness(positions, near=near)
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         self._solve = lambda force: factor.solve(np.ascontiguousarray(force.ravel())).reshape(-1, 3)
+
+    def stiffness(self, positions: FloatArray, *, near: bool = True) -> csc_array:
+        """Return the stiffness of cloth, body and friction somewhere, 3 #V by 3 #V [N/m], without what is negative.
+
+        Bending enters as a tension only: as it is, it would treble the entries of the factor.
+        """
+        vertices, least = self._zeros(wp.mat33d), float(self.weight.mean()) / _LONGEST_STEP
+        cells = self._cell_stiffness(positions, *((self._law, self._near_pull) if near else (self._far_law, _FAR_PULL)))
+        inputs = [self.motion, self.contact, least]
+        launch_each(stiffen_contact, self._count, inputs, [vertices], device=self.device, least=512)
+        return self._pattern.matrix(cells, vertices.numpy())
+
+    def cell_stiffness(self, positions: FloatArray) -> FloatArray:
+        """Return the stiffness of each cell somewhere by its corners, #C by 3 by 3 corners by 3 by 3 coordinates [N/m]."""
+        return self._cell_stiffness(positions, self._law, 0.0).reshape(-1, 3, 3, 3, 3)
+
+    def _cell_stiffness(self, positions: FloatArray, law: Cloth, pull: float) -> FloatArray:
+        self.motion.position.assign(positions)
+        count = len(self._cell_energy)
+        cells = wp.zeros(9 * count, wp.mat33d, self.device)
+        launch_each(stiffen_cloth, count, [*self._cells[:-1], law, pull], [cells], device=self.device, least=512)
+        return cells.numpy().copy()
 
     def solver(self, point: WornPoint) -> Solve:
         """Return the solution by the last factor."""

@@ -21,13 +21,16 @@ from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.draping.whole_pieces import whole_pieces
-from warpflat.draping.wrap_pieces import draw_together, wrap_pieces
+from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.pieces import Garment, Piece
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["Placement", "drape_pattern"]
+
+# The largest piece of a garment is between so short and so long [m].
+_SIZES = (0.05, 10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +92,7 @@ def drape_pattern(
         raise InputError(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
+    _check_size(pieces)
     meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
     start_warp()
     where = wp.get_device(device)
@@ -116,6 +120,24 @@ def drape_pattern(
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
+
+
+def _check_size(pieces: Mapping[str, Piece]) -> None:
+    """Refuse a pattern in the wrong units.
+
+    Raises:
+        InputError: its largest piece is smaller or larger than any garment's.
+    """
+    sizes = {
+        name: np.ptp(np.concatenate([edge.points for edge in piece.edges]), axis=0) for name, piece in pieces.items()
+    }
+    name = max(sizes, key=lambda each: float(sizes[each].max()))
+    wide, high = sizes[name]
+    if not _SIZES[0] <= max(wide, high) <= _SIZES[1]:
+        raise InputError(
+            f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
+            f"and {1e3 * _SIZES[1]:.0f} mm long: {UNITS}"
+        )
 
 
 def _sew(

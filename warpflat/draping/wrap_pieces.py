@@ -1,10 +1,10 @@
 """Flat pieces are wrapped around a body by their seams, and drawn together there: where an outside pattern starts to be draped.
 
 The pieces around the trunk are laid beside and upon each other in the plane, each by the longest seam (longest upwards) that
-joins it to one that lies. The plane is rolled up around the trunk, so that its first and last edge meet. A sleeve is rolled up
-around its arm. Then the seams are closed, and the cloth is drawn together as rigidly as it can be, outside the body, by
-projective dynamics (Bouaziz et al. 2014): each triangle is laid as near to its place as it goes without strain, and one
-sparse factor joins them.
+joins it to one that lies. The plane is rolled up around the trunk, so that its first and last edge meet; a tier that goes around
+the body by itself, such as a gathered skirt, by its own width. A sleeve is rolled up around its arm. Then the seams are closed,
+and the cloth is drawn together as rigidly as it can be, outside the body, by projective dynamics (Bouaziz et al. 2014): each
+triangle is laid as near to its place as it goes without strain, and one sparse factor joins them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,12 @@ from warpflat.draping.mesh_pieces import FlatMesh, Weld
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["draw_together", "wrap_pieces"]
+__all__ = ["UNITS", "draw_together", "wrap_pieces"]
+
+#: Where a file's units stand.
+UNITS = "are its units right (in DXF the text UNITS or $INSUNITS, in SVG width and viewBox)?"
+# Cloth around less than this share of the body's waist is no garment for it.
+_LEAST_GIRTH = 0.5
 
 # The trunk is rolled up as an ellipse so many times as wide as deep.
 _WIDTH_OVER_DEPTH = 1.4
@@ -72,7 +77,7 @@ def wrap_pieces(
         top: the highest point of what does not hang from the shoulders: a level of the body or a height [m]; its waist if not given.
 
     Raises:
-        InputError: a piece hangs together with no other, or a level is unknown.
+        InputError: a piece hangs together with no other, the pieces go around half the waist only, or a level is unknown.
     """
     at = dict(at or {})
     for name in meshes:
@@ -84,7 +89,7 @@ def wrap_pieces(
     fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
     joins = _joins(meshes, welds, set(trunk))
     plane = _lay_out(meshes, joins, trunk, fronts or trunk[:1])
-    hangs_from_shoulder, width = _girth(plane, joins)
+    hangs_from_shoulder, width, _ = _girth(plane, joins)
     points = np.concatenate(list(plane.values()))
     high = float(points[:, 1].max())
     if hangs_from_shoulder and top is None:
@@ -92,9 +97,23 @@ def wrap_pieces(
     else:
         level = _height(body, "waist" if top is None else top)
     waist = body.line("waist")
+    girth = float(np.linalg.norm(np.diff(waist, axis=0, append=waist[:1]), axis=1).sum())
+    if width < _LEAST_GIRTH * girth:
+        raise InputError(
+            f"the pattern goes {1e3 * width:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {UNITS} Is a piece missing?"
+        )
     origin = np.array([0.0, level - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
     frame = _Frame(origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-    placed = {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in plane.items()}
+    placed: dict[str, FloatArray] = {}
+    for tier in _tiers(plane, joins):
+        own = {name: plane[name] for name in tier}
+        inner = [join for join in joins if set(join.pieces) <= own.keys()]
+        _, of_tier, meets = _girth(own, inner)
+        if meets:
+            centred = _centred(own, of_tier, [name for name in fronts if name in own])
+            placed |= {name: frame.roll(flat, of_tier, _WIDTH_OVER_DEPTH) for name, flat in centred.items()}
+        else:
+            placed |= {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in own.items()}
     for name, side in at.items():
         if side.endswith(" arm"):
             placed[name] = _around_arm(meshes[name].points, body, side.removesuffix(" arm"))
@@ -177,26 +196,50 @@ def _lay_out(
                 f"piece {lost!r} is sewn to no other around the trunk; join it by a seam, or say in [[pieces]] where it is"
             )
     plane = {name: points + shift[name] for name, points in flat.items()}
-    width = max(_girth(plane, joins)[1], 1e-6)
+    return _centred(plane, _girth(plane, joins)[1], fronts)
+
+
+def _centred(plane: Mapping[str, FloatArray], width: float, fronts: Sequence[str]) -> dict[str, FloatArray]:
+    """Shift pieces so that the middle of the fronts is at 0, around a circumference; as they are without fronts."""
+    width = max(width, 1e-6)
     turn = sum(np.exp(2j * np.pi * plane[name][:, 0] / width).mean() for name in fronts)
     middle = np.angle(turn) * width / (2 * np.pi)
     return {name: points - [middle, 0.0] for name, points in plane.items()}
 
 
-def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[bool, float]:
-    """Return whether the pieces hang from seams over the shoulders, and how far apart the edges lie that meet behind the body [m]."""
-    points = np.concatenate(list(plane.values()))
-    whole, middle = float(np.ptp(points[:, 0])), 0.5 * float(points[:, 1].min() + points[:, 1].max())
-    around, shoulders = [(0.0, whole)], False
+def _tiers(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> list[list[str]]:
+    """Return the pieces in tiers above each other: those of one are joined by upright seams."""
+    tiers = {name: {name} for name in plane}
+    for join in joins:
+        a, b = join.pieces
+        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane)):
+            merged = tiers[a] | tiers[b]
+            tiers |= dict.fromkeys(merged, merged)
+    return [list(names) for names in {id(tier): sorted(tier) for tier in tiers.values()}.values()]
+
+
+def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[bool, float, bool]:
+    """Return whether the pieces hang from seams over the shoulders, the way around, and whether an upright seam meets behind the body.
+
+    The way around is how far apart the edges lie that meet there [m], or the width of all pieces. Edges half as far apart are those
+    of shoulders or, upright, those inside a leg.
+    """
+    whole = float(np.ptp(np.concatenate(list(plane.values()))[:, 0]))
+    around, shoulders = list[float](), False
     for join in joins:
         rows = join.points(plane)
         apart = abs(float((rows[0] - rows[1])[:, 0].mean()))
-        if apart > _FAR * whole:
-            around.append((float(min(np.ptp(row[:, 1]) for row in rows)), apart))
-            level = float(min(row[:, 1].mean() for row in rows))
+        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in rows):
+            around += [apart] if apart > _FAR * whole else []
+        elif apart > _FAR * whole:
             flat = all(np.ptp(row[:, 0]) > 0.5 * np.ptp(row[:, 1]) for row in rows)
-            shoulders = shoulders or (flat and level > middle)
-    return shoulders, max(around)[1]
+            # A waistband's seam is at the top of what it holds, but not of itself.
+            on_top = all(
+                row[:, 1].mean() > 0.5 * (plane[name][:, 1].min() + plane[name][:, 1].max())
+                for name, row in zip(join.pieces, rows, strict=True)
+            )
+            shoulders = shoulders or (flat and on_top)
+    return shoulders, max(around, default=whole), bool(around)
 
 
 def _height(body: Mannequin, top: str | float) -> float:

@@ -18,7 +18,7 @@ from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split
 from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_words import seams_of_words
 
-__all__ = ["outermost", "read_dxf"]
+__all__ = ["check_closed", "outermost", "read_dxf"]
 
 # Curves are flattened to within this [m].
 _FLAT = 2e-5
@@ -27,6 +27,9 @@ _METRES = {"METRIC": 1e-3, "ENGLISH": 0.0254}
 _METRES_OF_HEADER = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0}
 # Ends of lines that are nearer to each other than this share of the drawing meet.
 _MEET = 1e-5
+# A line whose ends lack less than this share of its length to meet, a side at most, is an outline that does not close, if it goes
+# around this share of the largest piece.
+_NEARLY_CLOSED, _LEAST_SHARE = 0.4, 0.1
 
 
 @dataclass
@@ -42,7 +45,10 @@ class _Block:
 
     def loops(self, layer: str) -> list[FloatArray]:
         """Return the closed lines of a layer, and those that its open lines form together (#P by 2 each)."""
-        return self.closed(layer) or _joined([points for points, _ in self.lines.get(layer, [])])
+        return [*self.closed(layer), *_joined(self.open(layer))]
+
+    def open(self, layer: str) -> list[FloatArray]:
+        return [points for points, closed in self.lines.get(layer, []) if not closed]
 
     def all_loops(self) -> list[FloatArray]:
         """Return the closed lines of all layers; boundary and sewing line hide what lies inside."""
@@ -95,6 +101,11 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
             Piece(name=f"piece_{n}", edges=split_outline(inset(ring * metres, allowance or 0.0, f"{path}: piece_{n}")))
             for n, ring in enumerate(outermost(style.all_loops()), start=1)
         ]
+    if not named:
+        for each in [style, *(block for name, block in blocks if name in inserted)]:
+            check_closed(
+                [line for layer in each.lines for line in each.open(layer)], each.all_loops(), metres, str(path)
+            )
     if not pieces:
         raise InputError(f"{path}: has no closed line; a piece is a closed line on layer 1 of a block")
     sizes: dict[str, list[Piece]] = {}
@@ -120,6 +131,29 @@ def outermost(loops: Iterable[FloatArray]) -> list[FloatArray]:
         if not any(other.contains(polygon.representative_point()) for _, other in found):
             found.append((ring, polygon))
     return [ring for ring, _ in found]
+
+
+def check_closed(lines: Sequence[FloatArray], loops: Iterable[FloatArray], metres: float, where: str) -> None:
+    """Refuse open lines (#P by 2) that nearly go around a piece, beside the closed ones: the piece would be lost.
+
+    Raises:
+        InputError: there are some.
+    """
+    import shapely
+
+    closed = [shapely.Polygon(ring).buffer(0) for ring in loops if len(ring) > 2]
+    pieces, least = shapely.union_all(closed), _LEAST_SHARE * max((each.area for each in closed), default=0.0)
+    for chain in shapely.get_parts(
+        shapely.line_merge(shapely.MultiLineString([line for line in lines if len(line) > 1]))
+    ):
+        points = np.array(chain.coords)
+        gap, area = float(np.linalg.norm(points[-1] - points[0])), float(shapely.convex_hull(chain).area)
+        round_something = len(points) > 2 and area > max(least, _LEAST_SHARE * (0.25 * chain.length) ** 2)
+        if round_something and gap < _NEARLY_CLOSED * chain.length and not pieces.intersects(chain.centroid):
+            at = ", ".join(f"{1e3 * metres * x:.0f}" for x in points[0])
+            raise InputError(
+                f"{where}: an outline is open by {1e3 * metres * gap:.1f} mm at ({at}) mm; join its ends, for a piece is a closed line"
+            )
 
 
 def _joined(lines: Sequence[FloatArray]) -> list[FloatArray]:

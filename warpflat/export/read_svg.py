@@ -14,7 +14,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import note_read
-from warpflat.export.read_dxf import outermost
+from warpflat.export.read_dxf import check_closed, outermost
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
 from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_words import seams_of_words
@@ -148,10 +148,14 @@ def _own_piece(group: ET.Element, matrix: FloatArray, words: dict[str, list[tupl
 
 def _other_pieces(root: ET.Element, page: FloatArray, allowance: float, file: str) -> list[Piece]:
     found: dict[int, tuple[FloatArray, str]] = {}
+    unclosed = list[FloatArray]()
     for element, matrix in _walk(root, page):
         for points, closed in _lines(element, matrix):
             if closed:
                 found[id(points)] = points, element.get(_LABEL) or element.get("id") or ""
+            else:
+                unclosed.append(points)
+    check_closed(unclosed, [points for points, _ in found.values()], 1.0, file)
     pieces, taken = [], set[str]()
     for number, ring in enumerate(outermost([points for points, _ in found.values()]), start=1):
         name = found[id(ring)][1] or f"piece_{number}"

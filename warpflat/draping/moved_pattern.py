@@ -1,0 +1,80 @@
+"""A pattern whose vertices move: the lengths of its seams' edges, the areas of its cells, and the garment with the new pattern."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.export.geometry import outline_edges
+from warpflat.flattening.result import Flattening
+from warpflat.garment.garment import Garment
+from warpflat.surface.triangles import corner_triangles
+
+__all__ = ["edge_lengths", "largest_share", "pieces_of", "seam_edges", "seam_rows", "with_pattern"]
+
+# No cell shrinks below this share of its area in a step.
+_LEAST_AREA = 0.5
+
+
+def seam_edges(cloth: SewnCloth) -> IntArray:
+    """Return the edges of the outlines that are sewn together, #S by 2 edges by 2 vertices of `flat` in corresponding order."""
+    edges = outline_edges(cloth.flat_faces)
+    sewn = cloth.welded[edges]
+    turned = sewn[:, 0] > sewn[:, 1]
+    edges[turned], sewn[turned] = edges[turned][:, ::-1], sewn[turned][:, ::-1]
+    order = np.lexsort((sewn[:, 1], sewn[:, 0]))
+    same = (sewn[order][1:] == sewn[order][:-1]).all(axis=1) & (sewn[order][1:, 0] != sewn[order][1:, 1])
+    first = np.flatnonzero(same)
+    return np.stack([edges[order[first]], edges[order[first + 1]]], axis=1)
+
+
+def edge_lengths(flat: FloatArray, edges: IntArray) -> FloatArray:
+    """Return the lengths of edges (#E by 2) [m]."""
+    return np.asarray(np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1))
+
+
+def seam_rows(flat: FloatArray, seams: IntArray) -> csr_array:
+    """Return the change of the difference in length of the two sides by the displacement of the vertices, #S by 2 #P."""
+    rows, columns, values = [], [], []
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        ends = seams[:, side]
+        along = flat[ends[:, 1]] - flat[ends[:, 0]]
+        unit = sign * along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)
+        for end, of_end in ((0, -unit), (1, unit)):
+            rows.append(np.repeat(np.arange(len(seams)), 2))
+            columns.append((2 * ends[:, end, None] + np.arange(2)).ravel())
+            values.append(of_end.ravel())
+    shape = (len(seams), 2 * len(flat))
+    return coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape).tocsr()
+
+
+def largest_share(cloth: SewnCloth, step: FloatArray) -> float:
+    """Return the largest share of a step, of 1, 1/2, 1/4 ..., that leaves every cell enough of its area."""
+    corner, _, _ = corner_triangles(cloth.flat_faces)
+
+    def areas(flat: FloatArray) -> FloatArray:
+        a, b = flat[corner[:, 1]] - flat[corner[:, 0]], flat[corner[:, 2]] - flat[corner[:, 0]]
+        return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+    before, share = areas(cloth.flat), 1.0
+    while share > 1e-3 and (areas(cloth.flat + share * step) < _LEAST_AREA * before).any():
+        share *= 0.5
+    return share
+
+
+def pieces_of(garment: Garment | Flattening) -> dict[str, Flattening]:
+    """Return the pieces by their names."""
+    return dict(garment.pieces) if isinstance(garment, Garment) else {garment.surface.name: garment}
+
+
+def with_pattern(garment: Garment | Flattening, cloth: SewnCloth) -> Garment | Flattening:
+    """Return the garment, or the piece, with the flat pieces of sewn cloth, and in that cloth's fabric."""
+    pieces = {
+        name: replace(piece, positions=cloth.flat[cloth.piece_vertices[name]], fabric=cloth.fabric)
+        for name, piece in pieces_of(garment).items()
+    }
+    return replace(garment, pieces=pieces) if isinstance(garment, Garment) else next(iter(pieces.values()))
