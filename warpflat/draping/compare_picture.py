@@ -46,7 +46,7 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     height = len(maps) * (tall + _TOP) + 0.3
     figure = Figure(figsize=(PAGE_WIDTH, height), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    pen.open_page(figure, height)
+    pen.open_page(figure, PAGE_WIDTH, height)
     for row, (title, values, low, high, colours) in enumerate(maps):
         bottom = height - (row + 1) * (tall + _TOP)
         for column, name in enumerate(drapes):

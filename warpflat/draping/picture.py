@@ -52,7 +52,7 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
     height = 2 * (tall + _TOP) + _BOTTOM + 0.2
     figure = Figure(figsize=(PAGE_WIDTH, height), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    pen.open_page(figure, height)
+    pen.open_page(figure, PAGE_WIDTH, height)
     pen.write(0.3, height - 0.2, _title(drape), 11)
     for row, (title, values, low, high, colours) in enumerate(_maps(drape)):
         bottom = height - 0.2 - (row + 1) * (tall + _TOP)
