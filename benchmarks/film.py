@@ -153,7 +153,8 @@ def main() -> None:
             continue
         print(
             f"{path.stem:20}{frames:7}{100 * share:14.2f}%{size:6.1f}{page:8.2f}{sum(sizes.values()):6.1f}"
-            f"{film_s:8.2f}{page_s:8.2f}{run_s:7.2f}{100 * (film_s + page_s) / run_s:6.0f}%  {' + '.join(map(str, counts))}; {', '.join(white)}",
+            f"{film_s:8.2f}{page_s:8.2f}{run_s:7.2f}{100 * (film_s + page_s) / run_s:6.0f}%  {' + '.join(map(str, counts))}"
+            f"; {', '.join(white)}",
             flush=True,
         )
 
