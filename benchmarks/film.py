@@ -41,13 +41,13 @@ def largest_shares(film: Path) -> tuple[int, list[int], float]:
         pattern = UsdGeom.Mesh(stage.GetPrimAtPath(f"{piece.GetPath()}/pattern"))
         if not pattern:
             continue
-        times = pattern.GetPointsAttr().GetTimeSamples()
+        # Between two samples USD interpolates: a frame is what a reader gets at its time.
+        times = range(int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode()) + 1)
         number = piece.GetAttribute("warpflat:stage_number")
         still = pattern.GetFaceVertexIndicesAttr().GetTimeSamples()
         shots: dict[tuple[int, int], list[Any]] = {}
         for at in times:
-            size = len(pattern.GetPointsAttr().Get(at))
-            key = number.Get(at), size * 0 + sum(change <= at for change in still)
+            key = number.Get(at), sum(change <= at for change in still)
             shots.setdefault(key, []).append(np.array(pattern.GetPointsAttr().Get(at), dtype=np.float64))
         frames, counts = len(times), [len(shot) for shot in shots.values()]
         for shot in shots.values():
