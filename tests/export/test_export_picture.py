@@ -24,7 +24,7 @@ from warpflat.export.labels import (
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_garment import Body, crop_body
-from warpflat.export.picture_packing import pack_boxes
+from warpflat.export.picture_packing import pack_boxes, pack_rows
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
@@ -128,7 +128,11 @@ def test_boxes_are_packed_without_overlap_and_use_what_lies_under_short_ones() -
     assert places[3] == (2.0, 3.0)
     rng = np.random.default_rng(3)
     sizes = [(float(w), float(h)) for w, h in rng.uniform(0.2, 3.0, (40, 2))]
+    rows, _, foot = pack_rows(sizes, 7.0)
+    assert [top for _, top in rows] == sorted(top for _, top in rows)
+    assert all(left > 0.0 for (left, top), (_, before) in zip(rows[1:], rows, strict=False) if top == before)
     places, wide, tall = pack_boxes(sizes, 7.0)
+    assert tall < foot
     low = np.array(places)
     high = low + np.array(sizes)
     assert high[:, 0].max() == wide <= 7.0

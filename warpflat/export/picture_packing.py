@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["pack_boxes"]
+__all__ = ["pack_boxes", "pack_rows"]
+
+
+def pack_rows(sizes: Sequence[tuple[float, float]], width: float) -> tuple[list[tuple[float, float]], float, float]:
+    """Place boxes in turn from left to right, in rows one below the other; arguments and results as of :func:`pack_boxes`."""
+    places, right, top, foot, widest = list[tuple[float, float]](), 0.0, 0.0, 0.0, 0.0
+    for wide, high in sizes:
+        if right + wide > width * (1.0 + 1e-9):
+            right, top = 0.0, foot
+        places.append((right, top))
+        right, foot = right + wide, max(foot, top + high)
+        widest = max(widest, right)
+    return places, widest, foot
 
 
 def pack_boxes(sizes: Sequence[tuple[float, float]], width: float) -> tuple[list[tuple[float, float]], float, float]:

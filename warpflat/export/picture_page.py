@@ -12,7 +12,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.labels import LabelRoom, Spot
 from warpflat.export.picture_lines import draw_lines
-from warpflat.export.picture_packing import pack_boxes
+from warpflat.export.picture_packing import pack_boxes, pack_rows
 from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, PAGE_WIDTH, Pen
 from warpflat.export.picture_scale import STRIP, draw_scale_bar
 from warpflat.export.picture_views import DrawnView, View
@@ -29,7 +29,7 @@ _TALLEST_PIECE, _TALLEST = (
     15.0,
 )  # what a piece, half as much again if its views are stacked, and all cells may take
 _SCALES = 0.97 ** np.arange(90)
-_REORDERED = 0.02  # how much more of the page pieces must cover to stand in another order than their own
+_REORDERED = 0.02  # how much more of the page pieces must cover to stand otherwise than in rows, in their own order
 _BETWEEN, _CAPTION_SIZE, _TITLE_SIZE = "  ·  ", 7.5, 11.5  # [pt]
 _STACKED = 2.6  # width of two views side by side over their height, from which they stand one below the other
 CAPTIONS_ALONE = 3.6  # wide, left of the colour bar
@@ -129,14 +129,15 @@ def lay_out(pen: Pen, cells: Sequence[Cell]) -> tuple[float, float, float]:
         )
         for cell in cells
     ]
+    own_order = list(range(len(cells)))
     by_height = sorted(range(len(cells)), key=lambda k: -float(cells[k].extent[1]))
     found = []
     for scale in min(limits) * _SCALES:
         for cell in cells:
             cell.fit(pen, scale)
         covered = sum(float(np.prod(cell.extent)) * cell.inches_per_metre**2 for cell in cells)
-        for order in (list(range(len(cells))), by_height):
-            places, wide, tall = pack_boxes([(cells[k].width, cells[k].height) for k in order], room)
+        for order, pack in ((own_order, pack_rows), (by_height, pack_boxes)):
+            places, wide, tall = pack([(cells[k].width, cells[k].height) for k in order], room)
             wide = max(wide, _NARROWEST_PAGE - 2 * MARGIN)
             share = covered / (wide * tall) - (_REORDERED if order is by_height else 0.0)
             found.append((max(0.0, tall - _TALLEST), -share, scale, order, places, wide, tall))
