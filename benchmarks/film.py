@@ -6,7 +6,7 @@ A row per scene. `frames` is their number, `stages` how many each stage has. `la
 farthest in one frame, as a share of the largest displacement in its stage, over all pieces. `run` is the processor time of the
 whole command, a process of its own with compiled kernels. `film` and `page` are what it spends on `frames.usdc` and on `review.html`,
 libraries loaded for them among it; `share` is both of the run. `MB` are their sizes, `other` is that of all other files. The
-fastest of the repeats counts. `--figures` runs each scene once.
+fastest of the repeats counts. `white` is the share of each picture that is white or nearly so. `--figures` runs each scene once.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ def largest_shares(film: Path) -> tuple[int, list[int], float]:
         pattern = UsdGeom.Mesh(stage.GetPrimAtPath(f"{piece.GetPath()}/pattern"))
         if not pattern:
             continue
-        times = pattern.GetPointsAttr().GetTimeSamples()
+        # Between two samples USD interpolates: a frame is what a reader gets at its time.
+        times = range(int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode()) + 1)
         number = piece.GetAttribute("warpflat:stage_number")
         still = pattern.GetFaceVertexIndicesAttr().GetTimeSamples()
         shots: dict[tuple[int, int], list[Any]] = {}
         for at in times:
-            size = len(pattern.GetPointsAttr().Get(at))
-            key = number.Get(at), size * 0 + sum(change <= at for change in still)
+            key = number.Get(at), sum(change <= at for change in still)
             shots.setdefault(key, []).append(np.array(pattern.GetPointsAttr().Get(at), dtype=np.float64))
         frames, counts = len(times), [len(shot) for shot in shots.values()]
         for shot in shots.values():
@@ -56,6 +56,17 @@ def largest_shares(film: Path) -> tuple[int, list[int], float]:
                 moves = (np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(shot))
                 worst = max(worst, *(move / way for move in moves))
     return frames, counts, worst
+
+
+def white_shares(folder: Path) -> dict[str, float]:
+    """Return the share of each picture of a folder that is paper: no channel is below 0.94 of white."""
+    from PIL import Image
+
+    found = {}
+    for path in sorted(folder.glob("*.png")):
+        with Image.open(path) as picture:
+            found[path.stem] = float((np.asarray(picture.convert("RGB")).min(axis=-1) >= 240).mean())
+    return found
 
 
 def seconds(scene: Path, folder: Path, repeats: int) -> tuple[float, float, float]:
@@ -125,7 +136,7 @@ def main() -> None:
     given = parser.parse_args()
     print(
         f"{'scene':20}{'frames':>7}{'largest share':>15}{'MB':>6}{'page MB':>8}{'other':>6}"
-        f"{'film s':>8}{'page s':>8}{'run s':>7}{'share':>7}  stages"
+        f"{'film s':>8}{'page s':>8}{'run s':>7}{'share':>7}  stages; white"
     )
     for path in given.scenes:
         try:
@@ -134,6 +145,7 @@ def main() -> None:
                 film_s, page_s, run_s = seconds(path, folder, 1 if given.figures else given.repeats)
                 film = folder / "frames.usdc"
                 frames, counts, share = largest_shares(film)
+                white = [f"{name} {100 * share:.0f} %" for name, share in white_shares(folder).items()]
                 sizes = {file.name: file.stat().st_size / 1e6 for file in folder.iterdir()}
                 size, page = sizes.pop("frames.usdc"), sizes.pop("review.html")
         except InputError as error:
@@ -141,7 +153,8 @@ def main() -> None:
             continue
         print(
             f"{path.stem:20}{frames:7}{100 * share:14.2f}%{size:6.1f}{page:8.2f}{sum(sizes.values()):6.1f}"
-            f"{film_s:8.2f}{page_s:8.2f}{run_s:7.2f}{100 * (film_s + page_s) / run_s:6.0f}%  {' + '.join(map(str, counts))}",
+            f"{film_s:8.2f}{page_s:8.2f}{run_s:7.2f}{100 * (film_s + page_s) / run_s:6.0f}%  {' + '.join(map(str, counts))}"
+            f"; {', '.join(white)}",
             flush=True,
         )
 

@@ -9,6 +9,11 @@ import rerun as rr
 from pxr import Usd, UsdGeom
 
 
+def encode(colours: np.ndarray) -> np.ndarray:
+    """Return linear Rec. 709, as USD has it, as sRGB, as rerun has it (IEC 61966-2-1)."""
+    return np.where(colours <= 0.0031308, 12.92 * colours, 1.055 * np.maximum(colours, 0.0) ** (1 / 2.4) - 0.055)
+
+
 def log_film(source: str, target: str) -> int:
     """Write the film of a USD file as a recording of rerun; return the number of frames."""
     stage = Usd.Stage.Open(source)
@@ -24,7 +29,7 @@ def log_film(source: str, target: str) -> int:
             counts = np.array(mesh.GetFaceVertexCountsAttr().Get(frame))
             corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(frame))
             colours = mesh.GetDisplayColorPrimvar()
-            shade = np.array(colours.ComputeFlattened(frame))  # one for each vertex, or one for all
+            shade = encode(np.array(colours.ComputeFlattened(frame)))  # one for each vertex, or one for all
             if colours.GetInterpolation() == UsdGeom.Tokens.constant:
                 shade = np.tile(shade, (len(points), 1))
             # A fan of triangles for each face.

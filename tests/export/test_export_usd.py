@@ -220,7 +220,7 @@ def test_validation_finds_what_is_wrong(tmp_path: Path) -> None:
     mesh = mesh_at(stage, "/World/front/pattern")
     mesh.GetFaceVertexIndicesAttr().Set(Vt.IntArray([999] * 256), 3)
     mesh.GetPointsAttr().Set(Vt.Vec3fArray([9.0 * point for point in mesh.GetPointsAttr().Get(4)]), 4)
-    mesh.GetDisplayColorPrimvar().GetIndicesAttr().Set(Vt.IntArray([0] * 3), 2)
+    mesh.GetDisplayColorAttr().Set(Vt.Vec3fArray([(0.0, 0.0, 0.0)] * 3), 2)
     stage.ClearDefaultPrim()
     stage.Export(str(tmp_path / "bad.usdc"))
     messages = "\n".join(validate_usd(tmp_path / "bad.usdc"))

@@ -193,7 +193,7 @@ def test_one_film_tells_the_whole_story(tmp_path: Path):
     assert list(validate_usd(film)) == []
     stage = Usd.Stage.Open(str(film))
     pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern"))
-    times = pattern.GetPointsAttr().GetTimeSamples()
+    times = range(int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode()) + 1)
     counts = [len(pattern.GetPointsAttr().Get(time)) for time in times]
     changes = np.flatnonzero(np.diff(counts))
     assert len(changes) == 1, "the topology changes once"

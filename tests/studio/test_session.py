@@ -21,6 +21,7 @@ from warpflat.studio.maps import face_values, piece_scale, vertex_values
 from warpflat.studio.pick import Hit, nearest_line, pick_flat, pick_on_rays
 from warpflat.studio.save import free_name
 from warpflat.studio.session import Session
+from warpflat.studio.solve import solve
 from warpflat.studio.worker import Job, Superseded, Ticket, Worker
 
 if sys.version_info >= (3, 11):
@@ -167,6 +168,13 @@ def test_a_form_takes_a_body_a_form_and_cuts_along_its_lines(tmp_path: Path) -> 
     assert preview.step.solution.plan is not None
     assert whole.plan is not None
     assert preview.step.solution.plan.mannequin is whole.plan.mannequin
+    # The piece without a cut is not built again, and the outcome is the one from scratch.
+    assert preview.step.solution.pieces["back"].surface is whole.pieces["back"].surface
+    assert preview.step.solution.pieces["front"].surface is not whole.pieces["front"].surface
+    scratch = solve(preview.step.scene)
+    for name, piece in scratch.pieces.items():
+        np.testing.assert_array_equal(piece.surface.vertices, preview.step.solution.pieces[name].surface.vertices)
+        np.testing.assert_allclose(piece.positions, preview.step.solution.pieces[name].positions, atol=1e-5)
     session.apply()
     row = cuttable_lines(whole, "back")["princess back left"]
     points = whole.pieces["back"].surface.vertices[row]

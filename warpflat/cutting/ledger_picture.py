@@ -62,7 +62,7 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     height = tall + 1.15
     figure = Figure(figsize=(PAGE_WIDTH, height), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    pen.open_page(figure, height)
+    pen.open_page(figure, PAGE_WIDTH, height)
     pen.write(0.45, height - 0.35, f"{surface.name}: where to cut", 15, fontweight="bold")
     peak = ledger.peaks.words[0] if ledger.peaks.words else "none inside"
     stored = f"strain energy {1e3 * ledger.result.stages[-1].strain_energy_j:.0f} mJ"

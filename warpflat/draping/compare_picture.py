@@ -37,7 +37,7 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     require_writable(path)
     report_activity("drawing the drapes")
     meshes = {name: body_around(drape) for name, drape in drapes.items()}
-    views = {name: seen_from(points, faces, 0.0) for name, (points, faces, _) in meshes.items()}
+    views = {name: seen_from(points, faces, 0.0, cloth=cloth) for name, (points, faces, cloth) in meshes.items()}
     size = np.max([view.size for view in views.values()], axis=0)
     room = PAGE_WIDTH - _BAR - _GAP * (len(views) + 1)
     scale = min(room / (len(views) * float(size[0])), _TALLEST / float(size[1]))
@@ -46,7 +46,7 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     height = len(maps) * (tall + _TOP) + 0.3
     figure = Figure(figsize=(PAGE_WIDTH, height), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    pen.open_page(figure, height)
+    pen.open_page(figure, PAGE_WIDTH, height)
     for row, (title, values, low, high, colours) in enumerate(maps):
         bottom = height - (row + 1) * (tall + _TOP)
         for column, name in enumerate(drapes):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.core.sums import weighted_percentile
 from warpflat.draping.result import Drape
-from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
 from warpflat.export.letters import all_letters
+from warpflat.export.picture_garment import Body, crop_body
 from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import DrawnView, View, make_facets
@@ -24,11 +26,11 @@ __all__ = ["body_around", "draw_scale", "seen_from", "write_drape_picture"]
 
 _VIEWS = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _SKIN = (0.80, 0.79, 0.77)
-# The body is drawn this much smaller [m], so that cloth that lies on it is seen; and so much of it beyond the cloth.
-_SHRUNK, _BEYOND = 0.003, 0.10
+# The body is drawn this much smaller [m], so that cloth that lies on it is seen.
+_SHRUNK = 0.003
 # A part of the body with a smaller share of the largest part's triangles is not drawn.
 _SCRAP = 0.1
-_TALLEST, _TOP, _BOTTOM, _BAR = 5.2, 0.75, 0.25, 1.2
+_TALLEST, _TOP, _BOTTOM, _BAR = 8.0, 0.55, 0.1, 1.0
 
 
 @all_letters()
@@ -45,14 +47,14 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     points, faces, cloth = body_around(drape)
-    views = [seen_from(points, faces, degrees) for _, degrees in _VIEWS]
+    views = [seen_from(points, faces, degrees, cloth=cloth) for _, degrees in _VIEWS]
     room = PAGE_WIDTH - _BAR - 0.2 * (len(views) + 1)
     scale = min(room / sum(float(view.size[0]) for view in views), _TALLEST / float(views[0].size[1]))
     tall = scale * float(views[0].size[1])
     height = 2 * (tall + _TOP) + _BOTTOM + 0.2
     figure = Figure(figsize=(PAGE_WIDTH, height), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    pen.open_page(figure, height)
+    pen.open_page(figure, PAGE_WIDTH, height)
     pen.write(0.3, height - 0.2, _title(drape), 11)
     for row, (title, values, low, high, colours) in enumerate(_maps(drape)):
         bottom = height - 0.2 - (row + 1) * (tall + _TOP)
@@ -98,14 +100,11 @@ def body_around(drape: Drape) -> tuple[FloatArray, IntArray, int]:
     body, x = drape.body, drape.positions
     normals = vertex_normals(area_vectors(body.vertices, body.triangles), body.triangles, len(body.vertices))
     inner = body.vertices - _SHRUNK * normals
-    height = body.vertices[body.triangles][:, :, 1].mean(axis=1)
     # Arms and legs far from the cloth would only make the pictures small.
-    across = body.vertices[body.triangles][:, :, 0].mean(axis=1)
-    beside = (across > x[:, 0].min() - _BEYOND) & (across < x[:, 0].max() + _BEYOND)
-    near = beside & (height > x[:, 1].min() - _BEYOND) & (height < x[:, 1].max() + _BEYOND)
-    kept = body.triangles[near]
+    corners = np.column_stack([body.triangles, np.full(len(body.triangles), -1)])
+    kept, inner = crop_body(Body(vertices=inner, faces=corners), x)
     # Nor are scraps of hands of use that hang in the air.
-    label = join_labels(len(body.vertices), kept[:, :2].ravel(), kept[:, 1:].ravel())[kept[:, 0]]
+    label = join_labels(len(inner), kept[:, :2].ravel(), kept[:, 1:].ravel())[kept[:, 0]]
     count = np.bincount(label)
     kept = kept[count[label] >= _SCRAP * count.max()] if len(kept) else kept
     triangles = np.column_stack([kept + len(x), np.full(len(kept), -1)])
@@ -113,11 +112,12 @@ def body_around(drape: Drape) -> tuple[FloatArray, IntArray, int]:
     return np.concatenate([x, inner]), faces, len(drape.cloth.faces)
 
 
-def seen_from(points: FloatArray, faces: IntArray, degrees: float) -> View:
-    """Return the mesh as seen by somebody who walked `degrees` around the body to its left."""
+def seen_from(points: FloatArray, faces: IntArray, degrees: float, *, cloth: int) -> View:
+    """Return the mesh as seen by somebody who walked `degrees` around the body to its left; the first `cloth` faces have outlines."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
-    facets = make_facets(faces)
+    # Without faces no mesh is drawn.
+    facets = replace(make_facets(faces), faces=faces[:0], outline=outline_edges(faces[:cloth]))
     vectors = area_vectors(points, facets.triangles)
     return View(points=points @ turn.T, facets=facets, lines={}, vectors=vectors @ turn.T)
 

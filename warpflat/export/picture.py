@@ -1,4 +1,4 @@
-"""`picture.png`: each piece on the body and in the plane, side by side, coloured by strain energy."""
+"""`picture.png`: a garment on its mannequin, then its patterns; other pieces on the body and in the plane, coloured by strain energy."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_garment import Body, GarmentViews
-from warpflat.export.picture_page import TOP_MARGIN, Row, draw_colour_bar, draw_row, lay_out, page_height
+from warpflat.export.picture_page import CAPTIONS_ALONE, MARGIN, Cell, draw_cell, lay_out
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
+from warpflat.export.picture_scale import STRIP, draw_colour_bar, draw_scale_bar
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
@@ -28,7 +29,7 @@ __all__ = ["PicturePiece", "draw_figure", "write_picture"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PicturePiece:
-    """One row of the picture.
+    """One piece of the picture.
 
     Attributes:
         name: the piece's.
@@ -64,13 +65,14 @@ def write_picture(
     scale: float | None = None,
     body: Body | None = None,
 ) -> None:
-    """Draw every piece twice, on the body and as pattern, at one scale of length and one of energy; atomically.
+    """Draw every piece on the body and as pattern, at one scale of length and one of energy; atomically.
 
     Args:
         path: the file, ``*.png``.
-        pieces: one row each.
+        pieces: what is drawn.
         quantity: what the colours show, written beside the colour bar.
-        body: on which all pieces are shown together first, from the front, the side and the back; none if not given.
+        body: on which all pieces are shown together first, from the front, the side and the back. If not given, each piece is
+            shown in space beside its pattern.
         scale: upper end of the colours [J/m2]; if not given, 98 % of the area of all pieces lies below it.
 
     Raises:
@@ -103,40 +105,41 @@ def draw_figure(
     if not pieces:
         raise ValueError("a picture needs at least one piece")
     shown_names = titles([piece.name for piece in pieces], is_drawn)
-    rows = [_prepared(piece, shown_names[piece.name]) for piece in pieces]
+    alone = body is None and len(pieces) == 1
+    cells = [_prepared(piece, shown_names[piece.name], shows_body=body is None, alone=alone) for piece in pieces]
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
-    areas = np.concatenate([row.areas for row in rows])
+    areas = np.concatenate([cell.areas for cell in cells])
     scale = energy_scale(density, areas) if scale is None else scale
     figure = Figure(figsize=(PAGE_WIDTH, 4.0), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
+    width, height, page_scale = lay_out(pen, cells)
     worn = None
     if body is not None:
-        worn = GarmentViews(body, [piece.surface for piece in pieces], [row.density for row in rows])
-    bands = lay_out(pen, rows)
-    height = page_height(bands) + (0.0 if worn is None else worn.height)
-    figure.set_size_inches(PAGE_WIDTH, height)
-    pen.open_page(figure, height)
-    top = height - TOP_MARGIN
+        worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells], width)
+        height += worn.height
+    height += STRIP
+    figure.set_size_inches(width, height)
+    pen.open_page(figure, width, height)
+    if not alone:
+        draw_scale_bar(pen, MARGIN, height - 0.27, page_scale)
+    draw_colour_bar(pen, scale, density, areas, quantity, left=MARGIN + (CAPTIONS_ALONE if alone else 2.3), top=height)
+    top = height - STRIP
     if worn is not None:
         worn.draw(pen, top, scale)
         top -= worn.height
-    band_top = top
-    for band in bands:
-        for row in band:
-            draw_row(pen, row, top, scale)
-        top -= band[0].height
-    draw_colour_bar(pen, rows[0], scale, density, areas, quantity, top=band_top)
+    for cell in cells:
+        draw_cell(pen, cell, top, scale, page_scale)
     return figure
 
 
-def _prepared(piece: PicturePiece, title: str) -> Row:
-    """Return the row of a piece, with its two views."""
+def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool) -> Cell:
+    """Return the cell of a piece, with its two views."""
     surface, positions = piece.surface, np.asarray(piece.positions, dtype=np.float64)
     faces = np.asarray(piece.faces, dtype=np.int32)
     in_space = surface.lines if piece.surface_lines is None else piece.surface_lines
     in_plane = make_facets(faces)
     on_body = in_plane if np.array_equal(faces, surface.faces) else make_facets(surface.faces)
-    return Row(
+    cell = Cell(
         name=title,
         captions=piece.captions,
         density=np.asarray(piece.face_energy_density, dtype=np.float64),
@@ -144,4 +147,8 @@ def _prepared(piece: PicturePiece, title: str) -> Row:
         pattern=pattern_view(positions, in_plane, polylines_of(piece.lines)),
         datum=piece.datum,
         grain_angle=piece.grain_angle,
+        shows_body=shows_body,
+        alone=alone,
     )
+    cell.stack_if_wide()
+    return cell

@@ -10,17 +10,18 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.geometry import area_vectors, outline_edges
-from warpflat.export.picture_pen import GREY, PAGE_WIDTH, Pen
+from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_views import DrawnView, Facets, View, make_facets
 from warpflat.surface.mesh import Surface
+from warpflat.surface.triangles import triangulate
 
-__all__ = ["Body", "GarmentViews"]
+__all__ = ["Body", "GarmentViews", "crop_body"]
 
 _VIEWS = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
-_HEIGHT, _HEAD, _FOOT = 5.6, 0.42, 0.45  # [in], as all that follows
-_LEFT, _RIGHT = 0.55, 1.75
-# How far the mannequin shows above and below the garment, as a share of the garment's height.
-_AROUND = 0.12
+_HEIGHT, _HEAD, _FOOT = 9.0, 0.26, 0.30  # [in], as all that follows
+_LEAST_GAP = 0.25
+# How far the mannequin shows around the garment [m].
+_AROUND = 0.06
 # The garment lies on the mannequin: it is drawn this much nearer to the eye [m].
 _NEARER = 0.012
 _SKIN = (0.88, 0.86, 0.83)
@@ -42,27 +43,28 @@ class Body:
 class GarmentViews:
     """A garment on its mannequin, seen from three sides, as a band across the page."""
 
-    def __init__(self, body: Body, surfaces: Sequence[Surface], densities: Sequence[FloatArray]) -> None:
+    def __init__(
+        self, body: Body, surfaces: Sequence[Surface], densities: Sequence[FloatArray], page_width: float
+    ) -> None:
         """
         Args:
             body: under it.
             surfaces: the pieces in space.
             densities: #F [J/m2] for each piece.
+            page_width: [in].
         """
         self._density = np.concatenate(densities)
         worn = np.concatenate([surface.vertices for surface in surfaces])
-        low, high = float(worn[:, 1].min()), float(worn[:, 1].max())
-        room = _AROUND * (high - low)
-        height = np.where(body.faces >= 0, body.vertices[body.faces, 1], body.vertices[body.faces[:, :1], 1])
-        near = body.faces[((height > low - room) & (height < high + room)).all(axis=1)]
+        near, skin_points = crop_body(body, worn)
         counts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
         pieces = [
             np.where(surface.faces >= 0, surface.faces + first, -1)
             for surface, first in zip(surfaces, counts, strict=False)
         ]
         cloth = np.concatenate(pieces).astype(np.int32)
-        skin = np.where(near >= 0, near + counts[-1], -1).astype(np.int32)
-        facets = make_facets(np.concatenate([cloth, skin]))
+        skin = np.column_stack([near, np.full(len(near), -1)]) + counts[-1]
+        skin[:, 3] = -1
+        facets = make_facets(np.concatenate([cloth, skin]).astype(np.int32))
         # Outlines of pieces show the seams; the body has none.
         facets = Facets(
             faces=cloth[:0],
@@ -72,19 +74,19 @@ class GarmentViews:
             used=facets.used,
         )
         self._skin_faces = len(skin)
-        points = np.concatenate([worn, body.vertices])
+        points = np.concatenate([worn, skin_points])
         self._views = [(title, _view(points, len(worn), facets, angle)) for title, angle in _VIEWS]
         widths = sum(float(view.size[0]) for _, view in self._views)
         tallest = max(float(view.size[1]) for _, view in self._views)
-        wide = PAGE_WIDTH - _LEFT - _RIGHT
-        self._scale = min(0.9 * wide / widths, _HEIGHT / tallest)
-        self._gap = (wide - widths * self._scale) / len(_VIEWS)
+        gaps = len(_VIEWS) * _LEAST_GAP
+        self._scale = min((page_width - gaps) / widths, _HEIGHT / tallest)
+        self._gap = (page_width - widths * self._scale) / len(_VIEWS)
         self.height = _HEAD + tallest * self._scale + _FOOT
 
     def draw(self, pen: Pen, top: float, scale: float) -> None:
         """Draw the band whose upper edge is at `top` [in], colours up to `scale` [J/m2]."""
         colours = np.concatenate([energy_colours(self._density, scale), np.tile(_SKIN, (self._skin_faces, 1))])
-        left = _LEFT
+        left = 0.0
         for title, view in self._views:
             width, height = view.size[:2] * self._scale
             left += 0.5 * self._gap
@@ -92,8 +94,48 @@ class GarmentViews:
                 view, left=left, bottom=top - _HEAD - float(height), inches_per_metre=self._scale, dpi=pen.dpi
             )
             drawn.draw(pen.axes, colours)
-            pen.write(left + 0.5 * float(width), top - 0.18, title, 10, color=GREY, ha="center", fontstyle="italic")
+            pen.write(left + 0.5 * float(width), top - 0.12, title, 9, color=GREY, ha="center", fontstyle="italic")
             left += float(width) + 0.5 * self._gap
+
+
+def crop_body(body: Body, worn: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return what of a body is near a garment (#P by 3), as triangles and vertices.
+
+    Arms end beside the garment, as those of a dress form do: they would take a third of the page. Their ends are closed.
+    """
+    triangles, vertices = triangulate(body.faces)[0], body.vertices
+    for axis, sign in ((1, 1.0), (1, -1.0), (0, 1.0), (0, -1.0)):
+        limit = float((sign * worn[:, axis]).max()) + _AROUND
+        triangles, vertices, edges = _cut(triangles, vertices, sign * vertices[:, axis] - limit)
+        if axis == 0 and len(edges):
+            # With vertices of its own: light does not bend around its edge.
+            rim = vertices[edges.ravel()]
+            own = len(vertices) + np.arange(len(rim)).reshape(-1, 2)
+            end = np.column_stack([own, np.full(len(own), len(vertices) + len(rim))])
+            vertices = np.concatenate([vertices, rim, rim.mean(axis=0)[None]])
+            triangles = np.concatenate([triangles, end])
+    return triangles.astype(np.int32), vertices
+
+
+def _cut(triangles: IntArray, vertices: FloatArray, beyond: FloatArray) -> tuple[IntArray, FloatArray, IntArray]:
+    """Leave out what of a mesh lies where `beyond` (#V) is positive; return triangles, vertices and the edges of the cut."""
+    outside = beyond[triangles] > 0.0
+    number = outside.sum(axis=1)
+    found, edges = [triangles[number == 0]], []
+    for several, alone_is_outside in ((1, True), (2, False)):
+        crossed = triangles[number == several]
+        # The vertex that is alone on its side comes first.
+        first = (outside[number == several] == alone_is_outside).argmax(axis=1)
+        a, b, c = np.take_along_axis(crossed, (first[:, None] + np.arange(3)) % 3, axis=1).T
+        p, q = len(vertices) + np.arange(2 * len(a)).reshape(2, -1)
+        ends = np.concatenate([b, c])
+        share = (beyond[np.tile(a, 2)] / (beyond[np.tile(a, 2)] - beyond[ends]))[:, None]
+        vertices = np.concatenate([vertices, (1.0 - share) * vertices[np.tile(a, 2)] + share * vertices[ends]])
+        parts = ((p, b, c), (p, c, q)) if alone_is_outside else ((a, p, q),)
+        found += [np.column_stack(part) for part in parts]
+        # As a face beyond the cut would have them, so that it looks outwards.
+        edges.append(np.column_stack([p, q] if alone_is_outside else [q, p]))
+    return np.concatenate(found), vertices, np.concatenate(edges)
 
 
 def _view(points: FloatArray, cloth: int, facets: Facets, degrees: float) -> View:

@@ -1,10 +1,10 @@
-"""The page of `picture.png`: rows of two views with dimensions, grain, labels and a scale bar, and one colour bar."""
+"""The page of `picture.png`: pieces in cells that are packed on it, each with its views, grain and labels."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,29 +12,37 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.labels import LabelRoom, Spot
 from warpflat.export.picture_lines import draw_lines
-from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, PAGE_WIDTH, POINT, Pen
-from warpflat.export.picture_views import INK, DrawnView, View
+from warpflat.export.picture_packing import pack_boxes, pack_rows
+from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, PAGE_WIDTH, Pen
+from warpflat.export.picture_scale import STRIP, draw_scale_bar
+from warpflat.export.picture_views import DrawnView, View
 
-__all__ = ["TOP_MARGIN", "Row", "draw_colour_bar", "draw_row", "lay_out", "page_height"]
+__all__ = ["CAPTIONS_ALONE", "MARGIN", "Cell", "draw_cell", "lay_out"]
 
-TOP_MARGIN = 0.30  # [in], as all that follows
-_LEFT, _RIGHT = 0.55, 1.75  # the colour bar stands in the right margin
-_BETWEEN = 1.35  # from surface to pattern: the height's dimension line, and labels that do not fit inside
-_BESIDE = 0.75  # right of the pattern, for labels
-_NAMES_LEFT = 1.0  # left of the surface, for labels, where two pieces stand side by side
-_LITTLE_SMALLER = 0.8
-_BELOW = 0.95  # a row's foot: the width's dimension line and the scale bar
-_SMALLEST_BAND, _SMALLEST_PATTERN = 1.0, 2.4
-_COLOUR_BAR = (1.9, 3.6)  # its least and its greatest height
-_BAR_WIDTH = 0.2
-_BAR_TIP = 0.05  # of its length, for what lies above the scale
+MARGIN = 0.25  # [in], as all that follows
+_BESIDE = 0.28  # either side of a view, for names
+_HEADING = 0.32  # above a view, for words and names
+_FOOT = 0.24  # below a view, for names
+_SMALLEST_PATTERN, _NARROWEST, _NARROWEST_PAGE = 2.0, 1.6, 8.5
+_TALLEST_PIECE, _TALLEST = (
+    8.0,
+    15.0,
+)  # what a piece, half as much again if its views are stacked, and all cells may take
+_SCALES = 0.97 ** np.arange(90)
+_REORDERED = 0.02  # how much more of the page pieces must cover to stand otherwise than in rows, in their own order
+_BETWEEN, _CAPTION_SIZE, _TITLE_SIZE = "  ·  ", 7.5, 11.5  # [pt]
+_STACKED = 2.6  # width of two views side by side over their height, from which they stand one below the other
+CAPTIONS_ALONE = 3.6  # wide, left of the colour bar
 _SHORTEST_GRAIN = 0.28  # half its length
-_TICK_SIZE = 8.5  # [pt]
 
 
 @dataclass(kw_only=True, eq=False)
-class Row:
-    """One piece on the page: its name, captions, two views, and where they lie, from `left` to `right` [in]."""
+class Cell:
+    """One piece on the page: its name, captions, views, and its place from `left` to the right and from `top` down [in].
+
+    The name of one that is `alone` on its page stands beside the colour bar, above the cell. Views that are `stacked` stand one below
+    the other.
+    """
 
     name: str
     captions: Mapping[str, str]
@@ -43,11 +51,14 @@ class Row:
     pattern: View
     datum: str | None
     grain_angle: float = 0.0
+    shows_body: bool = True
+    alone: bool = False
+    stacked: bool = False
     caption_lines: list[str] = field(default_factory=list)
     inches_per_metre: float = 1.0
-    band: float = 0.0
-    left: float = _LEFT
-    right: float = PAGE_WIDTH - _RIGHT
+    left: float = 0.0
+    top: float = 0.0
+    width: float = 0.0
 
     @property
     def areas(self) -> FloatArray:
@@ -58,144 +69,183 @@ class Row:
         return summed.astype(np.float64)
 
     @property
+    def views(self) -> list[View]:
+        """The views that are shown, from the left."""
+        return [self.on_body, self.pattern] if self.shows_body else [self.pattern]
+
+    @property
+    def extent(self) -> FloatArray:
+        """Width and height of all views together [m]."""
+        sizes = np.array([view.size[:2] for view in self.views])
+        along = 1 if self.stacked else 0
+        extent = sizes.max(axis=0)
+        extent[along] = sizes[:, along].sum()
+        return np.asarray(extent)
+
+    @property
+    def columns(self) -> int:
+        """Number of views side by side."""
+        return 1 if self.stacked else len(self.views)
+
+    @property
     def head(self) -> float:
-        """Room for the name, the captions and the words above the views."""
-        return 0.34 + 0.20 * len(self.caption_lines) + 0.44
+        """Room for the name, the captions and the words or names above the views."""
+        words = _HEADING if self.shows_body else 0.16
+        return words if self.alone else 0.28 + 0.15 * len(self.caption_lines) + words
 
     @property
     def height(self) -> float:
-        """Height of the whole row [in]."""
-        return self.head + self.band + _BELOW
+        """Height of the cell [in]."""
+        between = (_HEADING + _FOOT) * (len(self.views) - self.columns)
+        return self.head + self.inches_per_metre * float(self.extent[1]) + between + _FOOT
+
+    def stack_if_wide(self) -> None:
+        """Choose whether the two views stand side by side."""
+        width, height = self.extent
+        self.stacked = len(self.views) > 1 and float(width) > _STACKED * float(height)
+
+    def fit(self, pen: Pen, scale: float) -> None:
+        """Choose scale [in/m], width and captions; a piece that would become too small to read is drawn larger."""
+        beside = 2 * _BESIDE * self.columns
+        widest = (PAGE_WIDTH - 2 * MARGIN - beside) / max(float(self.extent[0]), 1e-9)
+        readable = _SMALLEST_PATTERN / max(float(self.pattern.size[:2].max()), 1e-9)
+        self.inches_per_metre = max(scale, min(widest, readable))
+        named = pen.measure(self.name, _TITLE_SIZE, "bold")[0] + 0.15
+        self.width = max(self.inches_per_metre * float(self.extent[0]) + beside, _NARROWEST, named)
+        self.caption_lines = _wrapped(pen, self)
 
 
-def lay_out(pen: Pen, rows: Sequence[Row]) -> list[list[Row]]:
-    """Choose the scale and the place of each piece, and return the pieces of each band across the page, from the top.
+def lay_out(pen: Pen, cells: Sequence[Cell]) -> tuple[float, float, float]:
+    """Choose the scale and the place of each piece, from the upper left corner; return width and height of the page, and the scale [in/m].
 
-    All pieces have the same scale, so that they can be compared; only a piece that would become too small to read is
-    drawn larger. Each has its own scale bar. Narrow pieces stand side by side.
+    All pieces have the same scale, so that they can be compared; only one that would become too small to read is
+    drawn larger. The scale is the one that leaves least of the page empty.
     """
-    wide = PAGE_WIDTH - _LEFT - _RIGHT - _BETWEEN - _BESIDE
-    high = 6.0 if len(rows) == 1 else 4.4 if len(rows) < 4 else 3.4
-    sizes = [(row.on_body.size[:2], row.pattern.size[:2]) for row in rows]
-    fits = [
-        min(wide / max(float(body[0] + flat[0]), 1e-9), high / max(float(body[1]), float(flat[1]), 1e-9))
-        for body, flat in sizes
+    room = PAGE_WIDTH - 2 * MARGIN
+    limits = [
+        min(
+            (room - 2 * _BESIDE * cell.columns) / max(float(cell.extent[0]), 1e-9),
+            _TALLEST_PIECE * (1.5 if cell.stacked else 1.0) / max(float(cell.extent[1]), 1e-9),
+        )
+        for cell in cells
     ]
-    scale = min(fits)
-    # The scale at which any two stand side by side, where that is not much smaller.
-    room = 0.5 * (PAGE_WIDTH - _LEFT - _RIGHT) - _NAMES_LEFT - _BETWEEN - _BESIDE
-    paired = room / max(float(body[0] + flat[0]) for body, flat in sizes)
-    if len(rows) > 1 and paired > _LITTLE_SMALLER * scale:
-        scale = min(scale, paired)
-    for row, fit, (body, flat) in zip(rows, fits, sizes, strict=True):
-        readable = _SMALLEST_PATTERN / max(float(flat.max()), 1e-9)
-        row.inches_per_metre = max(scale, min(fit, readable))
-        row.band = max(_SMALLEST_BAND, row.inches_per_metre * float(max(body[1], flat[1])))
-    rows[0].band = max(rows[0].band, _COLOUR_BAR[0])
-    bands = _bands(rows)
-    for band in bands:
-        width = (PAGE_WIDTH - _LEFT - _RIGHT) / len(band)
-        for place, row in enumerate(band):
-            row.left, row.right = _LEFT + place * width, _LEFT + (place + 1) * width
-            row.caption_lines = _wrapped(pen, row)
-        # The views of a band stand at one height.
-        lines = max(len(row.caption_lines) for row in band)
-        tallest = max(row.band for row in band)
-        for row in band:
-            row.caption_lines += [""] * (lines - len(row.caption_lines))
-            row.band = tallest
-    return bands
+    own_order = list(range(len(cells)))
+    by_height = sorted(range(len(cells)), key=lambda k: -float(cells[k].extent[1]))
+    found = []
+    for scale in min(limits) * _SCALES:
+        for cell in cells:
+            cell.fit(pen, scale)
+        covered = sum(float(np.prod(cell.extent)) * cell.inches_per_metre**2 for cell in cells)
+        for order, pack in ((own_order, pack_rows), (by_height, pack_boxes)):
+            places, wide, tall = pack([(cells[k].width, cells[k].height) for k in order], room)
+            wide = max(wide, _NARROWEST_PAGE - 2 * MARGIN)
+            share = covered / (wide * tall) - (_REORDERED if order is by_height else 0.0)
+            found.append((max(0.0, tall - _TALLEST), -share, scale, order, places, wide, tall))
+    _, _, scale, order, places, wide, tall = min(found, key=lambda each: each[:2])
+    for k, (left, top) in zip(order, places, strict=True):
+        cells[k].fit(pen, scale)
+        cells[k].left, cells[k].top = MARGIN + left, top
+    if len(cells) == 1:
+        cells[0].width = wide
+    return wide + 2 * MARGIN, tall, float(scale)
 
 
-def _bands(rows: Sequence[Row]) -> list[list[Row]]:
-    """Return the pieces in bands, as many to each as fit side by side."""
-    bands: list[list[Row]] = []
-    for row in rows:
-        if bands:
-            wider = [*bands[-1], row]
-            if max(map(_least_width, wider)) * len(wider) <= PAGE_WIDTH - _LEFT - _RIGHT + 1e-9:
-                bands[-1] = wider
-                continue
-        bands.append([row])
-    return bands
-
-
-def _least_width(row: Row) -> float:
-    """Return how wide a piece is with its two views and their labels [in]."""
-    views = float(row.on_body.size[0] + row.pattern.size[0]) * row.inches_per_metre
-    return _NAMES_LEFT + views + _BETWEEN + _BESIDE
-
-
-def page_height(bands: Sequence[Sequence[Row]]) -> float:
-    """Return the height of the page [in]."""
-    return TOP_MARGIN + sum(band[0].height for band in bands) + 0.15
-
-
-def _wrapped(pen: Pen, row: Row) -> list[str]:
-    """Return the captions as lines that end before the next piece or the colour bar."""
-    width, height = row.pattern.size[:2]
-    captions = {"pattern": _size(width, height)} | dict(row.captions)
+def _wrapped(pen: Pen, cell: Cell) -> list[str]:
+    """Return the captions as lines that end within the cell."""
+    width, height = cell.pattern.size[:2]
+    captions = {"pattern": _size(width, height)} | dict(cell.captions)
+    all_room = CAPTIONS_ALONE if cell.alone else cell.width - 0.1
+    gap = pen.measure(_BETWEEN, _CAPTION_SIZE)[0]
     lines: list[str] = []
+    room = 0.0
     for key, value in captions.items():
         entry = f"{key} {value}"
-        longer = f"{lines[-1]}   ·   {entry}" if lines else entry
-        if lines and pen.measure(longer, 9.5)[0] < row.right - row.left:
-            lines[-1] = longer
+        taken = pen.measure(entry, _CAPTION_SIZE)[0]
+        if lines and gap + taken < room:
+            lines[-1] += _BETWEEN + entry
+            room -= gap + taken
         else:
             lines.append(entry)
+            room = all_room - taken
     return lines
 
 
-def draw_row(pen: Pen, row: Row, top: float, scale: float) -> None:
-    """Draw a piece whose upper edge is at `top` [in], its colours up to `scale` [J/m2]."""
-    pen.write(row.left, top - 0.14, row.name, 15, fontweight="bold")
-    for index, text in enumerate(row.caption_lines):
-        pen.write(row.left, top - 0.42 - 0.20 * index, text, 9.5, color=GREY)
-    middle = top - row.head - 0.5 * row.band
-    size = row.inches_per_metre
-    body, flat = row.on_body.size * size, row.pattern.size * size
-    spare = row.right - row.left - _BETWEEN - _BESIDE - float(body[0] + flat[0])
-    left = row.left + 0.3 * spare
-    shown = []
-    for view, extent in ((row.on_body, body), (row.pattern, flat)):
-        bottom = middle - 0.5 * float(extent[1])
-        drawn = DrawnView(view, left=left, bottom=bottom, inches_per_metre=size, dpi=DPI)
-        drawn.draw(pen.axes, energy_colours(row.density, scale))
+def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float) -> None:
+    """Draw a piece.
+
+    Args:
+        cell: placed by :func:`lay_out`.
+        top: where the cells begin [in].
+        scale: upper end of the colours [J/m2].
+        page_scale: of lengths, that of most pieces [in/m].
+    """
+    top -= cell.top
+    title = top + STRIP - 0.08 if cell.alone else top
+    pen.write(cell.left, title - 0.13, cell.name, _TITLE_SIZE, fontweight="bold")
+    for index, text in enumerate(cell.caption_lines):
+        pen.write(cell.left, title - 0.32 - 0.15 * index, text, _CAPTION_SIZE, color=GREY)
+    size, shown = cell.inches_per_metre, []
+    frames = _frames(cell, top)
+    for view, (left, bottom, right, upper) in zip(cell.views, frames, strict=True):
+        width, height = view.size[:2] * size
+        x, y = 0.5 * (left + right - float(width)), 0.5 * (bottom + upper - float(height))
+        drawn = DrawnView(view, left=x, bottom=y, inches_per_metre=size, dpi=DPI)
+        drawn.draw(pen.axes, energy_colours(cell.density, scale))
         shown.append(drawn)
-        left += float(body[0]) + _BETWEEN + 0.35 * spare
     room = LabelRoom()
-    on_body, pattern = shown
-    for drawn, words in ((on_body, "on the body"), (pattern, "pattern")):
-        _heading(pen, room, drawn, words, top - row.head + 0.16)
-    _dimensions(pen, room, pattern)
-    _scale_bar(pen, room, on_body, size)
-    datum = row.pattern.lines.get(row.datum, [None])[0] if row.datum is not None else None
-    has_grain = datum is None or _grain(pen, room, pattern, datum, row.grain_angle, inside=True)
-    floor = top - row.height + 0.02
-    left_end = 0.1 if row.left == _LEFT else row.left + 0.05
-    between = 0.5 * (on_body.box[2] + pattern.box[0])
+    if cell.shows_body:
+        for drawn, frame, words in zip(shown, frames, ("on the body", "pattern"), strict=True):
+            _heading(pen, room, drawn, words, frame[3] + 0.24)
+    floor = top - cell.height + 0.02
+    if cell.alone or size != page_scale:
+        end = draw_scale_bar(pen, cell.left, floor, size)
+        room.take_box(cell.left, floor, end, floor + 0.08)
+    datum = cell.pattern.lines.get(cell.datum, [None])[0] if cell.datum is not None else None
+    has_grain = datum is None or _grain(pen, room, shown[-1], datum, cell.grain_angle)
     unnamed: dict[str, None] = {}
-    for drawn, left, right in ((on_body, left_end, between), (pattern, between, row.right + 0.05)):
-        page = (left, floor, right, top - row.head + 0.2)
-        unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, row.datum, page))
-    if not has_grain and datum is not None and not _grain(pen, room, pattern, datum, row.grain_angle, inside=False):
+    # Names may stand below and above a view, and beside it.
+    pages = [(left, bottom - _FOOT + 0.02, right, upper + 0.2) for left, bottom, right, upper in frames]
+    for drawn, page in zip(shown, pages, strict=True):
+        unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, cell.datum, page))
+    if not has_grain and datum is not None and not _grain(pen, room, shown[-1], datum, cell.grain_angle, pages[-1]):
         unnamed["grain"] = None
     if unnamed:
         text = f"not labelled for want of room: {', '.join(unnamed)}"
-        pen.write(row.left, floor + 0.06, text, 7.5, color=GREY)
+        pen.write(cell.left, floor + 0.04, text, 7, color=GREY)
+
+
+def _frames(cell: Cell, top: float) -> list[tuple[float, float, float, float]]:
+    """Return left, bottom, right and upper edge of the room of each view of a cell whose upper edge is at `top` [in]."""
+    heights = [cell.inches_per_metre * float(view.size[1]) for view in cell.views]
+    upper = top - cell.head
+    if cell.stacked:
+        below = upper - heights[0] - _FOOT - _HEADING
+        right = cell.left + cell.width
+        return [(cell.left, upper - heights[0], right, upper), (cell.left, below - heights[1], right, below)]
+    widths = [cell.inches_per_metre * float(view.size[0]) for view in cell.views]
+    spare = (cell.width - sum(widths)) / len(widths)
+    ends = cell.left + np.cumsum([0.0, *(width + spare for width in widths)])
+    return [(left, upper - max(heights), right, upper) for left, right in pairwise(ends.tolist())]
 
 
 def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) -> None:
     x = 0.5 * (drawn.box[0] + drawn.box[2])
-    width, height = pen.measure(words, 9.5)
-    pen.write(x, y, words, 9.5, color=GREY, ha="center", fontstyle="italic")
+    width, height = pen.measure(words, 8.5)
+    pen.write(x, y, words, 8.5, color=GREY, ha="center", fontstyle="italic")
     room.take_box(x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
 
 
-def _grain(pen: Pen, room: LabelRoom, drawn: DrawnView, datum: IntArray, grain_angle: float, *, inside: bool) -> bool:
+def _grain(
+    pen: Pen,
+    room: LabelRoom,
+    drawn: DrawnView,
+    datum: IntArray,
+    grain_angle: float,
+    page: tuple[float, float, float, float] | None = None,
+) -> bool:
     """Draw a grain arrow, turned by `grain_angle` degrees from the datum line; return False if there is no room.
 
-    It lies on the pattern if `inside`, else right of it.
+    It lies on the pattern, or beside it where a `page` is given, within which it stays [in].
     """
     line = drawn.to_page(drawn.view.points[datum])
     along = line[-1] - line[0]
@@ -207,10 +257,10 @@ def _grain(pen: Pen, room: LabelRoom, drawn: DrawnView, datum: IntArray, grain_a
     along *= 1.0 if along[1] >= 0 else -1.0
     across = np.array([along[1], -along[0]])
     text_width, text_height = pen.measure("grain", LABEL_SIZE)
-    if inside:
+    if page is None:
         place = _grain_inside(drawn, 0.5 * (line[0] + line[-1]), along, across, length, text_height)
     else:
-        place = _grain_outside(room, drawn, float(np.arctan2(along[1], along[0])))
+        place = _grain_outside(room, drawn, float(np.arctan2(along[1], along[0])), page)
     if place is None:
         return False
     centre, half = place
@@ -248,146 +298,18 @@ def _grain_inside(
     return None
 
 
-def _grain_outside(room: LabelRoom, drawn: DrawnView, angle: float) -> tuple[FloatArray, float] | None:
+def _grain_outside(
+    room: LabelRoom, drawn: DrawnView, angle: float, page: tuple[float, float, float, float]
+) -> tuple[FloatArray, float] | None:
     """Return the middle of the arrow and half its length [in] beside the cloth; None if there is no room."""
-    _, bottom, right, top = drawn.box
+    left, bottom, right, top = drawn.box
     spots = [
-        Spot(x=right + far, y=bottom + share * (top - bottom), angle=angle)
-        for far in (0.45, 0.9)
+        Spot(x=x, y=bottom + share * (top - bottom), angle=angle)
+        for x in (right + 0.25, left - 0.2, right + 0.45, right + 0.9)
         for share in (0.5, 0.25, 0.75, 0.1, 0.9)
     ]
-    free = room.place(spots, 0.8, 0.35, (0.0, 0.0, PAGE_WIDTH, np.inf))
+    free = room.place(spots, 0.8, 0.35, page)
     return None if free is None else (np.array([free.x - 0.05, free.y]), 0.35)
-
-
-def _dimensions(pen: Pen, room: LabelRoom, drawn: DrawnView) -> None:
-    """Draw width and height of the pattern, as in a technical drawing."""
-    left, bottom, right, top = drawn.box
-    width, height = drawn.view.size[:2]
-    y, x = bottom - 0.22, left - 0.26
-    for start, end, ticks in (
-        ((left, y), (right, y), ((left, left), (right, right))),
-        ((x, bottom), (x, top), ((bottom, bottom), (top, top))),
-    ):
-        ends = np.array([start, end])
-        if np.ptp(ends, axis=0).max() > 0.3:
-            pen.arrow(ends, width=0.6, colour=GREY, head=3.5)
-        else:
-            pen.line(ends, width=0.6, colour=GREY)
-        for tick, _ in ticks:
-            mark = [(tick, y + 0.14), (tick, y - 0.06)] if start[1] == end[1] else [(x + 0.18, tick), (x - 0.06, tick)]
-            pen.line(np.array(mark), width=0.6, colour=GREY)
-        room.take_line(ends, 0.1, passable=True)
-    text = _length(width)
-    text_width, text_height = pen.measure(text, 9)
-    middle = 0.5 * (left + right)
-    pen.write(middle, y - 0.14, text, 9, ha="center", color=GREY)
-    room.take_box(middle - 0.5 * text_width, y - 0.14 - 0.5 * text_height, middle + 0.5 * text_width, y - 0.07)
-    text = _length(height)
-    text_width, text_height = pen.measure(text, 9)
-    middle = 0.5 * (bottom + top)
-    if top - bottom > text_width + 0.1:
-        pen.write(x - 0.12, middle, text, 9, ha="center", color=GREY, rotation=90, rotation_mode="anchor")
-        room.take_box(x - 0.2, middle - 0.5 * text_width, x - 0.04, middle + 0.5 * text_width)
-    else:
-        pen.write(x - 0.10, middle, text, 9, ha="right", color=GREY)
-        room.take_box(x - 0.10 - text_width, middle - 0.08, x - 0.1, middle + 0.08)
-
-
-def _scale_bar(pen: Pen, room: LabelRoom, drawn: DrawnView, inches_per_metre: float) -> None:
-    """Draw a bar of a round length below the pattern."""
-    from matplotlib.patches import Rectangle
-
-    steps = np.outer(10.0 ** np.arange(-6, 4), [1.0, 2.0, 5.0]).ravel()
-    metres = float(steps[max(int(np.searchsorted(steps, 1.3 / inches_per_metre, side="right")) - 1, 0)])
-    wide = metres * inches_per_metre
-    left = max(0.5 * (drawn.box[0] + drawn.box[2] - wide), 0.2)
-    y = drawn.box[1] - 0.42
-    for part in range(2):
-        fill = INK if part == 0 else "white"
-        box = Rectangle(
-            (left + 0.5 * part * wide, y), 0.5 * wide, 0.06, facecolor=fill, edgecolor=INK, linewidth=0.7, zorder=6
-        )
-        pen.axes.add_patch(box)
-    pen.write(left + 0.5 * wide, y - 0.12, _length(metres, digits=0), 9, ha="center", color=GREY)
-    room.take_box(left - 0.1, y - 0.22, left + wide + 0.1, y + 0.08)
-
-
-def draw_colour_bar(
-    pen: Pen,
-    row: Row,
-    scale: float,
-    density: FloatArray,
-    areas: FloatArray,
-    quantity: str,
-    *,
-    top: float,
-) -> None:
-    """Draw the colour bar beside the first row, whose upper edge is at `top` [in], and the share of the area above its end."""
-    from matplotlib.patches import Polygon
-
-    from warpflat.export.picture_pixels import Pixels
-
-    above = density > scale
-    tall = float(np.clip(row.band, *_COLOUR_BAR))
-    top = top - row.head - max(0.0, 0.5 * (row.band - tall))
-    left, bottom = PAGE_WIDTH - _RIGHT + 0.45, max(top - tall, 0.75)
-    right = left + _BAR_WIDTH
-    end = bottom + (top - bottom) / (1.0 + _BAR_TIP) if above.any() else top
-    first, last = round(bottom * DPI), round(end * DPI)
-    shades = energy_colours((np.arange(last - first)[::-1, None] + 0.5) / (last - first), 1.0)
-    strip = np.full((last - first, round(_BAR_WIDTH * DPI), 4), 255, dtype=np.uint8)
-    strip[..., :3] = np.round(255.0 * shades)
-    pen.axes.add_artist(Pixels(strip, left=round(left * DPI), bottom=first, zorder=1))
-    outline = [(left, bottom), (right, bottom), (right, end), (left, end)]
-    if above.any():
-        tip = (0.5 * (left + right), top)
-        # It starts one pixel lower, so that no white shows between.
-        corners = [(left, end - 1.0 / DPI), (right, end - 1.0 / DPI), (right, end), tip, (left, end)]
-        pen.axes.add_patch(Polygon(corners, facecolor=energy_colours([1.0], 1.0)[0], linewidth=0, zorder=1))
-        outline.insert(3, tip)
-    pen.axes.add_patch(Polygon(outline, fill=False, edgecolor="black", linewidth=0.6, zorder=6))
-    places, words, power = _ticks(scale, end - bottom)
-    for place, word in zip(bottom + (end - bottom) * places / scale, words, strict=True):
-        pen.line(np.array([(right, place), (right + 3 * POINT, place)]), width=0.6, colour="black")
-        pen.write(right + 6.5 * POINT, place, word, _TICK_SIZE, color="black", va="center_baseline")
-    if power:
-        pen.write(left, top + 3 * POINT, power, 8, color="black", va="bottom")
-    wide = max(pen.measure(word, _TICK_SIZE)[0] for word in words)
-    aside: dict[str, Any] = {"rotation": 90, "rotation_mode": "anchor", "ha": "center", "va": "top"}
-    pen.write(right + 12.5 * POINT + wide, 0.5 * (bottom + end), f"{quantity} [J/m²]", 9.5, **aside)
-    total = float(areas.sum())
-    if above.any() and total > 0.0:
-        share = float(areas[above].sum()) / total
-        text = f"clipped: {_percent(share)} of the\narea is above, up to\n{density.max():.3g} J/m²"
-        pen.write(left - 0.08, bottom - 0.12, text, 7.5, color=GREY, va="top", linespacing=1.35)
-
-
-def _ticks(scale: float, length: float) -> tuple[FloatArray, list[str], str]:
-    """Return round values from 0 to `scale` for a bar of this length [in], their words, and their power of ten."""
-    from matplotlib.ticker import MaxNLocator, ScalarFormatter
-
-    most = int(np.clip(length / (2.0 * _TICK_SIZE * POINT), 1, 9))
-    values = np.asarray(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, scale))
-    values = values[values <= scale * (1.0 + 1e-9)]
-    formatter: Any = ScalarFormatter()
-    formatter.create_dummy_axis()
-    formatter.axis.set_view_interval(0.0, scale)
-    formatter.set_powerlimits((-3, 4))
-    words = formatter.format_ticks(values)
-    return values, words, formatter.get_offset()
-
-
-def _percent(share: float) -> str:
-    """Return a share in percent."""
-    return f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
-
-
-def _length(metres: float, *, digits: int = 1) -> str:
-    """Return a length as pattern makers write it: in centimetres, or in millimetres if it is below one."""
-    value, word = (100 * metres, "cm") if metres >= 0.00999 else (1000 * metres, "mm")
-    number = f"{value:.{digits}f}" if digits or value >= 1 else f"{value:.3g}"
-    return f"{number} {word}"
 
 
 def _size(width: float, height: float) -> str:

@@ -10,11 +10,11 @@ from warpflat.export.picture_views import HALO_LAYER, INK
 __all__ = ["DPI", "GRAIN", "GREY", "LABEL_SIZE", "PAGE_WIDTH", "POINT", "Pen"]
 
 DPI = 150
-PAGE_WIDTH = 12.5  # [in]
+PAGE_WIDTH = 12.5  # [in], at most
 POINT = 1.0 / 72.0  # [in]
 GREY = (0.36, 0.38, 0.42)
 GRAIN = (0.02, 0.27, 0.66)
-LABEL_SIZE = 8.5  # [pt]
+LABEL_SIZE = 7.5  # [pt]
 
 
 class Pen:
@@ -25,14 +25,14 @@ class Pen:
         self.dpi = DPI
         self._measured: dict[tuple[str, float, str], tuple[float, float]] = {}
         self.axes: Any = None
-        self.page_height = 0.0
+        self.page_width = PAGE_WIDTH
 
-    def open_page(self, figure: Any, height: float) -> None:
-        """Lay axes over the whole page whose units are inches."""
-        self.page_height = height
+    def open_page(self, figure: Any, width: float, height: float) -> None:
+        """Lay axes over the whole page, of this width and height [in], whose units are inches."""
+        self.page_width = width
         self.axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         self.axes.set_axis_off()
-        self.axes.set_xlim(0.0, PAGE_WIDTH)
+        self.axes.set_xlim(0.0, width)
         self.axes.set_ylim(0.0, height)
         self.axes.set_autoscale_on(False)
 

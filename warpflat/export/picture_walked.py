@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core.activity import report_activity
+from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_png import save_png
@@ -20,9 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["write_walked_picture"]
 
-#: Seams in a row, and the size of each; the height of the page's and of a seam's title, and the margin around a seam [in].
-COLUMNS, CELL = 3, (4.4, 1.9)
-HEAD, TITLE, MARGIN = 0.7, 0.4, 0.2
+#: Seams in a row, the width of each and its greatest height; the height of the page's and of a seam's title, and the margin around [in].
+COLUMNS, CELL, TALLEST = 3, 4.4, 1.1
+HEAD, TITLE, MARGIN = 0.5, 0.36, 0.14
 COLOURS = ("#1f5fa8", "#c8452c")
 
 
@@ -43,8 +44,10 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
 
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
-    rows = -(-len(seams) // COLUMNS)
-    width, height = COLUMNS * CELL[0], rows * CELL[1] + HEAD
+    rows = [[_fitted(seam) for seam in seams[first : first + COLUMNS]] for first in range(0, len(seams), COLUMNS)]
+    heights = [TITLE + 2 * MARGIN + max(float(np.ptp(lines[0], axis=0)[1]) for lines in row) for row in rows]
+    tops = HEAD + np.cumsum([0.0, *heights])
+    width, height = COLUMNS * CELL, float(tops[-1]) + MARGIN
     figure = Figure(figsize=(width, height), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     # One axis over the page, in inches: an axis for each seam takes longer than all that is drawn in it.
@@ -52,29 +55,35 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     axis.set_axis_off()
     for number, seam in enumerate(seams):
         row, column = divmod(number, COLUMNS)
-        _draw_seam(axis, seam, (column + 0.5) * CELL[0], height - HEAD - row * CELL[1])
+        _draw_seam(axis, seam, rows[row][column], (column + 0.5) * CELL, height - float(tops[row]), heights[row])
     words = f"{title}: the two sides of each seam laid upon each other, right sides together, darts closed [mm]"
-    axis.text(0.5 * width, height - 0.26, words, fontsize=12, ha="center", va="center", parse_math=False)
+    axis.text(0.5 * width, height - 0.26, words, fontsize=11, ha="center", va="center", parse_math=False)
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
 
 
-def _draw_seam(axis: Axes, seam: WalkedSeam, middle: float, top: float) -> None:
-    """Draw a seam in a cell, whose middle and upper edge are given [in]."""
-    from matplotlib.lines import Line2D
-
+def _fitted(seam: WalkedSeam) -> list[FloatArray]:
+    """Return both sides together, then each side and its notches, level and around the origin, as large as a cell lets them be [in]."""
     start, end = seam.sides[0][[0, -1]]
     x, y = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
     along = np.array([[x, -y], [y, x]])
     both = np.concatenate(seam.sides) @ along
     low, high = both.min(axis=0), both.max(axis=0)
-    room = np.array([CELL[0] - 2 * MARGIN, CELL[1] - TITLE - 2 * MARGIN])
-    scale = float((room / np.maximum(high - low, 1e-9)).min())
-    centre = np.array([middle, top - TITLE - 0.5 * (CELL[1] - TITLE)])
-    for line, notches, colour in zip(seam.sides, seam.notches, COLOURS, strict=True):
-        at, marks = (scale * (points @ along - 0.5 * (low + high)) + centre for points in (line, notches))
-        axis.add_artist(Line2D(*at.T, color=colour, linewidth=1.1, alpha=0.85))
-        axis.add_artist(Line2D(*marks.T, color=colour, marker="|", markersize=9, linestyle=""))
+    scale = float((np.array([CELL - 2 * MARGIN, TALLEST]) / np.maximum(high - low, 1e-9)).min())
+    middle = 0.5 * (low + high)
+    return [scale * (both - middle), *(scale * (rows @ along - middle) for rows in (*seam.sides, *seam.notches))]
+
+
+def _draw_seam(
+    axis: Axes, seam: WalkedSeam, lines: Sequence[FloatArray], middle: float, top: float, height: float
+) -> None:
+    """Draw a seam, fitted, in a cell, whose middle, upper edge and height are given [in]."""
+    from matplotlib.lines import Line2D
+
+    centre = np.array([middle, top - TITLE - 0.5 * (height - TITLE)])
+    for line, notches, colour in zip(lines[1:3], lines[3:], COLOURS, strict=True):
+        axis.add_artist(Line2D(*(line + centre).T, color=colour, linewidth=1.6, alpha=0.85))
+        axis.add_artist(Line2D(*(notches + centre).T, color=colour, marker="|", markersize=9, linestyle=""))
     notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"
     words = (
         f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip()

@@ -66,7 +66,7 @@ class FrameWriter:
 
     ``/World/NAME/surface`` is the piece in space, where it lies in the input. ``/World/NAME/pattern`` is its pattern in
     the XY plane, facing +Z; its points are the positions as given, and a translation sets it beside the surfaces
-    and the other patterns. Both carry the energy density per face and colours per vertex (linear Rec. 709, indexed) on one
+    and the other patterns. Both carry the energy density per face and colours per vertex (linear Rec. 709) on one
     scale for all pieces and all frames, stated in the colours' custom data. The values of the last frame are also
     authored as defaults, for readers that do not ask for a time.
 
@@ -266,15 +266,37 @@ class FrameWriter:
 
         time = Usd.TimeCode(number)
         self._sample(piece, flat, density, time, new_faces=new_faces, new_lines=new_lines)
-        self._measure(piece, measures or {}, time)
-
-        piece.frames += 1
         piece.last_positions = flat
         low, high = bounding_box(flat)
         piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
-        self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
         self._save_every_few_frames(len(flat))
-        return number
+        return self._count(piece, measures or {}, time)
+
+    def write_between(self, name: str, measures: Mapping[str, Measure]) -> int:
+        """Append a frame that lies evenly between the layouts before and after it; return its number.
+
+        Only its measures are stored. USD interpolates points, energies and colours linearly, so readers see all frames.
+
+        Args:
+            name: as given to :meth:`add_piece`.
+            measures: as of :meth:`write`.
+
+        Raises:
+            ValueError: the piece has no layout yet.
+        """
+        from pxr import Usd
+
+        piece = self._pieces[name]
+        if piece.frames == 0:
+            raise ValueError(f"the first frame of piece {name!r} needs a layout")
+        return self._count(piece, measures, Usd.TimeCode(FIRST_FRAME + piece.frames))
+
+    def _count(self, piece: FramePiece, measures: Mapping[str, Measure], time: Any) -> int:
+        """Author a frame's measures, count it and return its number."""
+        self._measure(piece, measures, time)
+        piece.frames += 1
+        self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), time.GetValue()))
+        return int(time.GetValue())
 
     def _sample(
         self,
@@ -292,11 +314,11 @@ class FrameWriter:
         points = np.zeros((len(flat), 3), dtype=np.float32)
         points[:, :2] = flat
         piece.on_pattern.write(time, points, piece.faces if new_faces else None)
-        energy, rows = Vt.FloatArray.FromNumpy(density), None
+        energy, shades = Vt.FloatArray.FromNumpy(density), None
         for samples, colours in zip((piece.on_surface, piece.on_pattern), piece.colours, strict=True):
-            if rows is None or colours is not piece.colours[0]:
-                rows = colours.rows(density, self._scale)
-            samples.write_energy(time, energy, rows)
+            if shades is None or colours is not piece.colours[0]:
+                shades = colours.shades(density, self._scale)
+            samples.write_energy(time, energy, shades)
         piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
         piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
         if new_lines:

@@ -1,11 +1,6 @@
-"""Colours of the pieces in `frames.usdc`: one table for all, and for each vertex of a frame its row of that table.
-
-A row takes a byte or two where a colour takes twelve.
-"""
+"""Colours of the pieces in `frames.usdc`: for each vertex the mean energy of its faces, on one scale."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,26 +8,14 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours, linear_rgb
 
-__all__ = ["COLOURS", "VertexColours", "define_colour_table"]
+__all__ = ["VertexColours"]
 
-COLOURS = 1024
-
-
-def define_colour_table(mesh: Any, scale: float) -> Any:
-    """Author the table of a mesh's `displayColor`, whose last row is the energy `scale` [J/m2]; return the attribute of rows."""
-    from pxr import Vt
-
-    table = linear_rgb(energy_colours(np.arange(COLOURS) / (COLOURS - 1), 1.0)).astype(np.float32)
-    primvar = mesh.GetDisplayColorPrimvar()
-    primvar.Set(Vt.Vec3fArray.FromNumpy(table))
-    primvar.GetAttr().SetCustomData(
-        {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
-    )
-    return primvar.CreateIndicesAttr()
+# Steps between the lowest energy and the highest.
+_COLOURS = 1024
 
 
 class VertexColours:
-    """Rows of the colour table around the vertices of one topology: a vertex has the mean of its faces by area."""
+    """Colours of the vertices of one topology: a vertex has the mean energy of its faces by area."""
 
     def __init__(self, faces: IntArray, areas: FloatArray, count: int) -> None:
         """
@@ -52,9 +35,14 @@ class VertexColours:
             ((weights[face] / whole[vertex]).astype(np.float32), (vertex, face)), shape=(count, len(faces))
         )
 
-    def rows(self, density: NDArray[np.float32], scale: float) -> NDArray[np.int32]:
-        """Return the row of each vertex (#V) for the energies of the faces (#F) [J/m2]; the last row is `scale`."""
-        share = self._shares @ density
-        share *= np.float32((COLOURS - 1) / scale)
+    def levels(self, density: NDArray[np.floating], scale: float, count: int) -> NDArray[np.int32]:
+        """Return the level of each vertex (#V), from 0 to `count` - 1 at `scale`, for the energies of the faces (#F) [J/m2]."""
+        share = self._shares @ density.astype(np.float32)
+        share *= np.float32((count - 1) / scale)
         share += np.float32(0.5)
-        return np.asarray(np.clip(share, 0, COLOURS - 1, out=share).astype(np.int32))
+        return np.asarray(np.clip(share, 0, count - 1, out=share).astype(np.int32))
+
+    def shades(self, density: NDArray[np.floating], scale: float) -> NDArray[np.float32]:
+        """Return the colour of each vertex (#V by 3, linear Rec. 709) for the energies of the faces (#F) [J/m2]."""
+        table = linear_rgb(energy_colours(np.arange(_COLOURS) / (_COLOURS - 1), 1.0)).astype(np.float32)
+        return np.asarray(table[self.levels(density, scale, _COLOURS)])

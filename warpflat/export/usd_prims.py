@@ -21,7 +21,6 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError
 from warpflat.export.geometry import Polylines
-from warpflat.export.usd_colours import define_colour_table
 
 __all__ = [
     "MeshSamples",
@@ -136,7 +135,7 @@ def bounding_box(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
 
 
 class MeshSamples:
-    """Samples of one mesh: points, energies and colours every frame, topology only where it changes."""
+    """Samples of one mesh: points, energies and colours of computed layouts, topology only where it changes."""
 
     def __init__(self, mesh: Any, scale: float) -> None:
         """
@@ -148,7 +147,10 @@ class MeshSamples:
 
         self.mesh = mesh
         self._density = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("strainEnergyDensity").GetAttr()
-        self._rows = define_colour_table(mesh, scale)
+        self._colours = mesh.GetDisplayColorPrimvar().GetAttr()
+        self._colours.SetCustomData(
+            {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
+        )
         self._stored = 0
         self._padding = 0
         self._points: Any = None
@@ -170,12 +172,12 @@ class MeshSamples:
         self._extent.Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
         self._stored = len(stored)
 
-    def write_energy(self, time: Any, density: Any, rows: NDArray[np.int32]) -> None:
-        """Write the energies of the faces [J/m2], and the row of the colour table of each vertex (#P)."""
+    def write_energy(self, time: Any, density: Any, colours: NDArray[np.float32]) -> None:
+        """Write the energies of the faces [J/m2], and the colours of the vertices (#P by 3, linear Rec. 709)."""
         from pxr import Vt
 
         self._density.Set(density, time)
-        self._rows.Set(Vt.IntArray.FromNumpy(self._padded(rows)), time)
+        self._colours.Set(Vt.Vec3fArray.FromNumpy(self._padded(colours)), time)
 
     def _padded(self, rows: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate([rows, rows[-1:]]) if self._padding else np.ascontiguousarray(rows)

@@ -241,6 +241,7 @@ def flatten_form(
     wishes: Sequence[SeamWish] = (),
     constraints: Sequence[Constraint] = (),
     curves_mm: float = CURVES_MM,
+    known: Mapping[str, Flattening] | None = None,
     **options: Any,
 ) -> Garment:
     """Flatten every piece of a form from its own datum line, then relax all together so that their seams match.
@@ -255,6 +256,7 @@ def flatten_form(
         wishes: fullness and gathers of seams; those of sleeves' caps by cloth are :func:`warpflat.garment.ease.cap_wishes`.
         constraints: on edges and lines of pieces.
         curves_mm: how far borders may move to be drawn as by hand; 0 leaves them as the cloth rests.
+        known: pieces that were flattened with these settings before, by name, not sewn; those of the same surface are not flattened again.
 
     Raises:
         InputError: a piece cannot be flattened, or a wish or constraint names what does not exist; one line says which
@@ -271,19 +273,21 @@ def flatten_form(
         "a Straight, FixedLength, Symmetric or DartMouth",
     )
     wished = seam_ratios(form, wishes)
-    names = list(form.pieces)
+    pieces = {name: flat for name, flat in (known or {}).items() if flat.surface is form.pieces[name].surface}
+    names = [name for name in form.pieces if name not in pieces]
     by_name = None if callback is None else _callback_by_name(names, callback)
     flat = flatten_all(
-        [piece.surface for piece in form.pieces.values()],
+        [form.pieces[name].surface for name in names],
         fabric=fabric,
-        datum=[piece.datum or None for piece in form.pieces.values()],
+        datum=[form.pieces[name].datum or None for name in names],
         grain_angle=grain_angle,
         relax=relax,
         callback=by_name,
         device=device,
         **options,
     )
-    pieces = dict(zip(names, flat, strict=True))
+    pieces |= dict(zip(names, flat, strict=True))
+    pieces = {name: pieces[name] for name in form.pieces}
     if not sewn:
         return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
     for name, edges in wished.full.items():

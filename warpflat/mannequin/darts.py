@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -161,6 +162,11 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
 
 
 def _cloth(layout: Layout, bricks: Sequence[str]) -> _Cloth:
+    return _cloth_of(layout, tuple(bricks))
+
+
+@functools.lru_cache(maxsize=32)  # one piece is asked for dozens of times while darts are looked for
+def _cloth_of(layout: Layout, bricks: tuple[str, ...]) -> _Cloth:
     corners = layout.faces[layout.faces_of(bricks)]
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     edges, counts = np.unique(ends, axis=0, return_counts=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 import importlib.resources
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,14 +105,27 @@ class FormResult:
         seams: between edges that are the same curve in space.
         darts: of the pieces on both sides of the body.
         ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled or bridged ones.
+        recipe, body, half: what it was built from.
     """
 
     name: str
+    recipe: Form
+    body: FloatArray
+    half: bool
     vertices: FloatArray
     pieces: Mapping[str, FormPiece]
     seams: tuple[FormSeam, ...]
     darts: tuple[PlacedDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
+
+    def differs_by_darts(self, body: FloatArray, form: Form, half: bool) -> bool:
+        """Return whether another form on a body is this one with other darts, if any."""
+        return body is self.body and half == self.half and replace(form, darts=self.recipe.darts) == self.recipe
+
+    def has_rows(self, piece: str, rows: Mapping[str, Mapping[str, IntArray]]) -> bool:
+        """Return whether darts run along the same vertices of a piece here."""
+        own, other = _rows_of(self.darts).get(piece, {}), rows.get(piece, {})
+        return own.keys() == other.keys() and all(np.array_equal(own[name], other[name]) for name in own)
 
 
 @functools.cache
@@ -215,7 +228,9 @@ def _blend_from(value: object, where: str) -> tuple[Form, float]:
     return shipped_form(str(mix["with"])), weight
 
 
-def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = False) -> FormResult:
+def realise(
+    layout: Layout, vertices: FloatArray, form: Form, *, half: bool = False, before: FormResult | None = None
+) -> FormResult:
     """Build a form's surface on a body and cut it into its pieces.
 
     Args:
@@ -223,25 +238,42 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
         vertices: #V by 3, the mannequin's [m].
         form: the garment.
         half: symmetric pieces as their left half, on the fold.
+        before: of the same layout; where it differs by darts only, its surface is taken, and its pieces whose darts are the same.
 
     Raises:
         InputError: for an unknown brick, line or level, or a piece that is not one disk.
     """
+    body = vertices
+    if before is not None and not before.differs_by_darts(body, form, half):
+        before = None
     bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
-    faces = layout.faces_of([brick for own in bricks.values() for brick in own])
-    vertices = _surface(layout, vertices, form, np.unique(layout.faces[faces]), form.neckline)
+    if before is None:
+        faces = layout.faces_of([brick for own in bricks.values() for brick in own])
+        vertices = _surface(layout, body, form, np.unique(layout.faces[faces]), form.neckline)
+    else:
+        vertices = before.vertices
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
     placed: tuple[PlacedDart, ...] = ()
     if form.darts:
         placed = place_darts(layout, vertices, bricks, form.darts)
+    rows = _rows_of(placed)
+    known = (
+        {} if before is None else {name: before.pieces[name] for name in before.pieces if before.has_rows(name, rows)}
+    )
+    pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half, known=known)
+    ease = {level: cm for level, cm in form.ease.items() if _keeps_ease(form, level)}
+    return FormResult(
+        name=form.name, recipe=form, body=body, half=half,
+        vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease,
+    )  # fmt: skip
+
+
+def _rows_of(placed: Sequence[PlacedDart]) -> dict[str, dict[str, IntArray]]:
+    """Return the vertices along each dart, by piece and dart."""
     rows: dict[str, dict[str, IntArray]] = {}
     for dart in placed:
         rows.setdefault(dart.piece, {})[dart.name] = dart.row
-    pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half)
-    ease = {level: cm for level, cm in form.ease.items() if _keeps_ease(form, level)}
-    return FormResult(
-        name=form.name, vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease
-    )
+    return rows
 
 
 def _keeps_ease(form: Form, level: str) -> bool:

@@ -231,19 +231,21 @@ class Mannequin:
             input_vertices=self.vertices, input_index=used.astype(np.int32), notes=self.notes,
         )  # fmt: skip
 
-    def form(self, form: str | Form, *, half: bool = False) -> FormResult:
+    def form(self, form: str | Form, *, half: bool = False, before: FormResult | None = None) -> FormResult:
         """Return the pieces of a form on this body, and their seams.
 
         Args:
             form: a shipped form's name (see :func:`warpflat.mannequin.forms.form_names`) or one of your own.
             half: symmetric pieces as their left half, on the fold.
+            before: a form on this body that may have much in common with it, to save time.
 
         Raises:
             InputError: for an unknown form, brick, line or profile in it.
         """
         from warpflat.mannequin.forms import realise, shipped_form
 
-        return realise(self.layout, self.vertices, shipped_form(form) if isinstance(form, str) else form, half=half)
+        recipe = shipped_form(form) if isinstance(form, str) else form
+        return realise(self.layout, self.vertices, recipe, half=half, before=before)
 
     def metrics(self) -> dict[str, Any]:
         """Return the mannequin's entry of ``metrics.json``: its source, and each level's height and girth [m].

@@ -68,7 +68,13 @@ class FormPiece:
 
 
 def cut_pieces(
-    layout: Layout, vertices: FloatArray, recipes: Recipes, *, darts: Darts | None = None, half: bool = False
+    layout: Layout,
+    vertices: FloatArray,
+    recipes: Recipes,
+    *,
+    darts: Darts | None = None,
+    half: bool = False,
+    known: Mapping[str, FormPiece] | None = None,
 ) -> dict[str, FormPiece]:
     """Join bricks into pieces.
 
@@ -79,6 +85,7 @@ def cut_pieces(
         darts: see :data:`Darts`.
         half: the left half of the garment: pieces that lie on both sides of a centre line end there, on the fold, and
             those of the right side are left out, being the left ones' mirror images.
+        known: pieces that are there already, by name.
 
     Raises:
         InputError: for an unknown brick or line, a line that does not run through its piece, a brick in two pieces, a piece that
@@ -100,8 +107,11 @@ def cut_pieces(
     if half:
         check_halves(cuts)
         cuts = {name: cut for name, cut in cuts.items() if not all(is_side(b, "right") for b in cut[0])}
-    darts = darts or {}
-    return {name: _piece(layout, vertices, name, *cut, darts.get(name, {}), half) for name, cut in cuts.items()}
+    darts, known = darts or {}, known or {}
+    return {
+        name: known.get(name) or _piece(layout, vertices, name, *cut, darts.get(name, {}), half)
+        for name, cut in cuts.items()
+    }
 
 
 def _check_opened(layout: Layout, name: str, bricks: Sequence[str], opened: Sequence[str]) -> None:

@@ -1,6 +1,6 @@
 """`frames.usdc` is packed for a page: only layouts that were computed, quantised, as differences, compressed.
 
-Frames between two of them are blended evenly in the file, and so they are on the page.
+USD interpolates frames between two of them linearly, and so does the page.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours
-from warpflat.export.geometry import outline_edges
-from warpflat.export.usd_colours import COLOURS
+from warpflat.export.geometry import face_areas, outline_edges
+from warpflat.export.usd_colours import VertexColours
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["FilmPiece", "Shape", "open_film", "pack_film"]
@@ -59,14 +59,16 @@ class FilmPiece:
         self._surface = UsdGeom.Mesh(stage.GetPrimAtPath(f"{prim.GetPath()}/surface"))
         self.name = prim.GetDisplayName() or prim.GetName()
         self.prim = prim
-        self.times = [int(time) for time in self._pattern.GetPointsAttr().GetTimeSamples()]
+        self.times = []
+        if self._pattern and self._pattern.GetPointsAttr().GetNumTimeSamples():
+            numbers = prim.GetAttribute("warpflat:stage_number")
+            last = max(numbers.GetTimeSamples() if numbers else (), default=stage.GetEndTimeCode())
+            self.times = list(range(int(stage.GetStartTimeCode()), int(last) + 1))
         self.changes = [int(time) for time in self._pattern.GetFaceVertexIndicesAttr().GetTimeSamples()]
         place = UsdGeom.Xformable(self._pattern).ComputeLocalToWorldTransform(0.0).ExtractTranslation()
         self.offset = [float(value) for value in place]
         colour = self._pattern.GetDisplayColorPrimvar()
         self.scale = float(colour.GetAttr().GetCustomData().get("rangeMax", 1.0))
-        self.is_indexed = bool(colour.IsIndexed())
-        self._rows = colour.GetIndicesAttr()
         tags = prim.GetAttribute("warpflat:interpolated")
         self.computed = [time for time in self.times if not (tags and tags.Get(time))]
         self._density = UsdGeom.PrimvarsAPI(self._pattern).GetPrimvar("strainEnergyDensity").GetAttr()
@@ -91,9 +93,9 @@ class FilmPiece:
         """Return the energies at a frame, #F [J/m2]."""
         return np.array(self._density.Get(time), dtype=np.float64)
 
-    def rows(self, time: int, count: int) -> NDArray[np.uint8]:
+    def rows(self, time: int, colours: VertexColours) -> NDArray[np.uint8]:
         """Return the row of the page's colour table of each vertex at a frame, #P."""
-        return np.asarray(np.array(self._rows.Get(time))[:count] // (COLOURS // _COLOURS), dtype=np.uint8)
+        return colours.levels(self.density(time), self.scale, _COLOURS).astype(np.uint8)
 
     def key_frames(self) -> list[int]:
         """Return the computed frames without those at which the piece stands still, before and after; all others follow from them."""
@@ -111,7 +113,7 @@ def open_film(path: Path) -> list[FilmPiece]:
     """Open the pieces of a `frames.usdc` that have frames.
 
     Raises:
-        InputError: it is no USD file, or of an earlier version.
+        InputError: it is no USD file.
     """
     from pxr import Tf, Usd
 
@@ -120,10 +122,7 @@ def open_film(path: Path) -> list[FilmPiece]:
     except Tf.ErrorException as error:
         raise InputError(f"{path}: is not a USD file that can be opened; run the scene again") from error
     found = [FilmPiece(stage, prim) for prim in stage.GetDefaultPrim().GetChildren() if prim.GetChild("pattern")]
-    pieces = [piece for piece in found if piece.times]
-    if not all(piece.is_indexed for piece in pieces):
-        raise InputError(f"{path}: the film was written by an earlier version of warpflat; run the scene again")
-    return pieces
+    return [piece for piece in found if piece.times]
 
 
 def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
@@ -209,8 +208,9 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
     ]
     box = _Box(np.concatenate([positions for _, _, positions, _ in layouts]))
     before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
+    painted = [VertexColours(shape.faces, _areas(shape), len(shape.surface)) for shape in shapes]
     for number, _, positions, time in layouts:
-        steps, colours = box.steps(positions), piece.rows(time, len(positions))
+        steps, colours = box.steps(positions), piece.rows(time, painted[number])
         same = before is not None and before[0] == number
         blocks.append(_planes(steps - before[1] if same and before else steps))
         blocks.append((colours - before[2] if same and before else colours).tobytes())
@@ -224,6 +224,11 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
         "frames": list(stored),
     }
     return entry, blocks
+
+
+def _areas(shape: Shape) -> FloatArray:
+    """Return the areas of the faces on the surface, #F [m2]."""
+    return face_areas(shape.surface, shape.faces)
 
 
 def _at(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> Iterator[tuple[int, Shape, int]]:

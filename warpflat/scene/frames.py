@@ -38,7 +38,7 @@ _SHRUNK = 0.002
 _LATER, _LINE = 15 / 60, 6 / 60
 # Into so many frames of a film of 60 the largest displacement of a stage is parted.
 _PARTS = 20 / 60
-# A film of more frames times vertices is thinned out: so many fill some 300 MB.
+# So many vertices of computed layouts a stage keeps at most: they fill some 200 MB. Frames between them take no room.
 _MOST_VERTICES = 6_000_000
 # A layout is kept if it lies at least this share of the stage's way from the one kept before.
 _KEPT = 0.05
@@ -143,13 +143,13 @@ class Film:
         if self._output.frame_every is not None:
             return stage, stage.keys, len(stage.keys)
         if stage.still:
-            return stage, stage.keys, min(max(round(_LINE * self._output.frames), 1), self._most)
+            return stage, stage.keys, max(round(_LINE * self._output.frames), 1)
         share = 1.0 if number == 0 else _LATER
         keys, count = self._keys.place_frames(
             stage,
             steps=_PARTS * self._output.frames,
             at_least=max(math.ceil(share * self._output.frames), 2),
-            at_most=self._most,
+            most_keys=self._most,
         )
         return stage, keys, count
 
@@ -164,17 +164,21 @@ class Film:
     def _write_frame(
         self, writer: FrameWriter, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool
     ) -> None:
+        measures = {
+            "stage": stage.name,
+            "stage_number": number,
+            "interpolated": frame.positions is None,
+            **_counts_whole(frame.measures),
+        }
+        if frame.positions is None or frame.face_energy_density is None:
+            writer.write_between(name, measures)
+            return
         writer.write(
             name,
             positions=frame.positions,
             face_energy_density=frame.face_energy_density,
             **(stage.topology if begins else {}),  # type: ignore[arg-type]
-            measures={
-                "stage": stage.name,
-                "stage_number": number,
-                "interpolated": frame.interpolated,
-                **_counts_whole(frame.measures),
-            },
+            measures=measures,
         )
 
 

@@ -48,16 +48,14 @@ class Frame:
     """A frame of one piece.
 
     Attributes:
-        positions: #P by 2, the layout [m].
-        face_energy_density: #F, strain energy per area [J/m2].
         measures: numbers of this layout.
-        interpolated: whether it lies between two computed layouts.
+        positions: #P by 2, the layout [m]; None where it lies evenly between the computed ones before and after.
+        face_energy_density: #F, strain energy per area [J/m2]; None there, too.
     """
 
-    positions: NDArray[np.float32]
-    face_energy_density: NDArray[np.float32]
     measures: Mapping[str, float]
-    interpolated: bool
+    positions: NDArray[np.float32] | None = None
+    face_energy_density: NDArray[np.float32] | None = None
 
 
 @dataclass(kw_only=True, eq=False)
@@ -158,36 +156,39 @@ class KeyFile:
             distances.append(_largest_move(at, last))
         return kept, distances
 
-    def place_frames(self, stage: FilmStage, *, steps: float, at_least: int, at_most: int) -> tuple[list[Key], int]:
+    def place_frames(self, stage: FilmStage, *, steps: float, at_least: int, most_keys: int) -> tuple[list[Key], int]:
         """Choose the keys that are shown, and the number of frames.
 
         Args:
             stage: of the film.
             steps: into so many frames the stage's largest displacement is parted, or more.
-            at_least, at_most: limits on the number of frames; the latter goes before all else.
+            at_least: frames.
+            most_keys: at least 2.
         """
         way = self.displacement(stage, stage.keys)
         if way <= _STILL:
-            return [stage.keys[0], stage.keys[-1]], min(at_least, at_most)
+            return [stage.keys[0], stage.keys[-1]], at_least
         spacing = 2.0 * way / steps
         while True:
             keys, distances = self.thin(stage, spacing)
             shown = max(self.displacement(stage, keys), _STILL)  # the layout farthest out may be left out
             wanted = 1 + sum(math.ceil(steps * distance / shown) for distance in distances)
-            if len(keys) <= 2 or (len(keys) <= at_most and wanted <= 4 * at_least):
-                return keys, min(max(wanted, at_least), max(at_most, 2))
+            if len(keys) <= 2 or (len(keys) <= most_keys and wanted <= 4 * at_least):
+                return keys, max(wanted, at_least)
             spacing *= 1.5
 
     def frames(self, stage: FilmStage, keys: Sequence[Key], number: int) -> Iterator[Frame]:
-        """Yield `number` frames along the path through these keys, each of which is one of the frames."""
+        """Yield `number` frames along the path through these keys, each of which is one of the frames.
+
+        Those between two keys have no layout of their own: the way from one to the next is straight and even.
+        """
         distances = [_largest_move(self.positions(stage, a), self.positions(stage, b)) for a, b in pairwise(keys)]
         yield self._computed(stage, keys[0])
         counts = spread(distances, number - 1)
         for (begin, end), count in zip(pairwise(keys), counts, strict=True):
-            first, last = self._computed(stage, begin), self._computed(stage, end)
             for step in range(1, count):
-                yield _blend(first, last, step / count)
-            yield last
+                yield _between(begin, end, step / count)
+            yield self._computed(stage, end)
         for _ in range(number - 1 - sum(counts)):
             yield self._computed(stage, keys[-1])
 
@@ -196,7 +197,6 @@ class KeyFile:
             positions=self.positions(stage, key),
             face_energy_density=self.density(stage, key),
             measures=key.measures,
-            interpolated=False,
         )
 
 
@@ -214,18 +214,14 @@ def spread(distances: Sequence[float], number: int) -> list[int]:
     return counts
 
 
-def _blend(first: Frame, last: Frame, share: float) -> Frame:
+def _between(first: Key, last: Key, share: float) -> Frame:
     """Return the frame at this share of the way between two computed ones."""
-    a, b = np.float32(1.0 - share), np.float32(share)
     return Frame(
-        positions=a * first.positions + b * last.positions,
-        face_energy_density=a * first.face_energy_density + b * last.face_energy_density,
         measures={
             key: (1.0 - share) * value + share * last.measures[key]
             for key, value in first.measures.items()
             if key in last.measures
-        },
-        interpolated=True,
+        }
     )
 
 

@@ -43,15 +43,22 @@ from warpflat.scene.write import SceneResult, packed_film, packed_pictures, revi
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
 
 
-def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, FormResult]:
+def scene_form(
+    scene: Scene, mannequin: Mannequin | None = None, *, before: FormResult | None = None
+) -> tuple[Mannequin, FormResult]:
     """Build the pieces of the scene's form on its mannequin, or on another one; return both.
+
+    Args:
+        scene: with a form.
+        mannequin: another one than the scene's.
+        before: a form on this mannequin that may have much in common, to save time.
 
     Raises:
         InputError: the body, the form or a brick is wrong.
     """
     mannequin, form = scene_recipe(scene, mannequin)
     with errors_named(f"{scene.where}: {'cuts' if scene.settings.cuts else 'form'}"):
-        return mannequin, mannequin.form(form, half=scene.settings.half)
+        return mannequin, mannequin.form(form, half=scene.settings.half, before=before)
 
 
 def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:
@@ -106,8 +113,13 @@ class GarmentPlan:
     openings: Sequence[Opening]
     settings: Mapping[str, Any]
 
-    def flatten(self, *, callback: Callable[[str, Progress], bool | None] | None = None) -> Garment:
-        """Flatten and sew the garment.
+    def flatten(
+        self,
+        *,
+        callback: Callable[[str, Progress], bool | None] | None = None,
+        known: Mapping[str, Flattening] | None = None,
+    ) -> Garment:
+        """Flatten and sew the garment; `callback` and `known` as :func:`warpflat.garment.garment.flatten_form` takes them.
 
         Raises:
             InputError: as :func:`warpflat.garment.garment.flatten_form`.
@@ -117,6 +129,7 @@ class GarmentPlan:
                 self.mannequin,
                 self.form,
                 callback=callback,
+                known=known,
                 wishes=self.wishes,
                 constraints=self.constraints,
                 **self.settings,

@@ -144,14 +144,22 @@ def _solve_garment(
     if plan is not None and mannequin is plan.mannequin and _alike(settled, plan.scene, _OF_FORM):
         form = plan.form
     else:
-        form = scene_form(settled, mannequin)[1]
+        form = scene_form(settled, mannequin, before=None if plan is None else plan.form)[1]
     plan = plan_garment(settled, built=(mannequin, form))
-    garment = plan.flatten(callback=callback)
+    garment = plan.flatten(callback=callback, known=_known(plan, before))
     while (opened := without_closed_darts(settled, [garment]))[1]:
         settled, notes = opened[0], (*notes, *opened[1])
-        plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin)[1]))
-        garment = plan.flatten(callback=callback)
+        plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin, before=plan.form)[1]))
+        garment = plan.flatten(callback=callback, known=_known(plan, before))
     return Solution(scene=scene, pieces=garment.pieces, plan=plan, garment=garment, notes=(*notes, *garment.notes))
+
+
+def _known(plan: GarmentPlan, before: Solution | None) -> dict[str, Flattening]:
+    """Return the pieces of another solution as they lay at rest before they were sewn, if they were flattened as the plan asks."""
+    if before is None or before.plan is None or before.plan.settings != plan.settings:
+        return {}
+    unsewn = {name: piece.unsewn for name, piece in before.pieces.items() if name in plan.form.pieces}
+    return {name: piece for name, piece in unsewn.items() if piece is not None and piece.converged}
 
 
 def _body(scene: Scene) -> Mannequin:
