@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
-from warpflat.core.beside import Beside
+from warpflat.core.beside import Beside, ForkServer
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.fabric.library import as_fabric
@@ -37,7 +37,7 @@ from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fab
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
-from warpflat.scene.write import SceneResult, packed_film, packed_pictures, review_files
+from warpflat.scene.write import SceneResult, modules_of_files, packed_film, packed_pictures, review_files
 
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
 
@@ -193,9 +193,23 @@ def run_garment(
     device: str | None = None,
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
+    with ForkServer(modules_of_files(scene)) as server:
+        plan = plan_garment(scene, device=device)
+        return _run_plan(plan, out, server, on_progress=on_progress, device=device)
+
+
+def _run_plan(
+    plan: GarmentPlan,
+    out: Path,
+    server: ForkServer,
+    *,
+    on_progress: Callable[[Progress], bool | None] | None,
+    device: str | None,
+) -> SceneResult:
+    """Flatten the garment and write its files; pictures and pattern in processes of the server."""
     from warpflat.core.atomic_files import expect_files
 
-    plan = plan_garment(scene, device=device)
+    scene = plan.scene
     expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
     if FrameSchedule(scene.settings.output).wanted:
         expect_files(out, [MANNEQUIN])
@@ -208,14 +222,14 @@ def run_garment(
             garment = _flatten_with_frames(plan, film, on_progress=on_progress)
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
-            pictures = beside.enter_context(Beside(partial(_write_pieces, plan, garment, out), "drawing the pictures"))
+            drawn = partial(_write_pieces, plan, garment, out)
+            pictures = beside.enter_context(Beside(drawn, "drawing the pictures", server=server))
             graded = {
                 size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
                 for size, (body, form) in others.items()
             }
-            pattern = beside.enter_context(
-                Beside(partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out), "drafting the pattern")
-            )
+            drafted = partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out)
+            pattern = beside.enter_context(Beside(drafted, "drafting the pattern", server=server))
         draped = write_drape(scene, garment, out, device=device)
         return _finish(plan, garment, graded, out, draped=draped, pictures=pictures, pattern=pattern)
 
