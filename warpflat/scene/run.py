@@ -36,10 +36,9 @@ if TYPE_CHECKING:
     from warpflat.scene.frames import FrameRecorder
     from warpflat.scene.schema import SceneTable
 
-# From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
+# From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run. With fewer
+# they get a copy of what they write.
 _MANY = 500_000
-# Up to so many, pictures and pattern get a copy of what is written, and have been imported meanwhile.
-_FEW = 150_000
 
 __all__ = ["files_of_run", "flatten_scene", "run_scene", "scene_cuts", "scene_ledger"]
 
@@ -113,7 +112,7 @@ def _run_surface(
     _check_edges(scene, sequence, drawing)
     wanted = FrameSchedule(settings.output).wanted
     require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
-    few = len(sequence.surface.vertices) <= _FEW
+    few = len(sequence.surface.vertices) < _MANY
     with ForkServer(modules_of_files(scene) if few else ()) as server, ExitStack() as beside:
         with Film(folder, settings.output, [sequence.surface]) as film:
             recorder = film.recorders[sequence.surface.name]
@@ -128,7 +127,7 @@ def _run_surface(
             pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures", server=server)
             drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
             pattern = Beside(drawn, "drafting the pattern", server=server)
-            if len(sequence.surface.vertices) < _MANY:
+            if few:
                 beside.enter_context(pictures)
                 beside.enter_context(pattern)
         drape_metrics, drape_files = write_drape(scene, result, folder, device=device)

@@ -222,8 +222,10 @@ def _run_plan(
             garment = _flatten_with_frames(plan, film, on_progress=on_progress)
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
-            drawn = partial(_write_pieces, plan, garment, out)
-            pictures = beside.enter_context(Beside(drawn, "drawing the pictures", server=server))
+            pictures = [  # the quickest first
+                beside.enter_context(Beside(partial(write, plan, garment, out), "drawing the pictures", server=server))
+                for write in (_write_wear, _write_pieces)
+            ]
             graded = {
                 size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
                 for size, (body, form) in others.items()
@@ -280,17 +282,20 @@ def _flatten_with_frames(
 
 
 def _write_pieces(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
-    """Write an OBJ per piece and the pictures of the flattened garment; return their names."""
-    settings = plan.scene.settings
-    files = garment.write_files(out, picture=settings.output.picture)
-    wearer = garment.wearer
-    if settings.output.picture and (settings.wear is not None or (wearer is not None and wearer.is_stretched)):
-        from warpflat.flattening.fit_picture import write_wear_sheet
+    """Write an OBJ per piece and the picture of the flattened garment; return their names."""
+    return garment.write_files(out, picture=plan.scene.settings.output.picture)
 
-        files.append("wear.png")
-        on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
-        write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name, on_body=on_body)
-    return files
+
+def _write_wear(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
+    """Draw how the garment is worn, if that was asked for or the cloth is stretched; return the name of the picture in a list."""
+    settings, wearer = plan.scene.settings, garment.wearer
+    if not settings.output.picture or (settings.wear is None and (wearer is None or not wearer.is_stretched)):
+        return []
+    from warpflat.flattening.fit_picture import write_wear_sheet
+
+    on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
+    write_wear_sheet(out / "wear.png", list(garment.pieces.values()), title=garment.name, on_body=on_body)
+    return ["wear.png"]
 
 
 def _own_size(plan: GarmentPlan) -> str:
@@ -325,7 +330,7 @@ def _finish(
     out: Path,
     *,
     draped: tuple[dict[str, Any], list[str]],
-    pictures: Beside[list[str]],
+    pictures: Iterable[Beside[list[str]]],
     pattern: Beside[WrittenPattern],
 ) -> SceneResult:
     """Write the last files of a garment when all others are there, and remove what earlier runs have left.
@@ -336,16 +341,18 @@ def _finish(
         graded: the garment in the other sizes of the pattern.
         out: an existing folder.
         draped: entries and files of the drape.
-        pictures, pattern: write the pieces with their pictures, and the pattern.
+        pictures, pattern: write the pieces with their pictures, in that order, and the pattern.
     """
     from warpflat.export.letters import note_on_names
 
     scene, settings = plan.scene, plan.scene.settings
     measured, film = garment.metrics(), packed_film(scene, out)
-    files = [*pictures.result(), *draped[1], "metrics.json"]
+    files, images = [*draped[1], "metrics.json"], packed_pictures(scene, out, draped[1])
     if FrameSchedule(settings.output).wanted:
         files.append("frames.usdc")
-    images = packed_pictures(scene, out, files)  # while the pattern is written
+    for drawn in (each.result() for each in pictures):
+        files = [*drawn, *files]
+        images |= packed_pictures(scene, out, drawn)  # while others are drawn
     written = pattern.result()
     measured |= {**_metrics_of_sizes(graded), **draped[0], **written.metrics}
     if settings.mannequin is not None:

@@ -155,7 +155,7 @@ def packed_film(scene: Scene, folder: Path) -> Mapping[str, Any] | None:
     return pack_frames(folder)
 
 
-def packed_pictures(scene: Scene, folder: Path, files: Sequence[str]) -> Mapping[str, str]:
+def packed_pictures(scene: Scene, folder: Path, files: Sequence[str]) -> dict[str, str]:
     """Return the pictures among the files that have been written, packed for `review.html` if the scene wants it."""
     output = scene.settings.output
     if not (output.picture and output.review):
