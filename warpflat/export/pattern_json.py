@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from pydantic_core import to_json
 
 from warpflat._version import __version__
 from warpflat.core.atomic_files import atomic_path
@@ -87,7 +87,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
 def write_pattern_json(garment: DraftedGarment, path: str | os.PathLike[str]) -> None:
     """Write :func:`pattern_json`; the file appears whole or not at all."""
     with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(pattern_json(garment), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        temporary.write_bytes(to_json(pattern_json(garment), indent=1) + b"\n")
 
 
 def _side(side: SeamSide) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
-from warpflat.core.beside import Beside
+from warpflat.core.beside import Beside, ForkServer
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.fabric.library import as_fabric
@@ -38,7 +38,7 @@ from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fab
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
-from warpflat.scene.write import SceneResult, packed_film, packed_pictures, review_files
+from warpflat.scene.write import SceneResult, modules_of_files, packed_film, packed_pictures, review_files
 
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
 
@@ -208,26 +208,34 @@ def run_garment(
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     notes: tuple[str, ...] = ()
-    while True:
-        try:
-            result = _run_garment(scene, out, on_progress=on_progress, device=device)
-            return replace(result, notes=(*notes, *result.notes))
-        except ClosedDarts as closed:
-            scene, left_out = closed.without, closed.notes
-            notes += left_out
+    with ForkServer(modules_of_files(scene)) as server:
+        while True:
+            plan = plan_garment(scene, device=device)
+            try:
+                result = _run_plan(plan, out, server, on_progress=on_progress, device=device)
+            except ClosedDarts as closed:
+                scene, left_out = closed.without, closed.notes
+                notes += left_out
+            else:
+                return replace(result, notes=(*notes, *result.notes))
 
 
-def _run_garment(
-    scene: Scene, out: Path, *, on_progress: Callable[[Progress], bool | None] | None, device: str | None
+def _run_plan(
+    plan: GarmentPlan,
+    out: Path,
+    server: ForkServer,
+    *,
+    on_progress: Callable[[Progress], bool | None] | None,
+    device: str | None,
 ) -> SceneResult:
-    """Run a scene's garment as it is asked for.
+    """Flatten the garment and write its files; pictures and pattern in processes of the server.
 
     Raises:
-        ClosedDarts: some darts of its shape do not open.
+        ClosedDarts: some darts of the scene's shape do not open.
     """
     from warpflat.core.atomic_files import expect_files
 
-    plan = plan_garment(scene, device=device)
+    scene = plan.scene
     expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
     if FrameSchedule(scene.settings.output).wanted:
         expect_files(out, [MANNEQUIN])
@@ -241,15 +249,17 @@ def _run_garment(
             require_open_darts(scene, [garment])
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
-            pictures = beside.enter_context(Beside(partial(_write_pieces, plan, garment, out), "drawing the pictures"))
+            pictures = [  # the quickest first
+                beside.enter_context(Beside(partial(write, plan, garment, out), "drawing the pictures", server=server))
+                for write in (_write_wear, _write_pieces)
+            ]
             graded = {
                 size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
                 for size, (body, form) in others.items()
             }
             require_open_darts(scene, graded.values())
-            pattern = beside.enter_context(
-                Beside(partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out), "drafting the pattern")
-            )
+            drafted = partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out)
+            pattern = beside.enter_context(Beside(drafted, "drafting the pattern", server=server))
         draped = write_drape(scene, garment, out, device=device)
         return _finish(plan, garment, graded, out, draped=draped, pictures=pictures, pattern=pattern)
 
@@ -300,17 +310,20 @@ def _flatten_with_frames(
 
 
 def _write_pieces(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
-    """Write an OBJ per piece and the pictures of the flattened garment; return their names."""
-    settings = plan.scene.settings
-    files = garment.write_files(out, picture=settings.output.picture)
-    wearer = garment.wearer
-    if settings.output.picture and (settings.wear is not None or (wearer is not None and wearer.is_stretched)):
-        from warpflat.flattening.fit_picture import write_wear_sheet
+    """Write an OBJ per piece and the picture of the flattened garment; return their names."""
+    return garment.write_files(out, picture=plan.scene.settings.output.picture)
 
-        files.append("wear.png")
-        on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
-        write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name, on_body=on_body)
-    return files
+
+def _write_wear(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
+    """Draw how the garment is worn, if that was asked for or the cloth is stretched; return the name of the picture in a list."""
+    settings, wearer = plan.scene.settings, garment.wearer
+    if not settings.output.picture or (settings.wear is None and (wearer is None or not wearer.is_stretched)):
+        return []
+    from warpflat.flattening.fit_picture import write_wear_sheet
+
+    on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
+    write_wear_sheet(out / "wear.png", list(garment.pieces.values()), title=garment.name, on_body=on_body)
+    return ["wear.png"]
 
 
 def _own_size(plan: GarmentPlan) -> str:
@@ -345,7 +358,7 @@ def _finish(
     out: Path,
     *,
     draped: tuple[dict[str, Any], list[str]],
-    pictures: Beside[list[str]],
+    pictures: Iterable[Beside[list[str]]],
     pattern: Beside[WrittenPattern],
 ) -> SceneResult:
     """Write the last files of a garment when all others are there, and remove what earlier runs have left.
@@ -356,16 +369,18 @@ def _finish(
         graded: the garment in the other sizes of the pattern.
         out: an existing folder.
         draped: entries and files of the drape.
-        pictures, pattern: write the pieces with their pictures, and the pattern.
+        pictures, pattern: write the pieces with their pictures, in that order, and the pattern.
     """
     from warpflat.export.letters import note_on_names
 
     scene, settings = plan.scene, plan.scene.settings
     measured, film = garment.metrics(), packed_film(scene, out)
-    files = [*pictures.result(), *draped[1], "metrics.json"]
+    files, images = [*draped[1], "metrics.json"], packed_pictures(scene, out, draped[1])
     if FrameSchedule(settings.output).wanted:
         files.append("frames.usdc")
-    images = packed_pictures(scene, out, files)  # while the pattern is written
+    for drawn in (each.result() for each in pictures):
+        files = [*drawn, *files]
+        images |= packed_pictures(scene, out, drawn)  # while others are drawn
     written = pattern.result()
     measured |= {**_metrics_of_sizes(graded), **draped[0], **written.metrics}
     if settings.mannequin is not None:

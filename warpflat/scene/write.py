@@ -18,12 +18,20 @@ if TYPE_CHECKING:
 __all__ = [
     "SceneResult",
     "measure_fit",
+    "modules_of_files",
     "packed_film",
     "packed_pictures",
     "review_files",
     "write_pieces",
     "write_surface",
 ]
+
+
+# What pictures and pattern files need, and the solvers do not.
+_OF_PICTURES = ("warpflat.export.picture", "warpflat.flattening.fit_picture", "matplotlib.backends.backend_agg", "matplotlib.figure",
+                "matplotlib.patheffects", "PIL.PngImagePlugin")  # fmt: skip
+_OF_PATTERN = ("shapely", "warpflat.garment.to_pattern", "warpflat.export.dxf", "warpflat.export.pdf", "warpflat.export.pattern_json",
+               "warpflat.pattern.draft", "reportlab.pdfbase.ttfonts", "reportlab.pdfgen.canvas", "scipy.interpolate")  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +47,13 @@ class SceneResult:
     metrics: dict[str, Any]
     files: tuple[str, ...]
     notes: tuple[str, ...]
+
+
+def modules_of_files(scene: Scene) -> list[str]:
+    """Return the modules that write the pictures and the pattern of a scene, which takes a while to import."""
+    settings = scene.settings
+    drafted = settings.pattern.formats or settings.marker is not None
+    return [*(_OF_PICTURES if settings.output.picture else ()), *(_OF_PATTERN if drafted else ())]
 
 
 def write_pieces(scene: Scene, pieces: Sequence[Flattening], folder: Path) -> list[str]:
@@ -140,7 +155,7 @@ def packed_film(scene: Scene, folder: Path) -> Mapping[str, Any] | None:
     return pack_frames(folder)
 
 
-def packed_pictures(scene: Scene, folder: Path, files: Sequence[str]) -> Mapping[str, str]:
+def packed_pictures(scene: Scene, folder: Path, files: Sequence[str]) -> dict[str, str]:
     """Return the pictures among the files that have been written, packed for `review.html` if the scene wants it."""
     output = scene.settings.output
     if not (output.picture and output.review):

@@ -204,22 +204,32 @@ def _given_to_vertices(surface: Surface, density: FloatArray) -> tuple[FloatArra
 
 def _diffusion_matrix(surface: Surface, area: FloatArray, length: float) -> tuple[csr_array, float]:
     """Return M + l^2/2 L, #V by #V, and the length of a typical edge [m]."""
-    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse import diags_array
+
+    joined, edge = _halves_of_couplings(surface, length)
+    joined = joined + joined.T
+    return (diags_array(area + joined.sum(axis=1)) - joined).tocsr(), edge
+
+
+def _halves_of_couplings(surface: Surface, length: float) -> tuple[csr_array, float]:
+    """Return a matrix, #V by #V, whose sum with its transpose couples neighbours in M + l^2/2 L, and the length of a typical edge [m]."""
+    from scipy.sparse import csr_array
 
     triangles, _, weight = corner_triangles(surface.faces)
     triangle_area, product = _measured(surface, triangles)
     # Negative cotangents of obtuse corners could make densities negative, and those of slivers are rounding noise.
     # Without them the diffusion is a little slower there and still conserves energy.
-    product = np.maximum(product, 0.0)
+    np.maximum(product, 0.0, out=product)
     # A corner below 0.001 rad counts as 0.001 rad: it couples its neighbours almost rigidly anyway.
-    cotangent = product / np.maximum(2.0 * triangle_area[:, None], 1e-3 * product + np.finfo(float).tiny)
-    half = 0.25 * length**2 * weight[:, None] * cotangent
-    count = len(surface.vertices)
+    half = 1e-3 * product
+    half += np.finfo(float).tiny
+    np.maximum(2.0 * triangle_area[:, None], half, out=half)
+    np.divide(product, half, out=half)
+    del product  # a million vertices' takes 50 MB
+    half *= 0.25 * length**2 * weight[:, None]
     across = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, 1, axis=1).ravel()
-    joined = coo_array((half.ravel(), across), shape=(count, count)).tocsr()
-    joined = joined + joined.T
-    matrix = (diags_array(area + joined.sum(axis=1)) - joined).tocsr()
-    return matrix, float(np.sqrt(triangle_area.mean()))
+    count = len(surface.vertices)
+    return csr_array((half.ravel(), across), shape=(count, count)), float(np.sqrt(triangle_area.mean()))
 
 
 def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: float) -> FloatArray:

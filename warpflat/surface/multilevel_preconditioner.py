@@ -33,8 +33,8 @@ def multilevel_preconditioner(matrix: csr_array, places: FloatArray, edge_length
         _, first, label = np.unique(
             (cube[:, 0] * sizes_y + cube[:, 1]) * sizes_z + cube[:, 2], return_index=True, return_inverse=True
         )
-        rows = np.arange(len(label) + 1)
-        sums = csr_array((np.ones(len(label)), label, rows), shape=(len(label), len(first)))
+        rows = np.arange(len(label) + 1, dtype=np.int32)
+        sums = csr_array((np.ones(len(label)), label.astype(np.int32), rows), shape=(len(label), len(first)))
         matrix = (sums.T @ (matrix @ sums)).tocsr()
         inverse.append(1.0 / matrix.diagonal())
         into.append(label)
