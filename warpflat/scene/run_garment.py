@@ -208,16 +208,16 @@ def run_garment(
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     notes: tuple[str, ...] = ()
-    with ForkServer(modules_of_files(scene)) as server:
-        while True:
-            plan = plan_garment(scene, device=device)
-            try:
+    while True:
+        try:
+            with ForkServer(modules_of_files(scene)) as server:
+                plan = plan_garment(scene, device=device)
                 result = _run_plan(plan, out, server, on_progress=on_progress, device=device)
-            except ClosedDarts as closed:
-                scene, left_out = closed.without, closed.notes
-                notes += left_out
-            else:
-                return replace(result, notes=(*notes, *result.notes))
+        except ClosedDarts as closed:
+            scene, left_out = closed.without, closed.notes
+            notes += left_out
+        else:
+            return replace(result, notes=(*notes, *result.notes))
 
 
 def _run_plan(
