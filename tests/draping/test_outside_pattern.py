@@ -285,6 +285,41 @@ def test_a_gathered_skirt_goes_around_the_body_by_its_own_width():
     assert placed["front skirt"][:, 1].max() == pytest.approx(placed["front"][:, 1].min(), abs=1e-6)
 
 
+def test_trousers_hang_from_the_waist_with_each_leg_on_its_side():
+    """The inside of a leg is no seam behind the body, and the waistband's seam none over a shoulder."""
+    front = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.9), (0.0, 0.9), (-0.05, 0.63)]
+    back = [(0.0, 0.0), (0.2, 0.0), (0.25, 0.63), (0.2, 0.9), (0.0, 0.9)]
+    band = polygon("band", [(0.0, 0.0), (0.8, 0.0), (0.8, 0.05), (0.0, 0.05)])
+    legs = [polygon("front", front, quantity=2), polygon("back", back, quantity=2)]
+
+    def side(piece: str, edge: str, *, mirrored: bool = False, reversed: bool = False) -> SeamSide:
+        return SeamSide(piece=piece, edge=edge, mirrored=mirrored, reversed=reversed)
+
+    seams = [
+        Seam(name=f"{name} {k}", sides=((side("front", a, mirrored=k),), (side("back", b, mirrored=k, reversed=True),)))
+        for name, a, b in (("outside", "e2", "e5"), ("inside", "e5", "e2"))
+        for k in (False, True)
+    ]
+    seams += [
+        Seam(name=f"crotch {piece}", sides=((side(piece, edge, mirrored=True),), (side(piece, edge),)))
+        for piece, edge in (("front", "e4"), ("back", "e3"))
+    ]
+    waist = [("front", "e3", False), ("back", "e4", False), ("back", "e4", True), ("front", "e3", True)]
+    # From the front's middle over the left side: with the mirrored edges, against the others.
+    chain = tuple(side(piece, edge, mirrored=k, reversed=not k) for piece, edge, k in waist)
+    seams.append(Seam(name="waist", sides=((side("band", "e1"),), chain)))
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    pieces, seams, _ = whole_pieces([*legs, band], seams)
+    meshes, welds = mesh_pieces(pieces, seams, 0.03)
+    placed = wrap_pieces(meshes, welds, body)
+    for name in ("front", "back", "front mirrored", "back mirrored"):
+        x, _, z = placed[name].mean(axis=0)
+        assert np.sign(x) == (-1.0 if "mirrored" in name else 1.0)
+        assert np.sign(z) == (1.0 if name.startswith("front") else -1.0)
+    assert placed["band"][:, 1].max() == pytest.approx(body.levels()["waist"].height, abs=1e-6)
+    assert np.ptp(placed["band"][:, 0]) == pytest.approx(np.ptp(np.concatenate(list(placed.values()))[:, 0]), rel=0.1)
+
+
 def test_a_tube_that_nothing_holds_falls_off():
     body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
     with pytest.raises(InputError, match=r"falls off: nothing on the body holds the garment"):

@@ -326,7 +326,9 @@ class Garment:
         names = [piece.name for piece in pieces]
         doubled = sorted({n for n in names if names.count(n) > 1})
         if doubled:
-            raise InputError(f"garment {self.name!r}, size {size}: piece {doubled[0]!r} occurs twice; names are unique")
+            raise InputError(
+                f"garment {self.name!r}{f', size {size}' if size else ''}: piece {doubled[0]!r} occurs twice; names are unique"
+            )
         expected = {piece.name for piece in next(iter(self.pieces.values()))}
         if set(names) != expected:
             odd = sorted(set(names) ^ expected)[0]
@@ -344,7 +346,7 @@ class Garment:
                 try:
                     edge = self.piece(side.piece, size).edge(side.edge)
                 except InputError as error:
-                    raise InputError(f"seam {seam.name!r}, size {size}: {error}") from None
+                    raise InputError(f"seam {seam.name!r}{f', size {size}' if size else ''}: {error}") from None
                 if edge.kind == "fold":
                     raise InputError(f"seam {seam.name!r}: edge {side} lies on the fold and cannot be sewn")
 
