@@ -233,7 +233,8 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
     placed: tuple[PlacedDart, ...] = ()
     if form.darts:
-        placed = place_darts(layout, vertices, bricks, form.darts)
+        opened = {name: recipe.open for name, recipe in form.pieces.items()}
+        placed = place_darts(layout, vertices, bricks, form.darts, opened)
     rows: dict[str, dict[str, IntArray]] = {}
     for dart in placed:
         rows.setdefault(dart.piece, {})[dart.name] = dart.row
