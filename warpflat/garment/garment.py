@@ -25,6 +25,7 @@ from warpflat.garment.ease import SeamRatios, SeamWish, is_knit, seam_ratios
 from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
+from warpflat.garment.hems import straight_hems
 from warpflat.garment.openings import Opening, opened_rings
 from warpflat.garment.pockets import Pocket
 from warpflat.garment.rings import GarmentRing, measure_rings
@@ -302,7 +303,7 @@ def flatten_form(
     ]  # fmt: skip
     pairs += dart_pairs(form)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
-    held = (*constraints, *dart_constraints(form))
+    held = (*constraints, *straight_hems(form, constraints), *dart_constraints(form))
     result = sew(pieces, pairs, constraints=held, folds=folds, options=relax)
     garment = Garment(name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, wished=wished)
     again = _SewAgain(pairs=pairs, held=held, folds=folds, options=relax)

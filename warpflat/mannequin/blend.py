@@ -27,6 +27,8 @@ __all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "is_tight"]
 _LEAST_MITRE = 0.5
 # Rows down to so many times as far below a lowered underarm share the height.
 _SHARED = 3.0
+# Standard deviation [m] along the arm of the mean that bows a sleeve around the elbow.
+_ELBOW_BOW = 0.03
 # Parts of the body whose profiles can be mixed with each other.
 _PARTS = (RING_LEVELS, ARM_LEVELS[1:], LEG_LEVELS[1:])
 
@@ -311,9 +313,23 @@ def _move_arms(
         moves = [out[grid[0]] - body[grid[0]], *own]
         rows = np.array([layout.arm_row[level] for level in ARM_LEVELS])
         out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
+        if changes.get("elbow", (None, 0.0))[1] > 0.0:
+            _round_elbow(out, layout, grid)
         for pair in ruled:
             if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
                 rule_rows(out, grid, layout.arm_row, pair, None)
+
+
+def _round_elbow(out: FloatArray, layout: Layout, grid: IntArray) -> None:
+    """Lead the rows of a loose sleeve around the elbow in a bow: cloth does not follow the crease of a bent arm."""
+    from scipy.ndimage import gaussian_filter1d
+
+    first, elbow, last = (layout.arm_row[level] for level in ("biceps", "elbow", "wrist"))
+    rows = out[grid[first : last + 1]]
+    apart = np.linalg.norm(np.diff(rows.mean(axis=1), axis=0), axis=1)[: 2 * (elbow - first)].mean()
+    smooth = gaussian_filter1d(rows, _ELBOW_BOW / max(apart, 1e-9), axis=0, mode="nearest")
+    near = np.interp(np.arange(first, last + 1), [first, elbow, last], [0.0, 1.0, 0.0])[:, None, None]
+    out[grid[first : last + 1]] = rows + near * near * (3.0 - 2.0 * near) * (smooth - rows)
 
 
 def _move_legs(

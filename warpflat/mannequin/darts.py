@@ -23,6 +23,10 @@ __all__ = ["FormDart", "PlacedDart", "dart_along", "place_darts", "standard_dart
 _TIPS = {"bust": 25.0, "front": 20.0, "back": 20.0, "front skirt": 100.0, "back skirt": 130.0, "back shoulder": 75.0}
 #: A skirt's second dart lies half-way from the first to the side and is this share as long.
 _SECOND = 0.9
+#: An arm whose elbow bends by more [degrees] shapes its sleeve; those of the tables bend by 5 to 7.
+_BENT = 12.0
+#: Where on the girth of the elbow its dart ends, from the underarm over the front: before the point of the elbow, at 0.75.
+_ELBOW_TIP = 0.77
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +103,11 @@ class _Cloth:
 
 
 def place_darts(
-    layout: Layout, vertices: FloatArray, bricks: Mapping[str, Sequence[str]], darts: Sequence[FormDart]
+    layout: Layout,
+    vertices: FloatArray,
+    bricks: Mapping[str, Sequence[str]],
+    darts: Sequence[FormDart],
+    opened: Mapping[str, Sequence[str]] | None = None,
 ) -> tuple[PlacedDart, ...]:
     """Find the grid vertices of darts.
 
@@ -107,13 +115,14 @@ def place_darts(
         layout, vertices: of the form, #V by 3 [m].
         bricks: by piece, both sides of the body.
         darts: what is asked for.
+        opened: by piece, the lines along which it is cut open; darts may begin there.
 
     Raises:
         InputError: an unknown piece or line, a line that does not run from the border into the piece, or two darts of one name.
     """
     if not darts:
         return ()
-    cloths = {name: _cloth(layout, own) for name, own in bricks.items()}
+    cloths = {name: _cloth(layout, own, (opened or {}).get(name, ())) for name, own in bricks.items()}
     found: list[PlacedDart] = []
     for dart in darts:
         where = f"dart {dart.name!r}"
@@ -136,16 +145,24 @@ def place_darts(
     return tuple(found)
 
 
-def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple[FormDart, ...]:
+def standard_darts(
+    layout: Layout, bricks: Mapping[str, Sequence[str]], vertices: FloatArray | None = None
+) -> tuple[FormDart, ...]:
     """Return the darts of a pattern book's block that fit the pieces (Aldrich, Metric Pattern Cutting for Women's Wear).
 
-    Bust and waist darts in the front bodice, a waist dart in the back; in the skirt one a side in front, two in the back.
+    Bust and waist darts in the front bodice, a waist dart in the back; in the skirt one a side in front, two in the back; in a
+    sleeve past the elbow of an arm that is bent one from the back of the underarm seam.
 
     Args:
         layout: the grid.
         bricks: by piece, both sides of the body.
+        vertices: the body's, #V by 3 [m]; without them no elbow is bent.
     """
     found: list[FormDart] = []
+    if vertices is not None and _elbow_bend(layout, vertices) > _BENT:
+        around = {"biceps-elbow/arm-left-back", "elbow-forearm/arm-left-back"}
+        sleeves = [piece for piece, own in bricks.items() if around <= set(own)]
+        found += [FormDart(name="elbow dart", piece=s, line="elbow left", part=(1.0, _ELBOW_TIP)) for s in sleeves]
     for piece, own in bricks.items():
         cloth = _cloth(layout, own)
         if _bust_mouth(layout, cloth, "bust") is not None:
@@ -161,19 +178,28 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
     return tuple(found)
 
 
-def _cloth(layout: Layout, bricks: Sequence[str]) -> _Cloth:
-    return _cloth_of(layout, tuple(bricks))
+def _elbow_bend(layout: Layout, vertices: FloatArray) -> float:
+    """Return the angle [degrees] between upper arm and forearm of the left arm; 0 is straight."""
+    rows = [layout.arms["left"][layout.arm_row[level]] for level in ("biceps", "elbow", "wrist")]
+    upper, lower = np.diff([vertices[row].mean(axis=0) for row in rows], axis=0)
+    cosine = upper @ lower / (np.linalg.norm(upper) * np.linalg.norm(lower))
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _cloth(layout: Layout, bricks: Sequence[str], opened: Sequence[str] = ()) -> _Cloth:
+    return _cloth_of(layout, tuple(bricks), tuple(opened))
 
 
 @functools.lru_cache(maxsize=32)  # one piece is asked for dozens of times while darts are looked for
-def _cloth_of(layout: Layout, bricks: tuple[str, ...]) -> _Cloth:
+def _cloth_of(layout: Layout, bricks: tuple[str, ...], opened: tuple[str, ...]) -> _Cloth:
     corners = layout.faces[layout.faces_of(bricks)]
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     edges, counts = np.unique(ends, axis=0, return_counts=True)
-    inner = edges[counts == 2].tolist()
+    cut = {edge for line in opened for edge in itertools.pairwise(layout.lines[line].tolist())}
+    inner = [(u, v) for u, v in edges[counts == 2].tolist() if (u, v) not in cut and (v, u) not in cut]
     return _Cloth(
         inner=frozenset((a, b) for u, v in inner for a, b in ((u, v), (v, u))),
-        border=frozenset(np.unique(edges[counts == 1]).tolist()),
+        border=frozenset(np.unique(edges[counts == 1]).tolist()).union(*cut),
     )
 
 

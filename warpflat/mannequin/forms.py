@@ -255,7 +255,8 @@ def realise(
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
     placed: tuple[PlacedDart, ...] = ()
     if form.darts:
-        placed = place_darts(layout, vertices, bricks, form.darts)
+        opened = {name: recipe.open for name, recipe in form.pieces.items()}
+        placed = place_darts(layout, vertices, bricks, form.darts, opened)
     rows = _rows_of(placed)
     known = (
         {} if before is None else {name: before.pieces[name] for name in before.pieces if before.has_rows(name, rows)}

@@ -18,7 +18,7 @@ from warpflat.mannequin.scan_checks import check_girths
 from warpflat.mannequin.scan_legs import LegSections, leg_curves, plumb_legs, slice_legs
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import UpperSections, slice_neck_and_arms, underarm_point, upper_curves
-from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, leg_levels
+from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, leg_levels, missing_note
 from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
 from warpflat.mannequin.scan_spread import guess_by_noise
 from warpflat.mannequin.slicer import Slicer
@@ -83,7 +83,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     return ScanFound(
         blueprint=blueprint,
         source=f"scan of a body {trunk.stature:.3f} m tall",
-        notes=(*notes, *body.notes, *apart, *guess_note(measures, body.notes)),
+        notes=(*notes, *body.notes, *apart, *guess_note(measures, body.notes), *missing_note(measures)),
         sections=sections,
         measures=measures,
         scan=(legs.move(slicer.vertices) if apart else slicer.vertices, slicer.triangles),

@@ -12,6 +12,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.slicer import Slicer
+from warpflat.mannequin.summit import summit
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["ScanArm", "slice_arm", "tape_around"]
@@ -39,6 +40,7 @@ class ScanArm:
         under, tip: shares of the armhole's lowest and highest point.
         elbow, wrist: shares.
         bent: true if the elbow was found from the bend of the line.
+        wide: the elbow's share from half as long again a stretch of the line; bones and muscles disagree where it is another.
         limb: #L by 3, vertices of the arm [m].
     """
 
@@ -52,6 +54,7 @@ class ScanArm:
     elbow: float
     wrist: float
     bent: bool
+    wide: float
     limb: FloatArray
 
     def frame(self, share: float) -> tuple[FloatArray, FloatArray]:
@@ -118,10 +121,12 @@ def slice_arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ScanA
     whole = np.flatnonzero(girths > 0.6 * np.median(girths[:17]))
     wrist = float(low[whole[int(np.argmin(np.array(girths)[whole]))]])
     under, tip = (float((p - middle) @ axis) / reach for p in (hole[0], hole[int(np.argmax(hole[:, 1]))]))
-    elbow, bent = _elbow(shares, line, tip, wrist, _NEAR_ELBOW * float(np.ptp(points[:, 1])) / reach)
+    near = _NEAR_ELBOW * float(np.ptp(points[:, 1])) / reach
+    elbow, bent = _elbow(shares, line, tip, wrist, near)
+    wide, _ = _elbow(shares, line, tip, wrist, 1.5 * near)
     return ScanArm(
         cut=cut, shares=shares, line=line, way=way, reach=reach, under=under, tip=tip, elbow=elbow, wrist=wrist,
-        bent=bent, limb=limb,
+        bent=bent, wide=wide, limb=limb,
     )  # fmt: skip
 
 
@@ -131,19 +136,21 @@ def _elbow(shares: FloatArray, line: FloatArray, tip: float, wrist: float, near:
     Only `near` the elbow, as a share: farther off, muscles bend the line, not bones.
     """
     guess = tip + _ELBOW * (wrist - tip)
-    best = (np.inf, guess, 0.0)
+    joints = np.linspace(guess - 0.12, guess + 0.12, 49)
+    best, angle = guess, 0.0
     for _ in range(2):
-        rows = (np.abs(shares - best[1]) < near) & (shares < wrist)
+        rows = (np.abs(shares - best) < near) & (shares < wrist)
         s, p = shares[rows], line[rows]
-        best = (np.inf, best[1], 0.0)
-        for joint in np.linspace(guess - 0.12, guess + 0.12, 49):
+        misses, angles = np.empty(len(joints)), np.empty(len(joints))
+        for i, joint in enumerate(joints):
             bones = np.column_stack([np.ones_like(s), s - joint, np.maximum(s - joint, 0.0)])
             fit, *_ = np.linalg.lstsq(bones, p, rcond=None)
-            miss = float(np.linalg.norm(bones @ fit - p))
+            misses[i] = np.linalg.norm(bones @ fit - p)
             cosine = float(_unit(fit[1]) @ _unit(fit[1] + fit[2]))
-            if miss < best[0]:
-                best = (miss, float(joint), float(np.arccos(np.clip(cosine, -1.0, 1.0))))
-    return (best[1], True) if best[2] > _BENT and abs(best[1] - guess) < 0.115 else (guess, False)
+            angles[i] = np.arccos(np.clip(cosine, -1.0, 1.0))
+        row = int(np.clip(np.argmin(misses), 1, len(joints) - 2))
+        best, angle = summit(joints, misses, row), float(angles[row])
+    return (best, True) if angle > _BENT and abs(best - guess) < 0.115 else (guess, False)
 
 
 def _at(shares: FloatArray, values: FloatArray, share: float) -> FloatArray:

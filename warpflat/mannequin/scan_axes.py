@@ -111,7 +111,8 @@ def across_trunk(slicer: Slicer, up: FloatArray, sideways: FloatArray) -> FloatA
         parts = [part.points @ axes.T for part in slicer.cut(up, low + share * (high - low))]
         if not parts:
             continue
-        area, middle, trunk = max((*_hull_area_and_middle(part), i) for i, part in enumerate(parts))
+        rated = [(*_hull_area_and_middle(part), i) for i, part in enumerate(parts)]
+        area, middle, trunk = max(rated, key=lambda part: part[0])
         reach = ((parts[trunk] - middle) @ way).max(axis=0)
         mirrored = np.array([np.roll(reach[::-1], 361 + 2 * step) for step in range(-_TURNED, _TURNED + 1)])
         misses += np.square(reach - mirrored).sum(axis=1) / max(area, 1e-12)

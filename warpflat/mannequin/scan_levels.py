@@ -20,6 +20,8 @@ _UP = np.array([0.0, 1.0, 0.0])
 _REACH = 0.19
 # No crotch lies higher, as a share of the stature.
 _ABOVE_CROTCH = 0.58
+# No neck of a body with a head is narrowest higher, as a share of the stature.
+_NECK = 0.91
 # How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
 _BELOW_ARMPIT = 0.006
 
@@ -156,6 +158,12 @@ def _armpit(
     jump = next((i for i in window if reach[i + 1] > 1.22 * reach[i]), None)
     where = "left" if side > 0 else "right"
     if jump is None:
+        higher = [y[i] for i in range(window[-1] + 1, len(y) - 1) if reach[i + 1] > 1.22 * reach[i]]
+        if higher:
+            raise InputError(
+                f"scan: its armpits lie at {higher[0] / stature:.2f} of its height, those of a body with a head at 0.66 to 0.84; "
+                "the head is missing"
+            )
         raise InputError(f"scan: no {where} armpit between 0.66 and 0.84 of the height; arms must stand off the body")
     low, high = float(y[jump]), float(y[jump + 1])
     point = np.zeros(3)
@@ -190,6 +198,7 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     Source: ISO 8559-1, which names the places of the tapes.
     """
     h = t.stature
+    _check_head(t)
     notes: list[str] = []
     levels: dict[str, float] = {}
     levels["armpit"] = min(t.armpits["left"][0], t.armpits["right"][0])
@@ -264,7 +273,11 @@ def _bust(t: TrunkSections, waist: float, armpit: float, notes: list[str]) -> fl
         raise InputError(f"scan: no room for a bust between waist ({waist:.3f} m) and armpits ({armpit:.3f} m)")
     row = int(rows[np.argmax(t.girth[rows])])
     if row < rows[-1]:
-        return summit(t.y, t.girth, row)
+        bust = summit(t.y, t.girth, row)
+        above = (t.y > t.y[row]) & (t.y <= armpit)
+        if t.girth[above].max(initial=0.0) > t.girth[row]:
+            notes.append(f"bust = {bust:.3f} m is a guess: the chest is as full again at the armpits at {armpit:.3f} m")
+        return bust
     notes.append(f"bust = {high:.3f} m is a guess: the chest grows fuller up to the armpits at {armpit:.3f} m")
     return high
 
@@ -312,6 +325,21 @@ def _hip(t: TrunkSections, waist: float, notes: list[str]) -> float:
     guess = max(0.52 * t.stature, t.crotch + 0.03 * t.stature)
     notes.append(f"hip = {guess:.3f} m is a guess: the seat does not stand out between crotch and waist")
     return guess
+
+
+def _check_head(t: TrunkSections) -> None:
+    """See that a head stands over the neck: levels are sought at shares of the stature.
+
+    Raises:
+        InputError: the scan is narrowest too near to its top.
+    """
+    rows = np.flatnonzero(t.y > max(a[0] for a in t.armpits.values()))
+    neck = float(t.y[rows[np.argmin(t.area[rows])]])
+    if neck > _NECK * t.stature:
+        raise InputError(
+            f"scan: it is narrowest at {neck:.2f} m, {neck / t.stature:.2f} of its height; a neck lies at 0.80 to {_NECK:g}: "
+            "the head is missing, or a part of it"
+        )
 
 
 def _neck(t: TrunkSections, armpit: float) -> tuple[float, float]:

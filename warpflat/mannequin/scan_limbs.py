@@ -115,7 +115,7 @@ def upper_curves(
                 neckline=line, bend=0.52, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
                 centre=_centre(slicer, bottom, row[0], line[0], face),
             )  # fmt: skip
-    arms = {side: _arm_curves(arm) for side, arm in upper.arms.items()}
+    arms = {side: _arm_curves(arm, upper.holes[side]) for side, arm in upper.arms.items()}
     return {name: quarters[name] for name in QUARTERS}, arms
 
 
@@ -328,20 +328,21 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
     return np.column_stack([np.zeros_like(y), y, z])
 
 
-def _arm_curves(arm: ScanArm) -> ArmCurves:
-    """Return the curves at biceps, elbow and wrist."""
-
-    def ring(share: float) -> FloatArray:
-        at, across = arm.frame(share)
-        up = np.array([0.0, 1.0, 0.0]) - across * across[1]
-        up /= np.linalg.norm(up)
-        ahead = np.cross(across, up)
-        cut = arm.cut(at, across)
-        return _loop(cut, cut.mean(axis=0), -up, np.sign(ahead[2]) * ahead, 4, 240)
-
+def _arm_curves(arm: ScanArm, hole: FloatArray) -> ArmCurves:
+    """Return the curves at biceps, elbow and wrist; they turn with the arm and are not wrung against the armhole `hole`."""
     biceps = float(np.clip(max(arm.under, arm.tip) + _SHORTEST_SLEEVE / arm.reach, 0.10, arm.elbow - 0.10))
-    shares = np.interp(_ARM_PLACES, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
+    places = sorted({0.0, 1.0, 2.0, *_ARM_PLACES})
+    shares = np.interp(places, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
+    # From the armhole's lowest to its highest point, carried along the arm without a twist.
+    up = hole[int(np.argmax(hole[:, 1]))] - hole[0]
+    side = np.sign(hole[0, 0])
+    rings: dict[float, FloatArray] = {}
+    for place, share in zip(places, shares, strict=True):
+        at, across = arm.frame(float(share))
+        up = up - across * float(across @ up)
+        up /= np.linalg.norm(up)
+        cut = arm.cut(at, across)
+        rings[place] = _loop(cut, cut.mean(axis=0), -up, side * np.cross(across, up), 4, 240)
     return ArmCurves(
-        biceps=ring(biceps), elbow=ring(arm.elbow), wrist=ring(arm.wrist),
-        between={place: ring(float(share)) for place, share in zip(_ARM_PLACES, shares, strict=True)},
+        biceps=rings.pop(0.0), elbow=rings.pop(1.0), wrist=rings.pop(2.0), between=rings,
     )  # fmt: skip

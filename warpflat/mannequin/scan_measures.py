@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.scan_arms import ScanArm, tape_around
@@ -16,7 +16,7 @@ from warpflat.mannequin.scan_levels import TrunkSections, leg_sections, smooth
 from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.summit import summit
 
-__all__ = ["ScanMeasure", "body_measures", "guess_note", "leg_levels"]
+__all__ = ["ScanMeasure", "body_measures", "guess_note", "leg_levels", "missing_note"]
 
 _TRUNK = ("bust", "underbust", "waist", "hip")
 _UP = np.array([0.0, 1.0, 0.0])
@@ -39,6 +39,10 @@ _POSSIBLE = {
     "thigh": (0.17, 0.60), "knee": (0.13, 0.45), "calf": (0.12, 0.42), "ankle": (0.07, 0.28), "foot": (0.09, 0.24),
 }  # fmt: skip
 
+
+# Girths [m] that a tape does not tell apart, and how far ISO 20685 lets a scan's height and girth differ from a tape's [m].
+_ALIKE = 0.001
+_ISO_HEIGHT, _ISO_GIRTH = 0.004, 0.009
 
 _HOLED = "it runs over a hole in the scan"
 
@@ -171,6 +175,16 @@ def guess_note(measures: Mapping[str, ScanMeasure], notes: Sequence[str]) -> lis
     return ["guessed: " + "; ".join(f"{' and '.join(names[why])} ({why})" for why in names)]
 
 
+def missing_note(measures: Mapping[str, ScanMeasure]) -> list[str]:
+    """Return one note that names head, hands and feet that the scan does not show; none if all are there."""
+    ends = ["head", *(f"{end} {side}" for end in ("hand", "foot") for side in ("left", "right"))]
+    missing = [end for end in ends if end not in measures]
+    if not missing:
+        return []
+    floor = "; heights count from its lowest point" if {"foot left", "foot right"} <= set(missing) else ""
+    return [f"the scan shows no {' and no '.join(missing)}{floor}"]
+
+
 def _check(found: Mapping[str, ScanMeasure], stature: float) -> None:
     for name, measure in found.items():
         low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
@@ -236,10 +250,13 @@ def _hip_legs_together(slicer: Slicer, trunk: TrunkSections, legs: LegSections, 
 def _arm(arm: ScanArm, trunk: TrunkSections, side: str) -> dict[str, ScanMeasure]:
     armpit, x, z = trunk.armpits[side]
     elbow, wrist = arm.tape(arm.elbow), arm.tape(arm.wrist)
-    share = None if arm.bent else "the arm is straight; it is a share of its length"
+    wide = arm.tape(arm.wide)
+    guess = "the arm is straight; it is a share of its length" if not arm.bent else None
+    if guess is None and (abs(wide[0] - elbow[0]) > _ISO_HEIGHT or abs(wide[1] - elbow[1]) > _ISO_GIRTH):
+        guess = "the arm bends in a bow, not at one place"
     return {
         "biceps": _biceps(arm, np.array([x, armpit, z]), _BEYOND_ARMPIT * trunk.stature),
-        "elbow": ScanMeasure(height=elbow[0], girth=elbow[1], guess=share),
+        "elbow": ScanMeasure(height=elbow[0], girth=elbow[1], guess=guess),
         "wrist": ScanMeasure(height=wrist[0], girth=wrist[1]),
     }
 
@@ -261,7 +278,19 @@ def _biceps(arm: ScanArm, armpit: FloatArray, beyond: float) -> ScanMeasure:
     bellies = 1 + np.flatnonzero((girths[1:-1] >= girths[:-2]) & (girths[1:-1] > girths[2:]))
     bellies = bellies[girths[bellies] > _BELLY * girths.max()]
     row = int(bellies[np.argmax(girths[bellies])]) if len(bellies) else int(np.argmax(girths))
-    return ScanMeasure(height=tapes[row][0], girth=tapes[row][1])
+    heights = np.array([height for height, _ in tapes])
+    alike = heights[_stretch(girths > girths[row] - _ALIKE, row)]
+    guess = (
+        "the arm is as full a way up and down from there" if np.abs(alike - heights[row]).max() > _ISO_HEIGHT else None
+    )
+    return ScanMeasure(height=tapes[row][0], girth=tapes[row][1], guess=guess)
+
+
+def _stretch(rows: BoolArray, row: int) -> slice:
+    """Return the stretch of true rows around `row`, which is true."""
+    off = np.flatnonzero(~rows)
+    before, after = off[off < row], off[off > row]
+    return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(rows))
 
 
 def _hand(slicer: Slicer, arm: ScanArm) -> ScanMeasure | None:

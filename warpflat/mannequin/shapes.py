@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
+from warpflat.core.arrays import FloatArray
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import standard_darts
 from warpflat.mannequin.forms import Form, PieceRecipe
@@ -17,10 +18,13 @@ _UNDER_BUST = ("bust", "waist")
 _SMALL_OF_BACK = ("waist", "hip")
 
 
-def shaped_form(layout: Layout, form: Form, shape: Literal["none", "darts", "princess"]) -> Form:
+def shaped_form(
+    layout: Layout, form: Form, shape: Literal["none", "darts", "princess"], vertices: FloatArray | None = None
+) -> Form:
     """Return a form whose pieces are shaped: by the darts of a pattern book's block, or by princess seams.
 
     With a bust dart the cloth hangs straight from the bust to the waist, and with skirt darts it bridges the small of the back.
+    The body's `vertices`, #V by 3 [m], say whether its elbows are bent.
 
     Raises:
         InputError: an unknown brick.
@@ -29,7 +33,7 @@ def shaped_form(layout: Layout, form: Form, shape: Literal["none", "darts", "pri
     if shape == "none":
         return form
     if shape == "darts":
-        darts = standard_darts(layout, bricks)
+        darts = standard_darts(layout, bricks, vertices)
         # Legs are straight where the cloth hangs straight over the hollows of the body.
         ruled = [_UNDER_BUST] if any(dart.line == "bust" for dart in darts) else []
         bridged = [_SMALL_OF_BACK] if any(dart.line == "princess back left" for dart in darts) else []

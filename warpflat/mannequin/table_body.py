@@ -263,7 +263,8 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
     across = quarters["front-left"].chest[-1] - quarters["back-left"].chest[-1]
     axis = np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), -np.sin(_ARM_ANGLE) * across[0] / across[2]])
     axis /= np.linalg.norm(axis)
-    up = np.array([0.0, 1.0, 0.0]) - axis * axis[1]
+    # Underarm and overarm line of the sleeve begin where those of the armhole are: the sleeve is not wrung.
+    up = (tip - under) - axis * float((tip - under) @ axis)
     up /= np.linalg.norm(up)
     ahead = np.cross(axis, up)
     ahead *= np.sign(ahead[2])

@@ -84,7 +84,8 @@ def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mann
     with errors_named(f"{scene.where}: form"):
         if not settings.half:
             form = part_at_centres(mannequin.layout, form, scene_openings(settings.openings))
-        form = shaped_form(mannequin.layout, form, "darts" if settings.shape == "auto" else settings.shape)
+        shape = "darts" if settings.shape == "auto" else settings.shape
+        form = shaped_form(mannequin.layout, form, shape, mannequin.vertices)
     # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
     with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
         return mannequin, cut_form(mannequin, form, settings.cuts)

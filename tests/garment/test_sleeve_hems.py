@@ -1,0 +1,97 @@
+"""Long sleeves on straight and on bent arms: the hem, the elbow's dart, and sleeves that are not wrung."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpflat.core.polyline import segment_lengths
+from warpflat.garment.constraints import Straight
+from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.hems import straight_hems
+from warpflat.mannequin.forms import FormResult, shipped_form
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.shapes import shaped_form
+
+
+@pytest.fixture(scope="module")
+def body() -> Mannequin:
+    return Mannequin.from_size("EU 38", resolution_mm=25.0)
+
+
+@pytest.fixture(scope="module")
+def bent(body: Mannequin) -> Mannequin:
+    """The body with its forearms turned forward by 35 degrees about the elbows, in a bow."""
+    layout, vertices = body.layout, body.vertices.copy()
+    for grid in layout.arms.values():
+        elbow, wrist = layout.arm_row["elbow"], layout.arm_row["wrist"]
+        joint = vertices[grid[elbow]].mean(axis=0)
+        share = np.clip((np.arange(len(grid)) - elbow + 2) / 4.0, 0.0, 1.0)
+        for row in range(elbow - 1, wrist + 1):
+            angle = np.radians(35.0) * share[row]
+            c, s = np.cos(angle), np.sin(angle)
+            turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+            vertices[grid[row]] = joint + (vertices[grid[row]] - joint) @ turn.T
+    return replace(body, vertices=vertices)
+
+
+def _sleeve(body: Mannequin, shape: str, name: str = "shirt") -> tuple[FormResult, Garment]:
+    whole = shaped_form(body.layout, shipped_form(name), shape, body.vertices)  # type: ignore[arg-type]
+    darts = tuple(replace(dart, mirrored=False) for dart in whole.darts if dart.piece == "sleeve_left")
+    form = body.form(replace(whole, pieces={"sleeve_left": whole.pieces["sleeve_left"]}, darts=darts))
+    return form, flatten_form(body, form)
+
+
+def _hem(form: FormResult, garment: Garment, level: str = "wrist") -> np.ndarray:
+    line = garment.pieces["sleeve_left"].positions[form.pieces["sleeve_left"].edges[f"{level} left"]]
+    return line if line[0, 0] < line[-1, 0] else line[::-1]
+
+
+def test_hem_of_bent_arm_is_straight_across_the_grain(bent: Mannequin) -> None:
+    form, garment = _sleeve(bent, "none")
+    hem = _hem(form, garment)
+    assert np.ptp(hem[:, 1]) < 1e-4
+    assert segment_lengths(hem).sum() == pytest.approx(np.ptp(hem[:, 0]), rel=1e-6)
+
+
+def test_bent_elbow_has_a_dart_and_straight_one_none(body: Mannequin, bent: Mannequin) -> None:
+    of_sleeve = [
+        d for d in shaped_form(body.layout, shipped_form("shirt"), "darts", body.vertices).darts if "elbow" in d.name
+    ]
+    assert not of_sleeve
+    form, garment = _sleeve(bent, "darts")
+    left, right = (garment.pieces["sleeve_left"].positions[form.pieces["sleeve_left"].edges[leg]]
+                   for leg in form.pieces["sleeve_left"].darts["elbow dart"])  # fmt: skip
+    assert np.linalg.norm(left[0] - right[-1]) > 0.02
+    assert garment.seams[0].lengths[0] == pytest.approx(garment.seams[0].lengths[1], abs=2e-4)
+    # The dart swings the forearm: its hem is straight, and square to it, not to the grain.
+    hem = _hem(form, garment)
+    way = hem[-1] - hem[0]
+    away = (hem - hem[0]) @ np.array([-way[1], way[0]]) / np.linalg.norm(way)
+    assert np.abs(away).max() < 1e-4
+    assert abs(way[1] / way[0]) > 0.05
+
+
+def test_darts_of_both_sleeves_are_mirror_images(bent: Mannequin) -> None:
+    form = bent.form(shaped_form(bent.layout, shipped_form("shirt"), "darts", bent.vertices))
+    assert {name for name, piece in form.pieces.items() if "elbow dart left" in piece.darts} == {"sleeve_left"}
+    assert {name for name, piece in form.pieces.items() if "elbow dart right" in piece.darts} == {"sleeve_right"}
+
+
+def test_what_is_asked_for_of_a_hem_holds(body: Mannequin) -> None:
+    form = body.form("shirt")
+    assert {line.line for line in straight_hems(form, [])} == {"wrist left", "wrist right"}
+    asked = [Straight(piece="sleeve_left", line="wrist left", along="free")]
+    assert [line.piece for line in straight_hems(form, asked)] == ["sleeve_right"]
+    assert not straight_hems(body.form("tshirt"), [])
+
+
+def test_short_sleeve_is_not_wrung(body: Mannequin) -> None:
+    """Its hem and the line through its underarm ends lie across the grain; wrung by 15 degrees they slant by 6."""
+    form, garment = _sleeve(body, "none", "tshirt")
+    hem = _hem(form, garment, "biceps")
+    cap = garment.pieces["sleeve_left"].positions[form.pieces["sleeve_left"].edges["armhole left"]]
+    for start, end in ((hem[0], hem[-1]), sorted((cap[0], cap[-1]), key=lambda p: p[0])):
+        assert abs(np.degrees(np.arctan2(end[1] - start[1], end[0] - start[0]))) < 3.5

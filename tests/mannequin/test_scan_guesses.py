@@ -1,0 +1,72 @@
+"""Scans that show less than a whole body: what is refused, and which tapes say that they are guesses."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from body_copies import copy_of_body
+from body_tapes import armpit_and_crotch
+
+from warpflat.core.errors import InputError
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.scan_axes import across_trunk
+from warpflat.mannequin.slicer import Slicer
+from warpflat.surface.io.read import read_scan
+
+needs_bodies = pytest.mark.skipif(
+    "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"
+)
+
+
+def _body(name: str) -> tuple[np.ndarray, np.ndarray]:
+    points, faces = read_scan(Path(os.environ["WARPFLAT_DATA"]) / f"body_{name}.obj")
+    points = np.asarray(points, float)
+    return points - [0.0, points[:, 1].min(), 0.0], np.asarray(faces)
+
+
+def _between(points: np.ndarray, faces: np.ndarray, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """The part of a body between two shares of its height."""
+    share = points[faces[:, :3]][:, :, 1] / points[:, 1].max()
+    return points, faces[(share.min(axis=1) > low) & (share.max(axis=1) < high)]
+
+
+@needs_bodies
+@pytest.mark.parametrize(("name", "high"), [("female", 0.86), ("female", 0.90), ("male", 0.89), ("child", 0.89)])
+def test_a_body_without_its_head_is_refused(name: str, high: float) -> None:
+    with pytest.raises(InputError, match="the head is missing"):
+        Mannequin.from_scan(*_between(*_body(name), 0.0, high), resolution_mm=25.0)
+
+
+@needs_bodies
+def test_a_body_without_feet_says_so() -> None:
+    body = Mannequin.from_scan(*_between(*_body("female"), 0.06, 1.1), resolution_mm=25.0)
+    assert "the scan shows no foot left and no foot right; heights count from its lowest point" in body.notes
+    assert body.measures["ankle left"].guess is not None
+
+
+@needs_bodies
+def test_the_fullest_place_of_an_evenly_full_arm_is_a_guess() -> None:
+    points, faces = _body("male_heavy")
+    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    marks = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
+    for copy, is_guess in (("arms down", True), ("as it is", False)):
+        body = Mannequin.from_scan(*copy_of_body(points, faces, copy, *marks), resolution_mm=25.0)
+        assert [body.measures[f"biceps {s}"].guess is not None for s in ("left", "right")] == [is_guess] * 2
+        # Its elbow bends in a bow: two fair fits lie 4 mm and more apart.
+        assert all(body.measures[f"elbow {s}"].guess for s in ("left", "right"))
+    assert not any("elbow" in name and m.guess for name, m in Mannequin.from_scan(*_body("female")).measures.items())
+
+
+def test_trunk_of_two_equal_parts_has_a_direction() -> None:
+    """Two parts of one area are no tie that cannot be broken."""
+    one = trimesh.creation.box((0.25, 2.0, 0.125))
+    aside = np.array([0.5, 0.0, 0.0])
+    points = np.concatenate([one.vertices - aside, one.vertices + aside])
+    slicer = Slicer(points, np.concatenate([one.faces, one.faces + len(one.vertices)]))
+    left = across_trunk(slicer, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    assert abs(left[1]) < 1e-9
+    assert np.linalg.norm(left) == pytest.approx(1.0)
