@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 from warpflat.core.arrays import FloatArray
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.contact import NO_CONTACTS, Barrier, ContactPoint
+from warpflat.solver.contact import Barrier, ContactPoint, evaluate_with_contact
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.gauss_newton import GaussNewtonSteps
 from warpflat.solver.grain_alignment import align_grain
@@ -83,22 +83,7 @@ class _SewnCloth:
 
     def at(self, positions: FloatArray) -> ContactPoint:
         """Evaluate a layout."""
-        state = self._state
-        touch = NO_CONTACTS if self._barrier is None else self._barrier(positions)
-        energy = touch.energy
-        if np.isfinite(energy):
-            state.place(positions)
-            energy += float(state.potentials().sum())
-        if np.isfinite(energy):
-            energy += state.network.seam_energy(state.position)
-        return ContactPoint(positions=positions, energy=energy, touch=touch)
-
-    def gradient(self, point: ContactPoint) -> FloatArray:
-        """Return the gradient of the energy, #V by 2 [N]."""
-        self._state.place(point.positions)
-        gradient = -self._state.forces()
-        point.touch.add_gradient(gradient)
-        return gradient
+        return evaluate_with_contact(self._state, self._barrier, positions)
 
     def solver(self, point: ContactPoint) -> Solve:
         """Return the solution by the metric: the factor plus the stiffness of the contacts."""
