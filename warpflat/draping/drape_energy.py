@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 from scipy.sparse import bsr_array, csc_array
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.launch import Sequence, launch_each, record
+from warpflat.core.sparse import factor_symmetric
 from warpflat.core.sums import range_offsets
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
@@ -157,8 +157,8 @@ class DrapeEnergy:
         launch_each(stiffen_cloth, len(self._cell_energy), inputs, [cells], **at)
         launch_each(stiffen_contact, self._count, [self.motion, self.contact, least], [vertices], **at)
         matrix = self._pattern.matrix(cells.numpy(), vertices.numpy())
-        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        self._solve = lambda force: factor.solve(np.ascontiguousarray(force.ravel())).reshape(-1, 3)
+        factor = factor_symmetric(matrix)
+        self._solve = lambda force: factor(force.ravel()).reshape(-1, 3)
 
     def solver(self, point: Point) -> Solve:
         """Return the solution by the last factor."""

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.sparse import factor_symmetric
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier, ContactPoint, evaluate_with_contact
@@ -120,17 +120,17 @@ def _metric(state: Relaxation) -> Solve:
         matrix = csc_array(matrix + rows.T @ rows)
     diagonal = matrix.diagonal()
     matrix.setdiag(diagonal + _REGULARISATION * diagonal.mean() + (free == 0.0) * diagonal.max())
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factor = factor_symmetric(matrix)
     # The chords keep their directions exactly: their rows are Lagrange multipliers.
     chords = np.zeros((len(state.alignments), len(free)))
     for row, each in zip(chords, state.alignments, strict=True):
         across = np.array([each.direction[1], -each.direction[0]])
         row.reshape(-1, 2)[[each.upper, each.lower]] = across, -across
-    columns = factor.solve(np.ascontiguousarray(chords.T))
+    columns = factor(np.ascontiguousarray(chords.T))
     inner = chords @ columns
 
     def solve(force: FloatArray) -> FloatArray:
-        step = factor.solve(np.ascontiguousarray(force.ravel()))
+        step = factor(np.ascontiguousarray(force.ravel()))
         return np.asarray(step - columns @ np.linalg.solve(inner, chords @ step)).reshape(-1, 2)
 
     return solve

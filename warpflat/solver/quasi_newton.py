@@ -135,6 +135,11 @@ class Metric:
             pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
             for axis in range(2):
                 step[:, axis] -= (rows[axis].T @ pull) @ columns
+            for (upper, lower, _), across in zip(self._chords, self._across, strict=True):
+                # What is left is rounding, which would add up over the steps.
+                half = 0.5 * across * (across @ (step[upper] - step[lower]))
+                step[upper] -= half
+                step[lower] += half
             return step
 
         return solve
