@@ -12,11 +12,9 @@ from .indices import natural
 
 wp.set_module_options({"enable_backward": False})
 
-# Which faces are evaluated, and for what: those in which something acted at the last evaluation of all, all of them, or all of them for
-# their forces alone.
+# Which faces are evaluated: those in which something acted at the last evaluation of all, or all of them.
 ACTING = wp.constant(0)
 ALL = wp.constant(1)
-FORCES_ALONE = wp.constant(2)
 
 
 @wp.struct
@@ -179,26 +177,49 @@ def turned_left(v: wp.vec2d):
 
 
 @wp.func
-def clear_corners(out: CellForces, slot: int, viscous: bool):
-    """Set what is gathered at the four corners of a face to zero; slot: the first of them."""
+def clear_forces(out: CellForces, slot: int):
+    """Set the forces at the four corners of a face to zero; slot: the first of them."""
     for corner in range(4):
         out.force[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+
+
+@wp.func
+def clear_corners(out: CellForces, slot: int, viscous: bool):
+    """Set what is gathered at the four corners of a face to zero; slot: the first of them."""
+    clear_forces(out, slot)
+    for corner in range(4):
         out.stiffness[slot + corner] = wp.float64(0.0)
         if viscous:
             out.viscosity[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
 
 
 @wp.func
-def add_to_corners(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d, bounds: wp.vec3d):
-    """Add a cell's forces, on its corners 1 and 2 as columns, and its bounds to the corners `at` of its face."""
+def add_forces(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d):
+    """Add a cell's forces, on its corners 1 and 2 as columns, to the corners `at` of its face."""
     f1 = wp.vec2d(pull[0, 0], pull[1, 0])
     f2 = wp.vec2d(pull[0, 1], pull[1, 1])
     out.force[slot + at[0]] -= f1 + f2
     out.force[slot + at[1]] += f1
     out.force[slot + at[2]] += f2
+
+
+@wp.func
+def add_to_corners(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d, bounds: wp.vec3d):
+    """Add a cell's forces, as `add_forces` takes them, and its bounds to the corners `at` of its face."""
+    add_forces(out, slot, at, pull)
     out.stiffness[slot + at[0]] += bounds[0]
     out.stiffness[slot + at[1]] += bounds[1]
     out.stiffness[slot + at[2]] += bounds[2]
+
+
+@wp.func
+def add_drag(out: CellForces, slot: int, at: wp.vec3i, drag: wp.mat22d):
+    """Add a cell's viscosity, on its corners 1 and 2 as columns, to the corners `at` of its face."""
+    d1 = wp.vec2d(drag[0, 0], drag[1, 0])
+    d2 = wp.vec2d(drag[0, 1], drag[1, 1])
+    out.viscosity[slot + at[0]] -= d1 + d2
+    out.viscosity[slot + at[1]] += d1
+    out.viscosity[slot + at[2]] += d2
 
 
 @wp.func

@@ -133,36 +133,3 @@ def interpolate_along_rows(
         total += weight[j, k] * values[i, natural(column[j, k])]
         k += 1
     result[natural(grid[i, j])] = total
-
-
-@wp.kernel
-def sample_grid(
-    values: wp.array2d(dtype=wp.float64),
-    grid: wp.array2d(dtype=wp.int32),
-    row: wp.array2d(dtype=wp.int32),
-    row_weight: wp.array2d(dtype=wp.float64),
-    column: wp.array2d(dtype=wp.int32),
-    column_weight: wp.array2d(dtype=wp.float64),
-    first: int,
-    # outputs
-    sampled: wp.array3d(dtype=wp.float64),
-):
-    """Sample values between the rows and columns of a grid, by the weights of the rows and columns around each place.
-
-    values: #V by #D, three or fewer. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer.
-    column, column_weight: #N by 4 or fewer. sampled: #M by #N by #D.
-    """
-    p = natural(wp.tid() + first)
-    i = p / sampled.shape[1]
-    j = p - i * sampled.shape[1]
-    total = wp.vec3d()
-    for a in range(row.shape[1]):
-        on_row = wp.vec3d()
-        for b in range(column.shape[1]):
-            v = natural(grid[row[i, a], column[j, b]])
-            weight = column_weight[j, b]
-            for d in range(sampled.shape[2]):
-                on_row[d] += weight * values[v, d]
-        total += row_weight[i, a] * on_row
-    for d in range(sampled.shape[2]):
-        sampled[i, j, d] = total[d]

@@ -11,7 +11,7 @@ force is bounded.
 import warp as wp
 
 from .indices import natural
-from .membrane import Cloth, sheared_threads, stretched_sheet
+from .membrane_cell import Cloth, sheared_threads, stretched_sheet
 
 wp.set_module_options({"enable_backward": False})
 

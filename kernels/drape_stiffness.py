@@ -4,7 +4,7 @@ import warp as wp
 
 from .drape import TINY, Contact, Motion
 from .indices import natural
-from .membrane import Cloth, beyond_hooke, sheared_threads, stretched_sheet
+from .membrane_cell import Cloth, beyond_hooke, sheared_threads, stretched_sheet
 
 wp.set_module_options({"enable_backward": False})
 

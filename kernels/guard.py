@@ -7,19 +7,32 @@ import warp as wp
 
 from .cells import (
     ACTING,
-    FORCES_ALONE,
     CellForces,
     Cells,
+    across,
+    add_forces,
     add_to_corners,
     cell_places,
     cell_weight,
     clear_corners,
+    clear_forces,
     corner_at,
     count_cells,
     edge_matrix,
+    on_body,
     turned_left,
 )
-from .guard_cell import ThreadGuard, check_cell, guard_energy, guard_on_cell, sheared
+from .guard_cell import (
+    ThreadGuard,
+    cell_bounds,
+    cell_energy,
+    cell_forces,
+    check_cell,
+    guard_acts,
+    guard_energy,
+    guarded_cell,
+    sheared,
+)
 from .indices import natural
 
 wp.set_module_options({"enable_backward": False})
@@ -35,7 +48,6 @@ def check_face(
     weft: wp.vec2d,
     onset: wp.vec2d,
     isotropic: int,
-    scope: int,
 ):
     """Return the least height and the largest flag of `check_cell` over the cells of a face; `begin`: the first."""
     p0 = position[natural(face[0])]
@@ -44,13 +56,13 @@ def check_face(
     height2 = wp.float64(0.0)
     near = int(0)
     if face[3] < 0:
-        height2, near = check_cell(p0, p1, p2, laid[begin], warp, weft, onset, isotropic, scope)
+        height2, near = check_cell(p0, p1, p2, laid[begin], warp, weft, onset, isotropic)
     else:
         p3 = position[natural(face[3])]
-        h0, near0 = check_cell(p3, p0, p1, laid[begin], warp, weft, onset, isotropic, scope)
-        h1, near1 = check_cell(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset, isotropic, scope)
-        h2, near2 = check_cell(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset, isotropic, scope)
-        h3, near3 = check_cell(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset, isotropic, scope)
+        h0, near0 = check_cell(p3, p0, p1, laid[begin], warp, weft, onset, isotropic)
+        h1, near1 = check_cell(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset, isotropic)
+        h2, near2 = check_cell(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset, isotropic)
+        h3, near3 = check_cell(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset, isotropic)
         height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
         near = near0 | near1 | near2 | near3
     return height2, near
@@ -118,7 +130,7 @@ def evaluate_guard(
     cell that moves as a whole is not held back.
 
     position: #V [m]. velocity: #V [m/s]. coefficients: as `implicit` has it; without viscosity none is written.
-    scope: ACTING passes over the faces in which the guard did not act; FORCES_ALONE leaves stiffness and viscosity at zero.
+    scope: ACTING passes over the faces in which the guard did not act.
     out: a face acts where the guard acts in a cell or is about to, and in long quads; elsewhere the last three are not written.
     """
     f = natural(wp.tid() + first)
@@ -129,7 +141,7 @@ def evaluate_guard(
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
     begin = natural(cells.first[f])
-    height2, any_near = check_face(position, face, cells.laid, begin, warp, weft, onset, guard.isotropic, scope)
+    height2, any_near = check_face(position, face, cells.laid, begin, warp, weft, onset, guard.isotropic)
     lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
     wave = cells.hourglass[f]
     is_held = wp.dot(wave, wave) > wp.float64(0.0)
@@ -154,14 +166,15 @@ def evaluate_guard(
             q1 = position[i1]
             q2 = position[i2]
             laid = cells.laid[natural(begin + k)]
-            cell_height2, near = check_cell(q0, q1, q2, laid, warp, weft, onset, guard.isotropic, scope)
+            cell_height2, near = check_cell(q0, q1, q2, laid, warp, weft, onset, guard.isotropic)
             if near != 0 or (lacks_shear and cell_height2 > wp.float64(0.0)):
                 D = edge_matrix(q0, q1, q2)
-                bounded = scope != FORCES_ALONE
-                pull, bounds = guard_on_cell(D, laid, warp, weft, onset, s, t, guard, bounded)
-                add_to_corners(out, 4 * f, at, pull * cell_weight(face), bounds * cell_weight(face))
+                cell = guarded_cell(D, laid, warp, weft, onset, s, t, guard)
+                pull = cell_forces(cell, onset, s, t, guard) * cell_weight(face)
+                bounds = cell_bounds(cell, D, onset, s, t, guard) * cell_weight(face)
+                add_to_corners(out, 4 * f, at, pull, bounds)
                 if viscous:
-                    drag = bounds * (time_step * cell_weight(face))
+                    drag = bounds * time_step
                     add_viscosity(out, 4 * f, at, velocity[i0], velocity[i1], velocity[i2], drag)
             k += 1
     if is_held:
@@ -209,3 +222,106 @@ def compute_guard_energy(
         if wp.dot(wave, wave) > wp.float64(0.0):
             amplitude = wave[0] * p0 + wave[1] * p1 + wave[2] * p2 + wave[3] * p3
             energy[f] += wp.float64(0.5) * wp.dot(amplitude, amplitude)
+
+
+@wp.func
+def cell_state(
+    p0: wp.vec2d,
+    p1: wp.vec2d,
+    p2: wp.vec2d,
+    laid: wp.vec3d,
+    warp: wp.vec2d,
+    weft: wp.vec2d,
+    onset: wp.vec2d,
+    isotropic: int,
+):
+    """Return 2 for a cell that is collapsed or mirrored, 1 for one in which the guard acts, 0 for any other."""
+    D = edge_matrix(p0, p1, p2)
+    det = wp.determinant(D)
+    if det <= wp.float64(0.0):
+        return 2
+    if guard_acts(
+        on_body(laid, across(D, warp)), on_body(laid, across(D, weft)), det, wp.float64(1.0), onset, isotropic
+    ):
+        return 1
+    return 0
+
+
+@wp.func
+def face_state(
+    position: wp.array(dtype=wp.vec2d),
+    face: wp.vec4i,
+    laid: wp.array(dtype=wp.vec3d),
+    begin: int,
+    warp: wp.vec2d,
+    weft: wp.vec2d,
+    onset: wp.vec2d,
+    isotropic: int,
+):
+    """Return the `cell_state` of all cells of a face together, by bits; `begin`: the first."""
+    p0 = position[natural(face[0])]
+    p1 = position[natural(face[1])]
+    p2 = position[natural(face[2])]
+    if face[3] < 0:
+        return cell_state(p0, p1, p2, laid[begin], warp, weft, onset, isotropic)
+    p3 = position[natural(face[3])]
+    return (
+        cell_state(p3, p0, p1, laid[begin], warp, weft, onset, isotropic)
+        | cell_state(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset, isotropic)
+        | cell_state(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset, isotropic)
+        | cell_state(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset, isotropic)
+    )
+
+
+@wp.kernel
+def evaluate_guard_potential(
+    position: wp.array(dtype=wp.vec2d),
+    cells: Cells,
+    guard: ThreadGuard,
+    first: int,
+    # outputs
+    energy: wp.array(dtype=wp.float64),
+    out: CellForces,
+):
+    """Compute the energies of `compute_guard_energy` and the forces of `evaluate_guard` at once, for minimisers that take both.
+
+    position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored. out: `force` where a face is `acting`.
+    """
+    f = natural(wp.tid() + first)
+    face = cells.face[f]
+    warp = guard.warp * cells.slack[f][0]
+    weft = guard.weft * cells.slack[f][1]
+    onset = cells.onset[f]
+    begin = natural(cells.first[f])
+    state = face_state(position, face, cells.laid, begin, warp, weft, onset, guard.isotropic)
+    lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
+    wave = cells.hourglass[f]
+    is_held = wp.dot(wave, wave) > wp.float64(0.0)
+    acts = state == 1 or (state == 0 and (lacks_shear or is_held))
+    out.acting[f] = wp.int8(wp.where(acts, 1, 0))
+    if not acts:
+        energy[f] = wp.where(state > 1, wp.float64(wp.inf), wp.float64(0.0))
+        return
+    clear_forces(out, 4 * f)
+    total = wp.float64(0.0)
+    if state == 1 or lacks_shear:
+        s = sheared(cells.shear[f], warp, weft, cells.slack[f])
+        t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
+        k = int(0)
+        end = count_cells(face)
+        while k < end:
+            at = cell_places(face, k)
+            p0 = position[corner_at(face, at[0])]
+            D = edge_matrix(p0, position[corner_at(face, at[1])], position[corner_at(face, at[2])])
+            cell = guarded_cell(D, cells.laid[natural(begin + k)], warp, weft, onset, s, t, guard)
+            add_forces(out, 4 * f, at, cell_forces(cell, onset, s, t, guard) * cell_weight(face))
+            total += cell_energy(cell) * cell_weight(face)
+            k += 1
+    if is_held:
+        amplitude = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+        for k in range(4):
+            amplitude += wave[k] * position[face[k]]
+        for k in range(4):
+            out.force[4 * f + k] -= wave[k] * amplitude
+        total += wp.float64(0.5) * wp.dot(amplitude, amplitude)
+    energy[f] = total

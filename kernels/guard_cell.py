@@ -3,7 +3,6 @@
 import warp as wp
 
 from .cells import (
-    FORCES_ALONE,
     across,
     combined,
     edge_matrix,
@@ -91,7 +90,6 @@ def check_cell(
     weft: wp.vec2d,
     onset: wp.vec2d,
     isotropic: int,
-    scope: int,
 ):
     """Return the square of a cell's least height [m2], 0 if mirrored, and 1 where the guard acts or is about to."""
     D = edge_matrix(p0, p1, p2)
@@ -102,8 +100,6 @@ def check_cell(
         longest2 = longest_square(D)
         height2 = det * det / longest2
         early = early_share(det, longest2)
-        if scope == FORCES_ALONE:
-            early = wp.float64(1.0)
         if guard_acts(on_body(laid, across(D, warp)), on_body(laid, across(D, weft)), det, early, onset, isotropic):
             near = int(1)
     return height2, near
@@ -188,8 +184,33 @@ def shear_bound(w: wp.vec2d, s: wp.vec2d, t: wp.vec2d, back_s: wp.vec2d, back_t:
     return wp.float64(2.0) * (wp.dot(g, g) + bent * (along_s * along_s + along_t * along_t))
 
 
+@wp.struct
+class GuardedCell:
+    """A cell as the guard sees it.
+
+    inv: inverse of its edges in the plane [1/m]. F: deformation. area: in the plane [m2].
+    along, over: warp and weft, or the principal directions in an isotropic sheet. worn_warp, worn_weft: these, worn.
+    y_warp, y_weft: their stretch beyond the onset. worn_s, worn_t: directions of the shear deficit, worn; angle: their product.
+    density: energy of the guard per area [J/m2].
+    """
+
+    inv: wp.mat22d
+    F: wp.mat22d
+    area: wp.float64
+    along: wp.vec2d
+    over: wp.vec2d
+    worn_warp: wp.vec2d
+    worn_weft: wp.vec2d
+    y_warp: wp.float64
+    y_weft: wp.float64
+    worn_s: wp.vec2d
+    worn_t: wp.vec2d
+    angle: wp.float64
+    density: wp.float64
+
+
 @wp.func
-def guard_on_cell(
+def guarded_cell(
     D: wp.mat22d,
     laid: wp.vec3d,
     warp: wp.vec2d,
@@ -198,57 +219,78 @@ def guard_on_cell(
     s: wp.vec2d,
     t: wp.vec2d,
     guard: ThreadGuard,
-    bounded: bool,
 ):
-    """Return the forces on corners 1 and 2 of a cell with all of its area, as columns [N], and its bounds, one a corner [N/m].
-
-    D: the cell's edges in the plane. bounded: False leaves the bounds at zero.
-    """
+    """Return the cell with the edges D in the plane."""
     half = wp.float64(0.5)
-    area = half * wp.determinant(D)
-    inv = wp.inverse(D)
-    F = laid_edges(laid) * inv
-    along = warp
-    over = weft
+    cell = GuardedCell()
+    cell.area = half * wp.determinant(D)
+    cell.inv = wp.inverse(D)
+    cell.F = laid_edges(laid) * cell.inv
+    cell.along = warp
+    cell.over = weft
     if guard.isotropic != 0:
-        turn = principal_direction(F * warp, F * weft)
-        along = combined(turn, warp, weft)
-        over = combined(turned_left(turn), warp, weft)
-    worn_warp = F * along
-    worn_weft = F * over
-    y_warp = excess_stretch(worn_warp, onset[0])
-    y_weft = excess_stretch(worn_weft, onset[1])
-    worn_s = F * s
-    worn_t = F * t
-    angle = wp.dot(worn_s, worn_t)
-    density = half * (guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft)
-    P = thread_stress(worn_warp, along, guard.stiffness_warp, onset[0])
-    P += thread_stress(worn_weft, over, guard.stiffness_weft, onset[1])
-    P += (wp.outer(worn_t, s) + wp.outer(worn_s, t)) * angle
+        turn = principal_direction(cell.F * warp, cell.F * weft)
+        cell.along = combined(turn, warp, weft)
+        cell.over = combined(turned_left(turn), warp, weft)
+    cell.worn_warp = cell.F * cell.along
+    cell.worn_weft = cell.F * cell.over
+    cell.y_warp = excess_stretch(cell.worn_warp, onset[0])
+    cell.y_weft = excess_stretch(cell.worn_weft, onset[1])
+    cell.worn_s = cell.F * s
+    cell.worn_t = cell.F * t
+    cell.angle = wp.dot(cell.worn_s, cell.worn_t)
+    cell.density = half * (
+        guard.stiffness_warp * cell.y_warp * cell.y_warp + guard.stiffness_weft * cell.y_weft * cell.y_weft
+    )
+    return cell
+
+
+@wp.func
+def cell_energy(cell: GuardedCell):
+    """Return the energy of a cell with all of its area [J]."""
+    return cell.area * (cell.density + wp.float64(0.5) * cell.angle * cell.angle)
+
+
+@wp.func
+def cell_forces(cell: GuardedCell, onset: wp.vec2d, s: wp.vec2d, t: wp.vec2d, guard: ThreadGuard):
+    """Return the forces on corners 1 and 2 of a cell with all of its area, as columns [N]."""
+    P = thread_stress(cell.worn_warp, cell.along, guard.stiffness_warp, onset[0])
+    P += thread_stress(cell.worn_weft, cell.over, guard.stiffness_weft, onset[1])
+    P += (wp.outer(cell.worn_t, s) + wp.outer(cell.worn_s, t)) * cell.angle
     # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
-    inv_t = wp.transpose(inv)
-    G = (wp.transpose(F) * P * inv_t - inv_t * (density + half * angle * angle)) * area
-    bounds = wp.vec3d()
-    if bounded:
-        early = early_share(wp.determinant(D), longest_square(D))
-        q_warp = thread_curvature(worn_warp, F, guard.stiffness_warp, early * onset[0])
-        q_weft = thread_curvature(worn_weft, F, guard.stiffness_weft, early * onset[1])
-        if guard.isotropic != 0:
-            # The principal directions turn with the cell, against the longer one's excess.
-            q_weft = wp.max(q_weft, q_warp * turning_share(worn_warp, worn_weft, y_warp))
-        # rows of D^-1 are the gradients of the barycentric weights of corners 1 and 2
-        w1 = wp.vec2d(inv[0, 0], inv[0, 1])
-        w2 = wp.vec2d(inv[1, 0], inv[1, 1])
-        w0 = -(w1 + w2)
-        back_s = wp.transpose(F) * worn_s
-        back_t = wp.transpose(F) * worn_t
-        bent = wp.abs(angle) * wp.ddot(F, F)
-        bounds = wp.vec3d(
+    inv_t = wp.transpose(cell.inv)
+    psi = cell.density + wp.float64(0.5) * cell.angle * cell.angle
+    return (wp.transpose(cell.F) * P * inv_t - inv_t * psi) * cell.area
+
+
+@wp.func
+def cell_bounds(cell: GuardedCell, D: wp.mat22d, onset: wp.vec2d, s: wp.vec2d, t: wp.vec2d, guard: ThreadGuard):
+    """Return bounds on the stiffness of a cell with all of its area, one a corner [N/m]."""
+    F = cell.F
+    early = early_share(wp.determinant(D), longest_square(D))
+    q_warp = thread_curvature(cell.worn_warp, F, guard.stiffness_warp, early * onset[0])
+    q_weft = thread_curvature(cell.worn_weft, F, guard.stiffness_weft, early * onset[1])
+    if guard.isotropic != 0:
+        # The principal directions turn with the cell, against the longer one's excess.
+        q_weft = wp.max(q_weft, q_warp * turning_share(cell.worn_warp, cell.worn_weft, cell.y_warp))
+    # rows of D^-1 are the gradients of the barycentric weights of corners 1 and 2
+    w1 = wp.vec2d(cell.inv[0, 0], cell.inv[0, 1])
+    w2 = wp.vec2d(cell.inv[1, 0], cell.inv[1, 1])
+    w0 = -(w1 + w2)
+    back_s = wp.transpose(F) * cell.worn_s
+    back_t = wp.transpose(F) * cell.worn_t
+    bent = wp.abs(cell.angle) * wp.ddot(F, F)
+    density = cell.density
+    along = cell.along
+    over = cell.over
+    return (
+        wp.vec3d(
             guard_bound(w0, along, over, q_warp, q_weft, density) + shear_bound(w0, s, t, back_s, back_t, bent),
             guard_bound(w1, along, over, q_warp, q_weft, density) + shear_bound(w1, s, t, back_s, back_t, bent),
             guard_bound(w2, along, over, q_warp, q_weft, density) + shear_bound(w2, s, t, back_s, back_t, bent),
         )
-    return G, bounds * area
+        * cell.area
+    )
 
 
 @wp.func

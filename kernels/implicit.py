@@ -131,6 +131,56 @@ def gather_forces(
     out.stiffness[i] = k
 
 
+@wp.kernel
+def gather_potential(
+    position: wp.array(dtype=wp.vec2d),
+    springs: Springs,
+    cells: Cells,
+    cell_forces: CellForces,
+    bonds: Bonds,
+    bond_forces: BondForces,
+    first: int,
+    # outputs
+    energy: wp.array(dtype=wp.float64),
+    force: wp.array(dtype=wp.vec2d),
+):
+    """Gather the force on each vertex at rest, without a load, and the springs' energy of `compute_spring_energy`.
+
+    position: #V [m]. energy: #V [J]. force: #V [N]. Cells and bonds have been evaluated at these positions.
+    """
+    i = natural(wp.tid() + first)
+    total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    stored = wp.float64(0.0)
+    if springs.active != wp.float64(0.0):
+        here = position[i]
+        s = natural(springs.offset[i])
+        end = springs.offset[i + 1]
+        while s < end:
+            there = natural(springs.neighbor[s])
+            d = position[there] - here
+            length = wp.sqrt(wp.max(wp.dot(d, d), wp.float64(1.0e-300)))
+            stretch = length - springs.rest_length[s]
+            tension = springs.stiffness[s] * stretch
+            total += (tension / length) * d
+            if there > i:
+                stored += tension * stretch
+            s += 1
+    e = natural(cells.offset[i])
+    end = cells.offset[i + 1]
+    while e < end:
+        slot = natural(cells.slot[e])
+        if cell_forces.acting[slot / 4] != wp.int8(0):
+            total += cell_forces.force[slot]
+        e += 1
+    b = natural(bonds.offset[i])
+    end = bonds.offset[i + 1]
+    while b < end:
+        total += bond_forces.force[natural(bonds.slot[b])]
+        b += 1
+    energy[i] = wp.float64(0.5) * stored
+    force[i] = wp.cw_mul(total, bonds.freedom[i])
+
+
 @wp.func
 def stop_vertex(
     i: int,

@@ -17,7 +17,7 @@ from .cells import (
     turned_left,
 )
 from .indices import natural
-from .membrane import Cloth, sheared_threads, stretched_sheet
+from .membrane_cell import Cloth, sheared_threads, stretched_sheet
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 

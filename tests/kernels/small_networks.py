@@ -11,8 +11,16 @@ import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from warpflat.kernels.cells import ALL, CellForces
-from warpflat.kernels.guard import compute_guard_energy, evaluate_guard
-from warpflat.kernels.implicit import BondForces, VertexForces, advance, compute_kinetic_energy, gather_forces, stop
+from warpflat.kernels.guard import compute_guard_energy, evaluate_guard, evaluate_guard_potential
+from warpflat.kernels.implicit import (
+    BondForces,
+    VertexForces,
+    advance,
+    compute_kinetic_energy,
+    gather_forces,
+    gather_potential,
+    stop,
+)
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 
 from warpflat.fabric.fabric import Fabric
@@ -137,6 +145,11 @@ class Launched:
 
     def evaluate_guard(self) -> Launched:
         self._launch(evaluate_guard, self.network.face_count, per_face=True)
+        return self
+
+    def evaluate_potential(self) -> Launched:
+        self._launch(evaluate_guard_potential, self.network.face_count, per_face=True)
+        self._launch(gather_potential, self.network.vertex_count)
         return self
 
     def gather_forces(self) -> Launched:

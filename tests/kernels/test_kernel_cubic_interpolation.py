@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 from devices import DEVICE
-from warpflat.kernels.cubic_interpolation import interpolate_along, interpolate_along_rows, sample_grid, weigh_cubics
+from warpflat.kernels.cubic_interpolation import interpolate_along, interpolate_along_rows, weigh_cubics
 from warpflat.kernels.grid_lists import number_faces
 
 from warpflat.core.launch import launch_each
@@ -82,15 +82,3 @@ def test_values_along_the_rows_of_a_grid_are_summed_by_weight() -> None:
     launch_each(interpolate_along_rows, 35, [values, grid, column, weight], [result])
     expected = np.einsum("jk,ijkd->ijd", weight, values[:, column])
     np.testing.assert_allclose(result[grid], expected, rtol=1e-13)
-
-
-@pytest.mark.parametrize("depth", [1, 2, 3])
-def test_values_between_rows_and_columns_are_summed_by_both_weights(depth: int) -> None:
-    rng = np.random.default_rng(depth)
-    grid, values = rng.permutation(6 * 8).reshape(6, 8).astype(np.int32), rng.normal(size=(48, depth))
-    row, column = rng.integers(6, size=(5, 4)).astype(np.int32), rng.integers(8, size=(3, 2)).astype(np.int32)
-    row_weight, column_weight = rng.normal(size=(5, 4)), rng.normal(size=(3, 2))
-    sampled = np.empty((5, 3, depth))
-    launch_each(sample_grid, 15, [values, grid, row, row_weight, column, column_weight], [sampled])
-    whole = values[grid][row[:, :, None, None], column]
-    np.testing.assert_allclose(sampled, np.einsum("ia,jb,iajbd->ijd", row_weight, column_weight, whole), rtol=1e-13)

@@ -11,7 +11,7 @@ from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import corner_vertices, filled
 from warpflat.kernels.cells import CellForces
-from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane
+from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane, evaluate_membrane_potential
 from warpflat.kernels.strain import compute_membrane_strain
 
 from warpflat.fabric.fabric import Fabric, grain_axes
@@ -80,8 +80,13 @@ def evaluated(
         device=DEVICE,
     )
     found = {k: np.array(a.numpy()) for k, a in out.items()}
+    energy = wp.zeros(f, dtype=wp.float64, device=DEVICE)
+    made = [energy, filled(CellForces, out)]
+    given = [at, network.cells, network.cloth, 0]
+    wp.launch(evaluate_membrane_potential, dim=f, inputs=given, outputs=made, device=DEVICE)
+    found |= {"energy": energy.numpy(), "force_again": out["force"].numpy()}
     slots, corner = corner_vertices(network)
-    found |= {k: found[k][slots] for k in ("force", "viscosity", "stiffness")}
+    found |= {k: found[k][slots] for k in ("force", "force_again", "viscosity", "stiffness")}
     found["vertex_force"] = np.stack([np.bincount(corner, found["force"][:, k], minlength=n) for k in range(2)], axis=1)
     return found
 
@@ -333,7 +338,11 @@ def test_forces_are_minus_the_gradient(name: str, meant: tuple[float, float] | N
     network = network_of(surface, CLOTHS[name], points[:, :2], grain_angle=20.0, stretch=stretch)
     flat = 0.97 * points[:, :2] @ np.array([[1.0, 0.0], [shear, 1.0]])
     flat += np.random.default_rng(1).normal(scale=0.004, size=(9, 2))
-    force = evaluated(network, flat)["vertex_force"]
+    found = evaluated(network, flat)
+    force = found["vertex_force"]
+    # The kernel that takes energies and forces at once.
+    np.testing.assert_allclose(found["force_again"], found["force"], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found["energy"], energies(network, flat), rtol=1e-9)
     step, slope = 1e-7, np.zeros_like(flat)
     for i, k in np.ndindex(flat.shape):
         there, back = flat.copy(), flat.copy()

@@ -24,9 +24,7 @@ from warpflat.solver.multigrid.coarsen import (
     hierarchy_in_background,
     inherit_levels,
     is_coarsest,
-    resampled_surface,
 )
-from warpflat.solver.multigrid.grid_coarsening import ResamplingKind
 from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic, non_manifold_vertices
 from warpflat.surface.cut.cut_mesh import cut_along
@@ -38,8 +36,6 @@ from warpflat.surface.shapes import make_shape
 from warpflat.surface.untangle import signed_cell_areas
 
 FloatArray = NDArray[np.float64]
-
-KINDS: tuple[ResamplingKind, ...] = ("fine", "halves", "thirds")
 
 
 def sheet(columns: int, rows: int, *, triangles: bool = False) -> Surface:
@@ -225,28 +221,6 @@ def test_levels_of_a_grid_go_down_to_fewer_vertices():
 
 
 @pytest.mark.parametrize(
-    ("columns", "rows", "expected"),
-    [(101, 101, (57, 57)), (72, 143, (41, 81)), (1_000, 21, (393, 9)), (2_000, 5, (785, 5)), (90, 70, (65, 49))],
-)
-def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expected: tuple[int, int]):
-    """Its rows and columns are as many for its size as those of the large one, each face lies where one of the large grid's does, and
-    all can be halved."""
-    surface = sheet(columns, rows)
-    found = resampled_surface(surface, "fine")
-    assert found is not None
-    small, carry, face_of = found
-    grid = rows_and_columns(small)
-    assert grid is not None
-    assert sorted(grid.shape) == sorted(expected)
-    middle = small.vertices[small.faces].mean(axis=1)
-    there = surface.vertices[surface.faces[face_of]]
-    assert (there.min(axis=1) - 1e-9 <= middle).all()
-    assert (middle <= there.max(axis=1) + 1e-9).all()
-    np.testing.assert_allclose(carry(flat(small)), flat(surface), atol=1e-9)
-    assert resampled_surface(surface, "fine") is found
-
-
-@pytest.mark.parametrize(
     ("columns", "rows", "quads", "triangles"),
     [(7, 9, False, False), (11, 11, True, False), (200, 4, False, True), (200, 5, True, True), (30, 30, True, True)],
 )
@@ -256,34 +230,6 @@ def test_whether_there_is_a_coarser_level_is_told_before_it_is_made(
     for surface, wished in ((sheet(columns, rows), quads), (sheet(columns, rows, triangles=True), triangles)):
         assert can_coarsen(surface) == wished
         assert bool(coarsenings_of(surface)) == wished
-
-
-def test_stiff_cloth_has_a_coarser_one():
-    surface = sheet(101, 101)
-    sizes = []
-    for kind in KINDS:
-        found = resampled_surface(surface, kind)
-        assert found is not None
-        sizes.append([len(found[0].vertices), *(len(step.kept) for step in coarsenings_of(found[0]))])
-    assert sizes == [[57**2, 29**2, 15**2, 8**2], [49**2, 25**2, 13**2, 7**2], [49**2, 17**2, 9**2]]
-
-
-@pytest.mark.parametrize("shape", [(72, 143), (90, 70), (1_000, 21)])
-def test_small_grids_for_stiff_cloth_have_every_third_row_and_column_next(shape: tuple[int, int]):
-    """All of them where a small grid has as many as it likes; every second one where a large grid has too few rows, or long quads."""
-    surface = sheet(*shape)
-    found = resampled_surface(surface, "thirds")
-    assert found is not None
-    step = coarsenings_of(found[0])[0]
-    fine, coarse = (rows_and_columns(of) for of in (found[0], step.surface))
-    assert fine is not None
-    assert coarse is not None
-    np.testing.assert_array_equal(
-        step.kept.reshape(coarse.shape), fine[::3, ::3] if min(shape) > 21 else fine[::2, ::2]
-    )
-    np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(found[0]), atol=1e-12)
-    assert step.smooth_interpolation is not None
-    np.testing.assert_allclose(step.smooth_interpolation(flat(step.surface)), flat(found[0]), atol=1e-12)
 
 
 def test_rows_much_farther_apart_than_columns_all_stay():
@@ -315,12 +261,6 @@ def test_what_surfaces_share_by_their_faces_is_not_how_long_their_quads_are():
         assert grid is not None
         shapes.append(grid.shape)
     assert shapes == [(17, 33), (17, 17), (17, 33)]
-
-
-def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
-    for kind in KINDS:
-        assert resampled_surface(sheet(2_000, 4), kind) is None
-        assert resampled_surface(sheet(21, 21, triangles=True), kind) is None
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])

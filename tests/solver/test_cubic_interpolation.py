@@ -73,22 +73,3 @@ def test_rows_at_one_place_are_told_apart_by_number() -> None:
     keep = every_second(7)
     carried = grid_carry(space.reshape(-1, 3), grid, (keep, keep))(np.ones((16, 2)))
     np.testing.assert_allclose(carried, 1.0, rtol=1e-12)
-
-
-def test_sampled_from_a_finer_grid_and_carried_back_cubics_are_kept() -> None:
-    """Rows and columns of the coarser grid lie between those of the finer one, both of uneven widths."""
-    rng = np.random.default_rng(3)
-    across, up = (np.cumsum(rng.uniform(0.5, 2.0, count)) / count for count in (14, 11))
-    space = in_space(across, up)
-    u, v = space[..., 0], space[..., 1]
-    layout = np.stack([u**3 - u * v**2, v**3 + 2.0 * u**2 * v], axis=-1).reshape(-1, 2)
-    grid = np.arange(14 * 11, dtype=np.int32).reshape(11, 14)
-    carry = grid_carry(space.reshape(-1, 3), grid, (np.linspace(0.0, 10.0, 6), np.linspace(0.0, 13.0, 8)))
-    coarse = carry.sample(layout)
-    assert coarse.shape == (48, 2)
-    np.testing.assert_allclose(coarse[[0, 7, 40, 47]], layout[[0, 13, 140, 153]], rtol=1e-14)
-    np.testing.assert_allclose(carry(coarse), layout, atol=1e-12)
-    # The coarse vertices lie on the sheet, where their rows and columns do.
-    places = carry.sample(space.reshape(-1, 3)).reshape(6, 8, 3)
-    np.testing.assert_allclose(places[:, 0, 1], np.interp(np.linspace(0.0, 10.0, 6), np.arange(11), up), rtol=1e-12)
-    np.testing.assert_allclose(places[0, :, 0], np.interp(np.linspace(0.0, 13.0, 8), np.arange(14), across), rtol=1e-12)

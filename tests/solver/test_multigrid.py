@@ -22,7 +22,6 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.multigrid.cascade import start_from_cascade
 from warpflat.solver.multigrid.levels import Levels
 from warpflat.solver.multigrid.solve import relax_multilevel
 from warpflat.solver.options import RelaxOptions
@@ -229,62 +228,6 @@ def test_soft_cloth_and_strips_take_half_of_the_work_that_steps_take_to_a_thousa
         energies.append(seen[-1][1])
     plain, levels = (next(work for work, energy in seen if energy < 1.001 * min(energies)) for seen in works)
     assert levels <= 0.55 * plain
-
-
-def start_of(piece: Flattening) -> Relaxation:
-    """Its relaxation, before the first step."""
-    ends = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
-    state = Relaxation(piece.network, LEVELS, start=piece.development.positions, alignments=[ends])
-    state.check_start()
-    return state
-
-
-@pytest.mark.parametrize("side", [72, 100, 101, 200])
-@pytest.mark.parametrize(("shape", "most"), [("dome", 3e-5), ("bodice", 5e-4)])
-def test_a_large_grid_is_relaxed_as_soon_as_a_small_one_is(shape: str, most: float, side: int):
-    """Cubic interpolation leaves at most some hundredths of a per cent of the energy, whether lines can be halved or not."""
-    done = flatten(make_shape(shape, resolution=side), fabric=cloth(375.0), datum="centre", device=DEVICE)
-    state = start_of(done)
-    assert start_from_cascade(state) is not None
-    assert state.status.potential[0] < (1.0 + most) * minimum(done)
-    assert state.work_units < 24.0 * (72 / side) ** 2
-
-
-def test_the_levels_of_a_small_lattice_are_those_of_the_large_one_too():
-    """Beside a crack the small lattice is one of the levels that cycles use; no network is made of those in between."""
-    done = flatten(cracked(101, column=34), fabric=cloth(375.0), datum="centre", device=DEVICE)
-    state = start_of(done)
-    cascade = start_from_cascade(state)
-    assert cascade is not None
-    sizes = [level.network.vertex_count for level in cascade.coarse_levels.values()]
-    assert 2_500 < max(sizes) < 5_000
-    levels = Levels(state, known=cascade)
-    assert levels.sizes == [done.network.vertex_count, *cascade.sizes]
-    assert [level.state for level in levels.all[1:]] == [level.state for level in cascade.all]
-
-
-def test_small_grids_and_triangles_start_by_nested_iteration():
-    for surface in (make_shape("dome", resolution=33), make_shape("dome", resolution=81, triangles=True)):
-        state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device=DEVICE))
-        assert start_from_cascade(state) is None
-
-
-def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
-    """Where it is relaxed already, all that could be interpolated has a higher energy."""
-    done = flatten(make_shape("bodice", resolution=75), fabric=cloth(375.0), datum="centre", device=DEVICE)
-    ends = GrainAlignment(lower=int(done.datum[0]), upper=int(done.datum[-1]))
-    state = Relaxation(done.network, LEVELS, start=done.positions, alignments=[ends])
-    before, load = state.check_start(), np.random.default_rng(0).normal(size=done.positions.shape)
-    state.load.assign(load)
-    assert start_from_cascade(state) is None
-    np.testing.assert_array_equal(state.positions(), done.positions)
-    np.testing.assert_array_equal(state.load.numpy(), load)
-    np.testing.assert_array_equal(state.velocity.numpy(), 0.0)
-    state.load.zero_()
-    assert state.status is before
-    outcome = relax_multilevel(state)
-    assert outcome.converged
-    assert outcome.energies.potential <= minimum(done) * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.sparse import factor_symmetric
 from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
@@ -260,8 +260,7 @@ def _step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool)
         matrix = matrix + weight * (b.T @ b)
         right += weight * (b.T @ (difference - now))
     matrix = csc_array(matrix + diags_array(np.full(count, _HOLD * threads)))
-    step = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(right)
-    return np.asarray(step.reshape(-1, 2))
+    return factor_symmetric(matrix)(right).reshape(-1, 2)
 
 
 def _lengths(x: FloatArray, gradient: FloatArray) -> FloatArray:

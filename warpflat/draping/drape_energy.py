@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
 from scipy.sparse import bsr_array, csc_array
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.launch import Sequence, launch_each, record
+from warpflat.core.sparse import factor_symmetric
 from warpflat.core.sums import range_offsets
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
@@ -19,11 +19,11 @@ from warpflat.fabric.fabric import Fabric
 from warpflat.kernels.drape import Bending, Contact, Motion, evaluate_cloth, evaluate_curvature, gather_drape
 from warpflat.kernels.drape_contact import anchor_friction, carry_contact, find_planes, load_contact
 from warpflat.kernels.drape_stiffness import stiffen_cloth, stiffen_contact
-from warpflat.kernels.membrane import Cloth
+from warpflat.kernels.membrane_cell import Cloth
 from warpflat.model.membrane import make_cloth
 from warpflat.solver.quasi_newton import Point, Solve
 
-__all__ = ["DrapeEnergy", "WornPoint"]
+__all__ = ["DrapeEnergy"]
 
 # Stiffness of the body's skin and of friction that holds, per area [N/m3]. The body carries what presses at no depth; these
 # only hold back what changes.
@@ -36,13 +36,6 @@ _REACH = 0.15  # [m]
 # A metric for far steps: least share of the tensile stiffness under compression, and a tension that is added in all directions [N/m].
 # Steps by a softer one are too long where cloth becomes taut, and across cloth without tension.
 _FAR_COMPRESSION, _FAR_PULL = 0.3, 10.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class WornPoint(Point):
-    """Places of the cloth (#V by 3 [m]), the energy there [J], and the forces (#V by 3 [N])."""
-
-    force: FloatArray
 
 
 class DrapeEnergy:
@@ -137,18 +130,14 @@ class DrapeEnergy:
         """Let no vertex go farther than some way [m] from #V by 3 places [m]: the energy is infinite beyond."""
         self._start, self._longest = start, longest
 
-    def at(self, positions: FloatArray) -> WornPoint:
+    def at(self, positions: FloatArray) -> Point:
         """Evaluate the cloth at #V by 3 places [m]."""
         if np.abs(positions - self._start).max() > self._longest:
-            return WornPoint(positions=positions, energy=np.inf, force=np.zeros_like(positions))
+            return Point(positions=positions, energy=np.inf, gradient=np.zeros_like(positions))
         self.motion.position.assign(positions)
         self._evaluate.launch()
         energy = float(self._cell_energy.numpy().sum() + self._energy.numpy().sum())
-        return WornPoint(positions=positions, energy=energy, force=self._force.numpy().copy())
-
-    def gradient(self, point: WornPoint) -> FloatArray:
-        """Return the gradient of the energy, #V by 3 [N]."""
-        return -point.force
+        return Point(positions=positions, energy=energy, gradient=-self._force.numpy())
 
     def factor(self, positions: FloatArray, *, near: bool) -> None:
         """Factor the stiffness of the cloth somewhere, from where on it is the metric.
@@ -157,9 +146,8 @@ class DrapeEnergy:
             positions: #V by 3, where the cloth is [m].
             near: whether rest is near, for steps by Newton's method; else the metric is stiffer, for L-BFGS.
         """
-        matrix = self.stiffness(positions, near=near)
-        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        self._solve = lambda force: factor.solve(np.ascontiguousarray(force.ravel())).reshape(-1, 3)
+        factor = factor_symmetric(self.stiffness(positions, near=near))
+        self._solve = lambda force: factor(force.ravel()).reshape(-1, 3)
 
     def stiffness(self, positions: FloatArray, *, near: bool = True) -> csc_array:
         """Return the stiffness of cloth, body and friction somewhere, 3 #V by 3 #V [N/m], without what is negative.
@@ -183,7 +171,7 @@ class DrapeEnergy:
         launch_each(stiffen_cloth, count, [*self._cells[:-1], law, pull], [cells], device=self.device, least=512)
         return cells.numpy().copy()
 
-    def solver(self, point: WornPoint) -> Solve:
+    def solver(self, point: Point) -> Solve:
         """Return the solution by the last factor."""
         assert self._solve is not None
         return self._solve

@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.sparse import factor_symmetric
 from warpflat.draping.drape_energy import DrapeEnergy
 from warpflat.draping.drape_garment import held_vertices
 from warpflat.draping.moved_pattern import edge_lengths, largest_share, seam_edges, seam_rows, with_pattern
@@ -108,7 +108,7 @@ def _step(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the way of the cloth to rest (#V by 3) after a displacement of its flat vertices, and that (#P by 2) [m]."""
     x, threads = cloth.designed, 0.5 * (cloth.fabric.stiffness_warp + cloth.fabric.stiffness_weft)
-    force = energy.at(x).force
+    force = -energy.at(x).gradient
     # J in cells: K F; and F K F, the cloth's stiffness in its plane.
     stiffness, along = energy.cell_stiffness(x), _gradients(cloth)
     by_flat = np.einsum("cijab,cbk->ciajk", stiffness, along)
@@ -127,8 +127,7 @@ def _step(
         damping = damping + _SEAM * threads * (sides.T @ sides)
         right = _SEAM * threads * (sides.T @ (difference - now))
     matrix = csc_array(block_array([[energy.stiffness(x), -jacobian], [-jacobian.T, -damping]]))
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    found = factor.solve(np.concatenate([force.ravel(), -right]))
+    found = factor_symmetric(matrix)(np.concatenate([force.ravel(), -right]))
     return found[:space].reshape(-1, 3), found[space:].reshape(-1, 2)
 
 

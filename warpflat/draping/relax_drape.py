@@ -228,10 +228,10 @@ def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
         energy.factor(point.positions, near=near)
         descent = Descent(energy, point, memory=min(steps, _MEMORY))
         while descent.iterations < steps and left > _ROUND_ENDS * tolerance and descent.step():
-            left = float(np.linalg.norm(descent.point.force, axis=1).mean()) / weight
+            left = float(np.linalg.norm(descent.point.gradient, axis=1).mean()) / weight
         point = descent.point
         if descent.is_stuck or left <= _ROUND_ENDS * tolerance:
             break
     energy.carry_contact(point.positions)
     energy.motion.velocity.zero_()
-    return float(np.linalg.norm(point.force, axis=1).mean()) / weight
+    return float(np.linalg.norm(point.gradient, axis=1).mean()) / weight

@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, diags_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import coo_array, diags_array
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.sparse import factor_symmetric
 from warpflat.draping.body import Body
 from warpflat.draping.mesh_pieces import FlatMesh, Weld
 from warpflat.draping.sewn_cloth import SewnCloth
@@ -279,21 +279,21 @@ def draw_together(cloth: SewnCloth, start: FloatArray, body: Body) -> FloatArray
     hold = laplacian.diagonal().mean()
     x = start.copy()
     outside = np.zeros(count, dtype=bool)
-    factor = None
+    solve = None
     for number in range(_ROUNDS):
         centre, normal = body.nearest(x)
         depth = np.einsum("ij,ij->i", x - centre, normal)
         near = (depth < _OFF) & (np.linalg.norm(x - centre, axis=1) < 0.2)
         # The factor is renewed where contact has changed, not in every round.
-        if factor is None or number % 10 == 0:
+        if solve is None or number % 10 == 0:
             outside = near
             pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside)
-            factor = splu(csc_array(laplacian + diags_array(pull)))
+            solve = factor_symmetric(laplacian + diags_array(pull))
         target = np.where((near & outside)[:, None], centre + _OFF * normal, x)
         pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside)
         turned = _nearest_isometries((derivative @ x).reshape(-1, 2, 3))
         right = derivative.T @ (stiffness[:, None] * turned.reshape(-1, 3)) + pull[:, None] * target
-        before, x = x, factor.solve(right)
+        before, x = x, solve(right)
         if np.linalg.norm(x - before, axis=1).mean() < _STILL:
             break
     return np.asarray(x)

@@ -10,7 +10,7 @@ import warp as wp
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.fabric.fabric import Curve, Fabric
-from warpflat.kernels.membrane import Cloth
+from warpflat.kernels.membrane_cell import Cloth
 
 __all__ = ["MODELS", "Model", "check_model", "corner_sums", "make_cloth", "step_matrix"]
 

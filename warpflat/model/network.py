@@ -33,7 +33,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
@@ -45,11 +45,12 @@ from warpflat.core.sorting import counting_sort
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells
 from warpflat.kernels.constraints import Seams, compute_seam_residuals
-from warpflat.kernels.guard import compute_guard_energy, evaluate_guard
+from warpflat.kernels.guard import compute_guard_energy, evaluate_guard, evaluate_guard_potential
 from warpflat.kernels.guard_cell import ThreadGuard
 from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.line_solve import ThreadLines
-from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
+from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane, evaluate_membrane_potential
+from warpflat.kernels.membrane_cell import Cloth
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
 from warpflat.model.membrane import Model, check_model, make_cloth, step_matrix
@@ -78,6 +79,15 @@ _SOFT = 12.0
 _STIFF = 5.0
 # The arrays of seam and constraint equations.
 _SEAMS = ("ends", "kind", "ratio", "target", "lever", "stiffness", "offset")
+
+
+class CellModel(NamedTuple):
+    """The kernels of a network's cells: what a step takes, the energy, and energy and forces at once; and their parameters."""
+
+    step: wp.Kernel
+    energy: wp.Kernel
+    potential: wp.Kernel
+    parameters: ThreadGuard | Cloth
 
 
 @dataclass(kw_only=True, repr=False)
@@ -275,11 +285,11 @@ class SpringNetwork:
         return around
 
     @property
-    def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:
-        """The kernels of the cells' forces and energy, and their parameters."""
+    def cell_model(self) -> CellModel:
+        """The kernels of the cells, and their parameters."""
         if self.cloth is None:
-            return evaluate_guard, compute_guard_energy, self.guard
-        return evaluate_membrane, compute_membrane_energy, self.cloth
+            return CellModel(evaluate_guard, compute_guard_energy, evaluate_guard_potential, self.guard)
+        return CellModel(evaluate_membrane, compute_membrane_energy, evaluate_membrane_potential, self.cloth)
 
     @property
     def pieces(self) -> Sequence[SpringNetwork]:

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.sparse import factor_symmetric
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.contact import NO_CONTACTS, Barrier, ContactPoint
+from warpflat.solver.contact import Barrier, ContactPoint, evaluate_with_contact
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.gauss_newton import GaussNewtonSteps
 from warpflat.solver.grain_alignment import align_grain
@@ -83,22 +83,7 @@ class _SewnCloth:
 
     def at(self, positions: FloatArray) -> ContactPoint:
         """Evaluate a layout."""
-        state = self._state
-        touch = NO_CONTACTS if self._barrier is None else self._barrier(positions)
-        energy = touch.energy
-        if np.isfinite(energy):
-            state.place(positions)
-            energy += float(state.potentials().sum())
-        if np.isfinite(energy):
-            energy += state.network.seam_energy(state.position)
-        return ContactPoint(positions=positions, energy=energy, touch=touch)
-
-    def gradient(self, point: ContactPoint) -> FloatArray:
-        """Return the gradient of the energy, #V by 2 [N]."""
-        self._state.place(point.positions)
-        gradient = -self._state.forces()
-        point.touch.add_gradient(gradient)
-        return gradient
+        return evaluate_with_contact(self._state, self._barrier, positions)
 
     def solver(self, point: ContactPoint) -> Solve:
         """Return the solution by the metric: the factor plus the stiffness of the contacts."""
@@ -135,17 +120,17 @@ def _metric(state: Relaxation) -> Solve:
         matrix = csc_array(matrix + rows.T @ rows)
     diagonal = matrix.diagonal()
     matrix.setdiag(diagonal + _REGULARISATION * diagonal.mean() + (free == 0.0) * diagonal.max())
-    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factor = factor_symmetric(matrix)
     # The chords keep their directions exactly: their rows are Lagrange multipliers.
     chords = np.zeros((len(state.alignments), len(free)))
     for row, each in zip(chords, state.alignments, strict=True):
         across = np.array([each.direction[1], -each.direction[0]])
         row.reshape(-1, 2)[[each.upper, each.lower]] = across, -across
-    columns = factor.solve(np.ascontiguousarray(chords.T))
+    columns = factor(np.ascontiguousarray(chords.T))
     inner = chords @ columns
 
     def solve(force: FloatArray) -> FloatArray:
-        step = factor.solve(np.ascontiguousarray(force.ravel()))
+        step = factor(np.ascontiguousarray(force.ravel()))
         return np.asarray(step - columns @ np.linalg.solve(inner, chords @ step)).reshape(-1, 2)
 
     return solve

@@ -27,7 +27,7 @@ from warpflat.surface.connectivity import border_of
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.surface.mesh import Surface
 
-__all__ = ["NO_CONTACTS", "Barrier", "ContactPoint", "Contacts", "open_cracks", "relax_with_contact", "swirl"]
+__all__ = ["Barrier", "ContactPoint", "Contacts", "evaluate_with_contact", "open_cracks", "relax_with_contact", "swirl"]
 
 # Two places of the border have the whole gap between them if the way between them along the border is at least this [m],
 _FULL_GAP_WAY = 0.025
@@ -185,9 +185,23 @@ def _closest(v: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, F
 
 @dataclass(frozen=True, kw_only=True)
 class ContactPoint(Point):
-    """A layout (#V by 2 [m]), the energy there with contacts [J], and the contacts."""
+    """A layout (#V by 2 [m]), the energy there with contacts [J], its gradient (#V by 2 [N]), and the contacts."""
 
     touch: Contacts
+
+
+def evaluate_with_contact(state: Relaxation, barrier: Barrier | None, positions: FloatArray) -> ContactPoint:
+    """Evaluate a layout (#V by 2 [m]): the cloth, unless the border crosses itself, its seams, and the barrier."""
+    touch = NO_CONTACTS if barrier is None else barrier(positions)
+    if not np.isfinite(touch.energy):
+        return ContactPoint(positions=positions, energy=np.inf, gradient=np.zeros_like(positions), touch=touch)
+    state.place(positions)
+    energies, force = state.evaluate_potential()
+    energy, gradient = touch.energy + float(energies.sum()), -force
+    if np.isfinite(energy):
+        energy += state.network.seam_energy(state.position)
+    touch.add_gradient(gradient)
+    return ContactPoint(positions=positions, energy=energy, gradient=gradient, touch=touch)
 
 
 class _Problem:
@@ -200,19 +214,7 @@ class _Problem:
 
     def at(self, positions: FloatArray) -> ContactPoint:
         """Evaluate a layout."""
-        touch = self._barrier(positions)
-        energy = touch.energy
-        if np.isfinite(energy):
-            self.state.place(positions)
-            energy += float(self.state.potentials().sum())
-        return ContactPoint(positions=positions, energy=energy, touch=touch)
-
-    def gradient(self, point: ContactPoint) -> FloatArray:
-        """Return the gradient of the energy, #V by 2 [N]."""
-        self.state.place(point.positions)
-        gradient = -self.state.forces()
-        point.touch.add_gradient(gradient)
-        return gradient
+        return evaluate_with_contact(self.state, self._barrier, positions)
 
     def solver(self, point: ContactPoint) -> Solve:
         """Return the solution by the metric at a point."""
@@ -220,7 +222,7 @@ class _Problem:
 
     def residual(self, point: ContactPoint) -> float:
         """Return the largest force on a vertex over the mean force of the springs."""
-        springs, force = self.state.network.spring_arrays, -self.gradient(point)
+        springs, force = self.state.network.spring_arrays, -point.gradient
         a, b = (point.positions[springs.ends[:, k]] for k in range(2))
         tension = springs.stiffness * np.abs(np.linalg.norm(b - a, axis=1) - springs.rest_length)
         weight = np.bincount(springs.ends.ravel(), np.repeat(springs.stiffness, 2), minlength=len(force)).astype(

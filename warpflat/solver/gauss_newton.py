@@ -19,9 +19,9 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 from scipy.sparse import csc_array, csr_array, diags_array, vstack
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.sparse import factor_symmetric
 from warpflat.fabric.fabric import grain_axes
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
@@ -91,8 +91,7 @@ class GaussNewtonSteps:
         stiffness = self.matrix(positions)
         diagonal = stiffness.diagonal()
         stiffness.setdiag(diagonal + _REGULARISATION * diagonal.mean())
-        factor = splu(stiffness, permc_spec="COLAMD", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        return np.asarray(factor.solve(force.ravel()).reshape(-1, 2))
+        return factor_symmetric(stiffness)(force.ravel()).reshape(-1, 2)
 
     def matrix(self, positions: FloatArray) -> csc_array:
         """Return J^T J in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m]."""

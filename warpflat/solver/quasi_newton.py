@@ -63,10 +63,11 @@ def quasi_newton_pays(network: SpringNetwork) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """A layout (#V by 2 [m]) and the energy there [J], infinite where it is not allowed."""
+    """A layout (#V by 2 [m]), the energy there [J], infinite where it is not allowed, and its gradient (#V by 2 [N])."""
 
     positions: FloatArray
     energy: float
+    gradient: FloatArray
 
 
 P = TypeVar("P", bound=Point)
@@ -77,9 +78,6 @@ class Problem(Protocol[P]):
 
     def at(self, positions: FloatArray) -> P:
         """Evaluate a layout."""
-
-    def gradient(self, point: P) -> FloatArray:
-        """Return the gradient of the energy, #V by 2 [N]."""
 
     def solver(self, point: P) -> Solve:
         """Return the solution by the metric at a point."""
@@ -137,6 +135,11 @@ class Metric:
             pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
             for axis in range(2):
                 step[:, axis] -= (rows[axis].T @ pull) @ columns
+            for (upper, lower, _), across in zip(self._chords, self._across, strict=True):
+                # What is left is rounding, which would add up over the steps.
+                half = 0.5 * across * (across @ (step[upper] - step[lower]))
+                step[upper] -= half
+                step[lower] += half
             return step
 
         return solve
@@ -209,11 +212,7 @@ class Descent(Generic[P]):
         """Begin at a point; L-BFGS remembers the last `memory` corrections."""
         self._problem = problem
         self.point, self.history = start, [start.energy]
-        self._gradient, self._memory, self._fraction = (
-            problem.gradient(start),
-            _Memory(start.positions.size, memory),
-            1.0,
-        )
+        self._memory, self._fraction = _Memory(start.positions.size, memory), 1.0
         self.tried, self.release, self.is_stuck = 1, np.inf, False
 
     @property
@@ -247,8 +246,8 @@ class Descent(Generic[P]):
     def step(self) -> bool:
         """Take one step; return False, and stay, where none makes the energy fall."""
         while True:
-            direction = self._memory.direction(self._gradient, self._problem.solver(self.point))
-            descent = dot(self._gradient, direction)
+            direction = self._memory.direction(self.point.gradient, self._problem.solver(self.point))
+            descent = dot(self.point.gradient, direction)
             self.release = -0.5 * descent
             new = self._search(direction, descent)
             if new is not None:
@@ -258,9 +257,8 @@ class Descent(Generic[P]):
                 return False
             self._memory.clear()
             self._fraction = 1.0
-        gradient = self._problem.gradient(new)
-        self._memory.add(new.positions - self.point.positions, gradient - self._gradient)
-        self.point, self._gradient = new, gradient
+        self._memory.add(new.positions - self.point.positions, new.gradient - self.point.gradient)
+        self.point = new
         self.history.append(new.energy)
         return True
 
@@ -269,7 +267,6 @@ class Descent(Generic[P]):
         if forget:
             self._memory.clear()
         self.point = self._problem.at(self.point.positions)
-        self._gradient = self._problem.gradient(self.point)
         self.history[-1] = self.point.energy
         self.is_stuck = False
 
@@ -296,12 +293,8 @@ class _Cloth:
     def at(self, positions: FloatArray) -> Point:
         """Evaluate a layout."""
         self.state.place(positions)
-        return Point(positions=positions, energy=float(self.state.potentials().sum()))
-
-    def gradient(self, point: Point) -> FloatArray:
-        """Return the gradient of the energy, #V by 2 [N]."""
-        self.state.place(point.positions)
-        return -self.state.forces()
+        energies, force = self.state.evaluate_potential()
+        return Point(positions=positions, energy=float(energies.sum()), gradient=-force)
 
     def solver(self, point: Point) -> Solve:
         """Return the solution by the metric, which is the same everywhere."""

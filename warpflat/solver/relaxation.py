@@ -283,12 +283,19 @@ class Relaxation:
             return np.stack([spring, cells, kinetic], axis=1)
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
 
+    def evaluate_potential(self) -> tuple[FloatArray, FloatArray]:
+        """Evaluate the present layout at rest; no step may follow.
+
+        Returns:
+            #P by 2, the energies of `potentials` [J]; #V by 2, the forces of the cloth and its seams [N].
+        """
+        self._buffers.evaluate_potential.launch()
+        energies = np.array(self.piece_sums.element_energies()).T
+        return energies, np.array(self._buffers.on_host(self._buffers.rest_force))
+
     def forces(self) -> FloatArray:
         """Return the forces of the cloth and its seams in the present layout at rest, #V by 2 [N]; no step may follow."""
-        self.velocity.zero_()
-        self._buffers.set_coefficients(IMPLICIT_STEP_AT_REST)
-        self._buffers.evaluate_forces_alone.launch()
-        return self.cloth_force()
+        return self.evaluate_potential()[1]
 
     def cloth_force(self) -> FloatArray:
         """Return the forces of the cloth and its seams, without the load, at the last evaluated state, #V by 2 [N]."""

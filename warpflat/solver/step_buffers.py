@@ -18,9 +18,17 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.launch import Launch, record
 from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import range_offsets
-from warpflat.kernels.cells import ACTING, ALL, FORCES_ALONE, CellForces
+from warpflat.kernels.cells import ACTING, ALL, CellForces
 from warpflat.kernels.constraints import evaluate_seams
-from warpflat.kernels.implicit import BondForces, VertexForces, advance, compute_kinetic_energy, gather_forces, stop
+from warpflat.kernels.implicit import (
+    BondForces,
+    VertexForces,
+    advance,
+    compute_kinetic_energy,
+    gather_forces,
+    gather_potential,
+    stop,
+)
 from warpflat.kernels.line_solve import move_along_lines, solve_lines
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 from warpflat.model.network import SpringNetwork
@@ -47,8 +55,8 @@ class StepBuffers:
         face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has
             them.
         vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_tension: #V, |tension| of the springs to
-            later vertices [N]. Values of vertices share the memory of `power`, those of faces that of `face_stiffness`:
-            each is read as soon as it is written.
+            later vertices [N]. rest_force: #V vec2d, forces at rest, without the load [N]. These share the memory of
+            `power`, `face_stiffness` and `driving_force`: each is read as soon as it is written.
     """
 
     def __init__(self, network: SpringNetwork, time_step: float, start: FloatArray) -> None:
@@ -85,7 +93,7 @@ class StepBuffers:
         self.seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
         self.coefficients = wp.array(np.array([IMPLICIT_STEP]), dtype=wp.vec3d, device=device)
         self.vertex_energy = self.vertex_tension = self.power
-        self.face_energy = self.face_stiffness[:f]
+        self.face_energy, self.rest_force = self.face_stiffness[:f], self.driving_force
         self._views: dict[int, NDArray[Any]] = {}
 
     def on_host(self, array: wp.array) -> NDArray[Any]:
@@ -128,11 +136,12 @@ class StepBuffers:
     def _cells(self, scope: int) -> Launch:
         """Record the forces of the cells in a scope (`kernels.cells`)."""
         net = self.network
-        kernel, _, parameters = net.cell_model
+        model = net.cell_model
+        at = [self.position, self.velocity, net.cells, model.parameters]
         return record(
-            kernel,
+            model.step,
             dim=net.face_count,
-            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, self.coefficients, scope],
+            inputs=[*at, self.time_step, self.coefficients, scope],
             outputs=[self._cell_forces],
             device=net.device,
             turns=_TURNS,
@@ -185,9 +194,26 @@ class StepBuffers:
         return LaunchSequence([self._cells(ALL), *self._seams, self._gather(ALL)])
 
     @cached_property
-    def evaluate_forces_alone(self) -> LaunchSequence:
-        """The forces, after a check of all faces, without what steps need besides."""
-        return LaunchSequence([self._cells(FORCES_ALONE), *self._seams, self._gather(FORCES_ALONE)])
+    def evaluate_potential(self) -> LaunchSequence:
+        """The energies of springs and cells, into `vertex_energy` and `face_energy`, and the forces at rest, into `rest_force`."""
+        net = self.network
+        cells = record(
+            net.cell_model.potential,
+            dim=net.face_count,
+            inputs=[self.position, net.cells, net.cell_model.parameters],
+            outputs=[self.face_energy, self._cell_forces],
+            device=net.device,
+            turns=_TURNS,
+        )
+        gather = record(
+            gather_potential,
+            dim=net.vertex_count,
+            inputs=[self.position, net.springs, net.cells, self._cell_forces, net.bonds, self._bond_forces],
+            outputs=[self.vertex_energy, self.rest_force],
+            device=net.device,
+            turns=_TURNS,
+        )
+        return LaunchSequence([cells, *self._seams, gather])
 
     @cached_property
     def _gather_guarded(self) -> Launch:
@@ -298,11 +324,10 @@ class StepBuffers:
             outputs=[self.vertex_energy],
             device=net.device,
         )
-        _, kernel, parameters = net.cell_model
         cells = record(
-            kernel,
+            net.cell_model.energy,
             dim=net.face_count,
-            inputs=[self.position, net.cells, parameters],
+            inputs=[self.position, net.cells, net.cell_model.parameters],
             outputs=[self.face_energy],
             device=net.device,
         )

@@ -6,21 +6,22 @@ displacement's squared gradient. What resists in a layout is the deformation of 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, csr_array, diags_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse import coo_array, csc_array, csr_array
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.sparse import factor_symmetric
 from warpflat.surface.cells import make_cells
 from warpflat.surface.mesh import Surface, once_per_surface
 
 __all__ = ["Laplacian", "factor_pays", "laplacian_of"]
 
-# The most vertices of a surface that is factored: a factor's entries grow faster than the mesh.
-_MOST_VERTICES = 20_000
+# The most vertices of a surface that is factored. A factor takes 1.8 KB a vertex, and its entries grow faster than the mesh.
+_MOST_VERTICES = 60_000
 # The same for meshes of quads alone: on larger ones multigrid cycles are as fast, and on grids faster.
 _MOST_OF_QUADS = 4_000
 
@@ -38,16 +39,12 @@ class Laplacian:
         gradient: #C by #V, complex: times a layout x + i y it gives the sum over each cell's edges of weight times conj(as on the
             body) times (in the layout). An edge weighs half the cotangent opposite to it, times the share with which its cell counts.
         matrix: #V by #V.
-        factor: of the matrix, with a little added that holds the piece as a whole.
+        solve: returns the solution for right sides of #V or #V by #N; a little is added that holds the piece as a whole.
     """
 
     gradient: csr_array
     matrix: csc_array
-    factor: SuperLU
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return the solution for right sides of #V or #V by #N."""
-        return np.asarray(self.factor.solve(np.ascontiguousarray(right)))
+    solve: Callable[[FloatArray], FloatArray]
 
     def as_rigid_step(self, positions: FloatArray) -> FloatArray:
         """Return a layout (#V by 2 [m]) in which each cell is nearer to a rotated copy of itself.
@@ -79,14 +76,15 @@ def laplacian_of(surface: Surface) -> Laplacian:
     rest = np.stack([np.zeros_like(length), length, x + 1j * y], axis=1)
     cotangent = np.stack([x / y, (length - x) / y, (x * (x - length) + y * y) / (length * y)], axis=1)
     weight, begin, end = 0.5 * cells.weight[:, None] * cotangent, [1, 2, 0], [2, 0, 1]
-    a, b = cells.corner[:, begin].ravel(), cells.corner[:, end].ravel()
-    count, both = len(surface.vertices), np.tile(weight.ravel(), 2)
-    of_edge = coo_array((both, (np.append(a, b), np.append(b, a))), shape=(count, count)).tocsr()
-    matrix = csc_array(diags_array(np.asarray(of_edge.sum(axis=1)).ravel()) - of_edge)
-    held = csc_array(matrix + diags_array(np.full(count, _REGULARISATION * matrix.diagonal().mean())))
-    edge = (weight * (rest[:, end] - rest[:, begin]).conj()).ravel()
-    cell = np.repeat(np.arange(len(weight)), 3)
-    gradient = csr_array((np.append(edge, -edge), (np.append(cell, cell), np.append(b, a))), shape=(len(weight), count))
-    # On meshes with slivers and long rows, columns in this order fill a quarter of what minimum degree on A + A^T fills.
-    factor = splu(held, permc_spec="COLAMD", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return Laplacian(gradient=gradient, matrix=matrix, factor=factor)
+    corner, count = cells.corner, len(surface.vertices)
+    a, b, each = corner[:, begin].ravel(), corner[:, end].ravel(), np.arange(count)
+    diagonal = np.bincount(np.append(a, b), np.tile(weight.ravel(), 2), minlength=count)
+    values = np.concatenate([-weight.ravel(), -weight.ravel(), diagonal])
+    places = np.concatenate([a, b, each]), np.concatenate([b, a, each])
+    matrix = coo_array((values, places), shape=(count, count)).tocsc()
+    held = matrix.copy()
+    held.setdiag(diagonal + _REGULARISATION * diagonal.mean())
+    edge = weight * (rest[:, end] - rest[:, begin]).conj()
+    at_corner, offset = edge[:, begin] - edge[:, end], np.arange(0, 3 * len(corner) + 1, 3)
+    gradient = csr_array((at_corner.ravel(), corner.ravel(), offset), shape=(len(corner), count))
+    return Laplacian(gradient=gradient, matrix=matrix, solve=factor_symmetric(held))

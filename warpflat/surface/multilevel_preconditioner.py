@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.linalg import LinearOperator, splu
+from scipy.sparse.linalg import LinearOperator
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.sparse import factor_symmetric
 
 __all__ = ["multilevel_preconditioner"]
 
@@ -39,14 +40,13 @@ def multilevel_preconditioner(matrix: csr_array, places: FloatArray, edge_length
         inverse.append(1.0 / matrix.diagonal())
         into.append(label)
         cube = cube[first] // 2
-    # Columns in this order fill the least, as with the Laplacian of a surface.
-    factor = splu(matrix.tocsc(), permc_spec="COLAMD", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    solve = factor_symmetric(matrix)
 
     def apply(residual: FloatArray) -> FloatArray:
         residuals: list[FloatArray] = [residual]
         for label, own in zip(into, inverse[1:], strict=True):
             residuals.append(np.bincount(label, residuals[-1], minlength=len(own)).astype(np.float64, copy=False))
-        result: FloatArray = factor.solve(residuals[-1])
+        result: FloatArray = solve(residuals[-1])
         for level in range(len(into) - 1, -1, -1):
             result = result[into[level]]
             result += inverse[level] * residuals[level]

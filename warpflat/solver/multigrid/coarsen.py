@@ -36,12 +36,9 @@ from warpflat.model.springs import spring_geometry
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation
 from warpflat.solver.multigrid.grid_coarsening import (
     CoarsenedGrid,
-    ResamplingKind,
     Transfer,
     can_be_coarsened,
-    coarsen_by_three,
     coarsened_grid,
-    resampled_grid,
 )
 from warpflat.surface.cells import face_creases, make_cells
 from warpflat.surface.grid import rows_and_columns
@@ -57,7 +54,6 @@ __all__ = [
     "inherit_levels",
     "is_coarsest",
     "iterate_coarsenings",
-    "resampled_surface",
 ]
 
 
@@ -92,7 +88,6 @@ class Coarsening:
         transfer: weights that interpolate layouts on the finer mesh, and whose transpose restricts forces.
         face_of: #G, for each of its faces one of the finer ones in or beside it.
         smooth_interpolation: cubic interpolation of layouts on the finer mesh, for quads on a lattice.
-        is_coarsest: whether it is relaxed without a coarser one.
     """
 
     surface: Surface
@@ -100,7 +95,6 @@ class Coarsening:
     transfer: Transfer
     face_of: IntArray
     smooth_interpolation: GridProlongation | LatticeProlongation | None = None
-    is_coarsest: bool = False
 
     @property
     def prolongation(self) -> csr_array:
@@ -162,7 +156,7 @@ def inherit_levels(surface: Surface, other: Surface) -> None:
 
 
 def can_coarsen(surface: Surface) -> bool:
-    """Return whether a surface has a coarser level. For a grid none is made, since a large grid starts without them."""
+    """Return whether a surface has a coarser level. For a grid none is made."""
     if is_coarsest(surface):
         return False
     grid = rows_and_columns(surface)
@@ -185,42 +179,11 @@ def iterate_coarsenings(surface: Surface) -> Iterator[Coarsening]:
         surface = step.surface
 
 
-def resampled_surface(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlongation, IntArray] | None:
-    """Return a small grid that samples a large one, made once for each surface; None for a surface that is no grid.
-
-    Returns:
-        The small grid (see `warpflat.solver.multigrid.grid_coarsening.resampled_grid`), the interpolation of its
-        layouts on the large one, and #G, for each of its faces one of the large grid's in it.
-    """
-    known = _resampled_surfaces(surface)
-    if kind not in known:
-        known[kind] = _resample(surface, kind)
-    return known[kind]
-
-
-@once_per_surface
-def _resampled_surfaces(surface: Surface) -> dict[ResamplingKind, tuple[Surface, GridProlongation, IntArray] | None]:
-    return {}
-
-
-def _resample(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlongation, IntArray] | None:
-    grid = resampled_grid(surface, kind)
-    if grid is None:
-        return None
-    interpolation = grid.make_interpolation(surface)
-    small = _coarse_quads(surface, interpolation.sample(surface.vertices), grid.faces, grid.of_faces)
-    every_third = coarsen_by_three(small) if kind == "thirds" else None
-    if every_third is not None:
-        _inherited[small] = replace(_coarsen_quads(small, every_third), is_coarsest=True)
-    return small, interpolation, grid.face_of
-
-
 @contextmanager
 def hierarchy_in_background(surface: Surface) -> Iterator[None]:
     """Make the coarser meshes of a large surface in another thread; they are ready at the end of the `with` block.
 
-    For triangle meshes this includes all that depends on no layout. Those of a grid, which starts from a resampled
-    grid, are not needed so soon, and do not take long.
+    For triangle meshes this includes all that depends on no layout. Those of a grid do not take long.
     """
     few = thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD
     if few or rows_and_columns(surface) is not None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.launch import launch_each
-from warpflat.kernels.cubic_interpolation import interpolate_along, interpolate_along_rows, sample_grid, weigh_cubics
+from warpflat.kernels.cubic_interpolation import interpolate_along, interpolate_along_rows, weigh_cubics
 from warpflat.surface.grid import Lattice
 from warpflat.surface.vectors import norm, points_at
 
@@ -26,8 +26,6 @@ Number = TypeVar("Number", np.float64, np.complex128)
 
 # Columns along which the distances of rows are measured, and rows for those of columns.
 _LINES = 16
-# Least number of places that are worth a thread of their own: each is a sum of sixteen terms.
-_PLACES = 512
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,16 +98,6 @@ class GridProlongation:
     @cached_property
     def _cubics(self) -> list[CubicInterpolation]:
         return [cubic_interpolation_between(coarse, fine) for coarse, fine in self._places]
-
-    def sample(self, values: FloatArray) -> FloatArray:
-        """Return the values of the coarser grid, #C by #K, from those of the finer one (#V by #K, three or fewer)."""
-        by_rows, by_columns = (cubic_interpolation_between(fine, coarse) for coarse, fine in self._places)
-        sampled = np.empty((len(by_rows.column), len(by_columns.column), values.shape[1]))
-        weights = [by_rows.column, by_rows.weight, by_columns.column, by_columns.weight]
-        given = [np.ascontiguousarray(values), self._grid, *weights]
-        places = len(by_rows.column) * len(by_columns.column)
-        launch_each(sample_grid, places, given, [sampled], least=_PLACES)
-        return sampled.reshape(-1, values.shape[1])
 
     def __call__(self, layout: FloatArray) -> FloatArray:
         """Return the finer layout, #V by 2 [m], of a coarser one (#C by 2)."""

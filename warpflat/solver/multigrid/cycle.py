@@ -11,7 +11,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
 from warpflat.solver.multigrid.level_transfer import LevelTransfer
-from warpflat.solver.multigrid.levels import FORCE_WORK, LEAST_FRACTION, Levels
+from warpflat.solver.multigrid.levels import CHECK_INTERVAL, FORCE_WORK, LEAST_FRACTION, Levels
 
 __all__ = ["accelerated_cycle", "cycle", "solve_coarsest"]
 
@@ -28,22 +28,12 @@ _COARSEST_GAIN_SHARE = 0.07
 # steps. A rectangular grid is at rest as soon without. In cycles this is for lattices only: a coarse level of triangles
 # stores roughly the energy of the fine level, and is not worth following to its end.
 _ACCELERATE_EVERY = 2
-# The least fraction tried of a step to the minimum in the subspace.
-_LEAST_SUBSPACE_FRACTION = 0.2
-# In a brief cycle, a level of at most this many vertices a piece has only rough errors left: this many smoothing steps
-# reduce them as much as a cycle does, in a third of the time.
-_STEPS_INSTEAD, _FEW_VERTICES = 16, 700
-# A brief cycle takes more steps after the correction on the finest level, since the next one has a ninth of its
-# vertices.
-_STEPS_AFTER_BRIEF = 7
 # Nested iteration on triangles leaves mostly rough errors, since each mesh is uneven in its own way: in the first cycle
 # this many steps before and after the correction save another cycle.
 _STEPS_AFTER_ROUGH_START = 12, 8
 
 
-def cycle(
-    levels: Levels, level: int, each_step: Callable[[], None] | None = None, *, brief: bool = False
-) -> FloatArray:
+def cycle(levels: Levels, level: int, each_step: Callable[[], None] | None = None) -> FloatArray:
     """Run one cycle from a level down and up again.
 
     On the finest level the forces must have been evaluated, and their work counted.
@@ -52,34 +42,31 @@ def cycle(
         levels: all levels; those from `level` on are changed.
         level: index of the level, 0 for the finest.
         each_step: called after each step on this level.
-        brief: take smoothing steps alone on the first small level.
 
     Returns:
         #P, the objective at the end [J].
     """
     transfer = levels.all[level].transfer
-    if brief and level and levels.sizes[level] <= _FEW_VERTICES * levels.piece_count:
-        return levels.smooth(level, steps=_STEPS_INSTEAD)
     if transfer is None:
         return solve_coarsest(levels, _COARSEST_FORCE_SHARE, _COARSEST_GAIN_SHARE)
-    pre_steps, post_steps = _smoothing_steps(levels, level, brief=brief)
+    pre_steps, post_steps = _smoothing_steps(levels, level)
 
     before = levels.smooth(level, each_step, evaluated=level == 0, steps=pre_steps)
     _evaluate_residual(levels, level)
     if not _restrict(levels, level, transfer):
         return levels.smooth(level, each_step)
-    cycle(levels, level + 1, brief=brief)
+    cycle(levels, level + 1)
     _correct(levels, level, transfer)
     energy = levels.smooth(level, each_step, evaluated=True, steps=post_steps)
     return levels.backtrack(level, transfer.base, transfer.correction, before, energy)
 
 
-def _smoothing_steps(levels: Levels, level: int, *, brief: bool) -> tuple[int | None, int | None]:
+def _smoothing_steps(levels: Levels, level: int) -> tuple[int | None, int | None]:
     """Return the steps before and after the correction; None for the level's own number."""
     if level == 0 and levels.starts_rough:
         levels.starts_rough = False
         return _STEPS_AFTER_ROUGH_START
-    return None, _STEPS_AFTER_BRIEF if brief and level == 0 else None
+    return None, None
 
 
 def _evaluate_residual(levels: Levels, level: int) -> None:
@@ -151,13 +138,13 @@ def solve_coarsest(levels: Levels, force_share: float, gain_share: float = 0.0) 
     if accelerated:
         levels.begin_acceleration(last, accelerations, sums.loaded_iterate())
     for run in range(1, 1 + _most_coarsest_runs(state.network.pieces)):
-        state.sweep(steps, check_interval=levels.check_interval)
+        state.sweep(steps, check_interval=CHECK_INTERVAL)
         levels.count_work(last, steps)
         now = levels.step_along_lines(last) if level.has_lines else levels.objective(last)
         if accelerated and run % _ACCELERATE_EVERY == 0 and np.isfinite(now).all():
             state.evaluate_at_rest()
             levels.add_iterate(last, accelerations, sums.loaded_iterate())
-            now = levels.minimise_in_subspace(last, accelerations, now, least_fraction=_LEAST_SUBSPACE_FRACTION)
+            now = levels.minimise_in_subspace(last, accelerations, now)
             state.evaluate_at_rest()
             levels.begin_acceleration(last, accelerations, sums.loaded_iterate())
         with np.errstate(invalid="ignore"):  # infinite, with mirrored cells
@@ -192,4 +179,4 @@ def accelerated_cycle(
     if levels.is_lattice or any(each.past for each in accelerations):
         levels.evaluate_forces(0)
         levels.add_iterate(0, accelerations, sums.iterate())
-        levels.minimise_in_subspace(0, accelerations, energy, least_fraction=_LEAST_SUBSPACE_FRACTION)
+        levels.minimise_in_subspace(0, accelerations, energy)

@@ -4,16 +4,13 @@ A rectangular grid keeps every second row and column (all rows where these lie m
 other lattice also keeps those in which its border turns, at corners and at the tips of cracks; then between two kept
 rows and two kept columns there is cloth everywhere or nowhere. Surfaces that differ only in the places of their
 vertices, such as the sizes of a pattern, share these results.
-
-A large rectangular grid starts from a relaxed small one that samples it evenly, with rows and columns between its own.
-The size of the small grid does not depend on the number of the large one's rows and columns, and its spacing is even.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -29,26 +26,14 @@ from warpflat.surface.unfold import corners_of
 
 __all__ = [
     "CoarsenedGrid",
-    "ResampledGrid",
-    "ResamplingKind",
     "Transfer",
     "can_be_coarsened",
-    "coarsen_by_three",
     "coarsened_grid",
-    "resampled_grid",
 ]
 
 
-ResamplingKind = Literal["thirds", "halves", "fine"]
-"""The kind of a small grid that samples a large one.
-
-"thirds" is for stiff cloth, whose next level has every third row and column; "halves" for other cloth, whose next
-level has every second one; "fine" for cloth so soft that it is relaxed along lines.
-"""
-
-# A grid of fewer rows or columns has no coarser one, or none with every third of them.
+# A grid of fewer rows or columns has no coarser one.
 _LEAST_LINES = 5
-_LEAST_THIRDS = 13
 # Quads left across a strip between two lines in which the border turns: a single one bends several times as stiffly as
 # its cloth.
 _LEAST_QUADS = 2
@@ -56,11 +41,6 @@ _LEAST_QUADS = 2
 _MOST_ASPECT = 2.5
 # A level of a lattice with more than this share of the finer one's vertices is not worth having.
 _MOST_LEFT = 0.7
-# Quads along a side of a resampled square grid, and the number of which they are a multiple. With these sizes cubic
-# interpolation leaves less than .1 % of the energy. Multiples of eight can be halved three times; a third of a multiple
-# of six can be halved.
-_SIDES: dict[ResamplingKind, int] = {"thirds": 48, "halves": 48, "fine": 56}
-_MULTIPLES: dict[ResamplingKind, int] = {"thirds": 6, "halves": 8, "fine": 8}
 
 
 class Transfer:
@@ -109,78 +89,6 @@ class CoarsenedGrid:
     of_faces: dict[str, Any]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ResampledGrid:
-    """A small grid that samples a large one evenly.
-
-    Attributes:
-        of_faces: results that depend on its faces alone (`warpflat.surface.mesh.once_per_faces`).
-        face_of: #G, for each of its faces one of the large grid's in it.
-        make_interpolation: returns the cubic interpolation of layouts on a surface with the large grid's faces, which
-            also samples such layouts.
-    """
-
-    of_faces: dict[str, Any]
-    face_of: IntArray
-    make_interpolation: Callable[[Surface], GridProlongation]
-
-    @property
-    def faces(self) -> IntArray:
-        """Its faces, #G by 4; vertices are numbered row by row."""
-        faces: IntArray = self.of_faces["faces"]
-        return faces
-
-
-def resampled_grid(surface: Surface, kind: ResamplingKind) -> ResampledGrid | None:
-    """Return the small grid for a large one; None for any other surface, and with too few rows or columns."""
-    known = _resampled_grids(surface)
-    if kind not in known:
-        known[kind] = _resample(surface, kind)
-    return known[kind]
-
-
-@once_per_faces
-def _resampled_grids(surface: Surface) -> dict[ResamplingKind, ResampledGrid | None]:
-    return {}
-
-
-def _resample(surface: Surface, kind: ResamplingKind) -> ResampledGrid | None:
-    grid = rows_and_columns(surface)
-    if grid is None or not can_be_coarsened(grid):
-        return None
-    quads = _quad_counts(grid.shape, _SIDES[kind], _MULTIPLES[kind])
-    lines = tuple(np.linspace(0.0, count - 1.0, n + 1) for count, n in zip(grid.shape, quads, strict=True))
-    middle = [(0.5 * (at[:-1] + at[1:])).astype(np.int32) for at in lines]
-    return ResampledGrid(
-        of_faces=_grid_faces_known(*map(len, lines)),
-        face_of=_any_face(surface, grid[np.ix_(*middle)].ravel()),
-        make_interpolation=lambda surface: GridProlongation(grid, _line_places(surface), lines),
-    )
-
-
-def _quad_counts(shape: tuple[int, ...], side: int, multiple: int) -> list[int]:
-    """Return how many quads a resampled grid has along each direction, with about the proportions of the large grid.
-
-    Args:
-        shape: rows and columns of the large grid.
-        side: quads along a square grid.
-        multiple: the counts are multiples of this number, unless the large grid has fewer quads.
-    """
-    quads = [count - 1 for count in shape]
-    short, long = np.argsort(quads).tolist()
-    share = side / float(np.sqrt(np.prod(quads, dtype=float)))
-    result = [0, 0]
-    result[short] = min(quads[short], max(round(quads[short] * share / multiple), 1) * multiple)
-    result[long] = min(quads[long], max(round(side**2 / result[short] / multiple), 1) * multiple)
-    return result
-
-
-@lru_cache(maxsize=16)
-def _grid_faces_known(rows: int, columns: int) -> dict[str, Any]:
-    """Return what is known of the faces of a resampled grid; pieces of about the same proportions share it."""
-    return face_results(_faces_of(rows, columns))
-
-
 def _faces_of(rows: int, columns: int) -> IntArray:
     """Return the faces of a grid whose vertices are numbered row by row, #F by 4."""
     number = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
@@ -207,14 +115,6 @@ def coarsened_grid(surface: Surface) -> CoarsenedGrid | None:
     if wide == "rows":
         return _coarsened_columns(surface)
     return _coarsened_rows(surface) if wide == "columns" else _coarsened_rows_and_columns(surface)
-
-
-def coarsen_by_three(surface: Surface) -> CoarsenedGrid | None:
-    """Return a grid with every third row and column; None if the last ones would be missing, or if quads are long."""
-    grid = rows_and_columns(surface)
-    if grid is None or any(count < _LEAST_THIRDS or count % 3 != 1 for count in grid.shape) or _wider_lines(surface):
-        return None
-    return _coarsened_by_three(surface)
 
 
 def _wider_lines(surface: Surface) -> Literal["rows", "columns", ""]:
@@ -254,11 +154,6 @@ def _coarsened_rows(surface: Surface) -> CoarsenedGrid:
     return _keep_lines(surface, rows=_second, columns=_every)
 
 
-@once_per_faces
-def _coarsened_by_three(surface: Surface) -> CoarsenedGrid:
-    return _keep_lines(surface, rows=_third, columns=_third)
-
-
 def _keep_lines(
     surface: Surface, *, rows: Callable[[int], IntArray], columns: Callable[[int], IntArray]
 ) -> CoarsenedGrid:
@@ -295,10 +190,6 @@ def _bilinear(grid: IntArray, keep: tuple[IntArray, ...]) -> csr_array:
 
 def _every(count: int) -> IntArray:
     return np.arange(count, dtype=np.int32)
-
-
-def _third(count: int) -> IntArray:
-    return np.arange(0, count, 3, dtype=np.int32)
 
 
 def _second(count: int) -> IntArray:

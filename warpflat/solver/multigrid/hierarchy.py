@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,8 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.multigrid.coarsen import Coarsening, coarsen, is_coarsest, iterate_coarsenings, resampled_surface
-from warpflat.solver.multigrid.grid_coarsening import ResamplingKind, Transfer
+from warpflat.solver.multigrid.coarsen import Coarsening, coarsen, is_coarsest, iterate_coarsenings
+from warpflat.solver.multigrid.grid_coarsening import Transfer
 from warpflat.surface.cells import make_cells
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges_of
@@ -23,11 +23,9 @@ from warpflat.surface.mesh import Surface, drop_result, is_large
 from warpflat.surface.untangle import untangle
 
 __all__ = [
-    "CascadeStart",
     "CoarseLevel",
     "drop_caches",
     "identity_coarsening",
-    "make_cascade_start",
     "make_coarse_levels",
 ]
 
@@ -79,24 +77,19 @@ def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, 
     network.replace_stiffness(stiffness)
 
 
-def make_coarse_levels(
-    network: SpringNetwork, layout: FloatArray, *, repair: bool, known: Mapping[Surface, CoarseLevel] | None = None
-) -> list[CoarseLevel]:
+def make_coarse_levels(network: SpringNetwork, layout: FloatArray, *, repair: bool) -> list[CoarseLevel]:
     """Make all coarser levels of a piece, the finest first.
 
     Args:
         network: of the piece.
         layout: #V by 2, its layout [m].
         repair: turn back cells of coarser levels that are mirrored there.
-        known: levels that exist already, by their surfaces.
     """
     coarse_levels: list[CoarseLevel] = []
     # First the surface's own coarsenings, down to one that is mirrored in this layout; from there on some that are not.
     ready: Iterator[Coarsening] = iterate_coarsenings(network.surface)
-    while not (_is_lowest(network) or (coarse_levels and coarse_levels[-1].coarsening.is_coarsest)):
-        coarsening = next(ready, None)
-        level = known.get(coarsening.surface) if known and coarsening is not None else None
-        level = level or _make_level(network, layout, coarsening, repair=repair)
+    while not _is_lowest(network):
+        level = _make_level(network, layout, next(ready, None), repair=repair)
         if level is None:
             ready = iter(())
             level = _make_level(network, layout, coarsen(network.surface, layout))
@@ -129,61 +122,6 @@ def _is_lowest(network: SpringNetwork) -> bool:
     """
     few = network.vertex_count <= _LOWEST_GRID and network.model == "springs" and not network.uses_line_relaxation
     return (few and rows_and_columns(network.surface) is not None) or is_coarsest(network.surface)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CascadeStart:
-    """The small lattice from which a large one starts.
-
-    Attributes:
-        network: of the small lattice.
-        layout: its layout [m].
-        interpolations: from its layout to that of the large lattice, in order.
-        coarse_level: the small lattice as a level of the large one, if it is one.
-    """
-
-    network: SpringNetwork
-    layout: FloatArray
-    interpolations: Sequence[Callable[[FloatArray], FloatArray]]
-    coarse_level: CoarseLevel | None = None
-
-
-def make_cascade_start(network: SpringNetwork, layout: FloatArray, max_vertices: int) -> CascadeStart | None:
-    """Make the small lattice from which a large one starts.
-
-    For a rectangular grid it is a resampled grid, for any other lattice the largest coarser level of at most
-    `max_vertices` vertices.
-
-    Returns:
-        None if there is no such lattice, or if its layout would be mirrored.
-    """
-    resampled = resampled_surface(network.surface, _resampling_kind(network))
-    if resampled is not None:
-        surface, interpolate, face_of = resampled
-        found = _make_network(network, surface, interpolate.sample(layout), face_of, repair=True)
-        return None if found is None else CascadeStart(network=found[0], layout=found[1], interpolations=[interpolate])
-    steps: list[Coarsening] = []
-    kept = np.arange(network.vertex_count, dtype=np.int32)
-    face_of = np.arange(len(network.surface.faces), dtype=np.int32)
-    for step in iterate_coarsenings(network.surface):
-        if step.smooth_interpolation is None or len(kept) <= max_vertices:
-            break
-        kept, face_of = kept[step.kept], face_of[step.face_of]
-        steps.append(step)
-    if not steps:
-        return None
-    found = _make_network(network, steps[-1].surface, layout[kept], face_of, repair=True)
-    if found is None:
-        return None
-    level = CoarseLevel(coarsening=steps[-1], network=found[0], layout=found[1])
-    interpolations = [step.smooth_interpolation for step in reversed(steps) if step.smooth_interpolation is not None]
-    return CascadeStart(network=level.network, layout=level.layout, interpolations=interpolations, coarse_level=level)
-
-
-def _resampling_kind(network: SpringNetwork) -> ResamplingKind:
-    if network.uses_line_relaxation:
-        return "fine"
-    return "thirds" if network.is_stiff else "halves"
 
 
 def _make_level(

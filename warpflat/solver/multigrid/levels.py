@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -14,7 +13,6 @@ import warp as wp
 
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.model.join import join_networks
-from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Iterate
 from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation
@@ -22,23 +20,17 @@ from warpflat.solver.multigrid.hierarchy import CoarseLevel, drop_caches, identi
 from warpflat.solver.multigrid.level_transfer import LevelTransfer, make_level_transfer, set_displacement
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relaxation import Relaxation
-from warpflat.surface.mesh import Surface
 
-__all__ = ["ENERGY_WORK", "FORCE_WORK", "Level", "Levels"]
+__all__ = ["CHECK_INTERVAL", "ENERGY_WORK", "FORCE_WORK", "Level", "Levels"]
 
 
-# Smoothing steps before and after a correction. Few on the finest level, where a step takes as long as one on every
-# coarser level, unless its start was interpolated linearly, which leaves kinks to be smoothed first. In soft cloth,
-# from this K/G on, one more, and of the paper's: the guard acts there, and a step in its direction may go further than
-# a Chebyshev step can bear.
-_STEPS = 3
-_STEPS_SMOOTH_START = 2
-_STEPS_SOFT = 4
+# Smoothing steps before and after a correction on the finest level, and on coarser ones, where they cost little; fewer where a line
+# relaxation step follows.
+_STEPS, _STEPS_COARSE, _STEPS_BEFORE_LINES = 3, 4, 2
+# From this K/G on they are the paper's: the guard acts there, and a step in its direction may go further than a Chebyshev step can bear.
 _SOFT = 12.0
-# Steps between two checks of all cells, and a bound on sqrt(K/G) times them: the guard of a soft cloth begins so early
-# that between two checks cells would go far beyond its onset, and raise the energy.
-_CHECK_INTERVAL = 4
-_CHECK_INTERVAL_SOFT = 20.0
+# Steps between two checks of all cells.
+CHECK_INTERVAL = 4
 # The least fraction of a displacement that a line search tries.
 LEAST_FRACTION = 0.05
 # Work of evaluating the forces, of a line relaxation step and of evaluating the energy, in steps.
@@ -72,24 +64,21 @@ class Levels:
         is_lattice, is_grid: whether every piece lies on a lattice of quads; on a rectangular grid.
         is_soft: whether the cloth is soft in shear.
         accelerations: of each piece, while a cycle on the finest level is accelerated.
-        cascade_levels: levels of larger surfaces that lead to the finest of these, by their surfaces.
         starts_rough: whether the next cycle on the finest level starts from a rough layout.
         is_outdated: a coarse level had mirrored cells at the finer level's layout; make the levels anew there.
     """
 
-    def __init__(self, finest: Relaxation, *, repair: bool = False, known: Levels | None = None) -> None:
+    def __init__(self, finest: Relaxation, *, repair: bool = False) -> None:
         """Make the levels of a relaxation at its present layout, which must mirror no face.
 
         Args:
             finest: the pieces themselves.
             repair: turn back cells of coarser levels that are mirrored at this layout, as at the start of a nested
                 iteration, which leaves the layout; otherwise make levels without mirrored cells.
-            known: levels that exist already; what they hold may become part of these.
         """
         layout, pieces = finest.positions(), finest.network.pieces
-        known_levels = {} if known is None else known.coarse_levels
         hierarchies = [
-            make_coarse_levels(net, layout[own], repair=repair, known=known_levels)
+            make_coarse_levels(net, layout[own], repair=repair)
             for net, own in zip(pieces, finest.vertex_ranges, strict=True)
         ]
         for coarse_levels, net in zip(hierarchies, pieces, strict=True):
@@ -102,34 +91,21 @@ class Levels:
             while len(coarse_levels) < depth:
                 same = identity_coarsening(lowest.surface)
                 coarse_levels.append(CoarseLevel(coarsening=same, network=lowest, layout=where))
-        self._join(finest, hierarchies, [] if known is None else known.all, repair=repair)
+        self._join(finest, hierarchies)
 
-    def _join(
-        self,
-        finest: Relaxation,
-        hierarchies: Sequence[Sequence[CoarseLevel]],
-        known: Sequence[Level] = (),
-        *,
-        repair: bool,
-    ) -> None:
+    def _join(self, finest: Relaxation, hierarchies: Sequence[Sequence[CoarseLevel]]) -> None:
         """Join the pieces' hierarchies level by level, and record the transfers between the levels."""
-        self._hierarchies, self._repair = hierarchies, repair
+        self._hierarchies = hierarchies
         kinds = [coarse_levels[0].coarsening.smooth_interpolation for coarse_levels in hierarchies if coarse_levels]
         self.is_lattice = None not in kinds
         self.is_grid = all(isinstance(kind, GridProlongation) for kind in kinds)
         self.is_soft = finest.network.fabric.softness >= _SOFT
         self.accelerations: Sequence[SubspaceAcceleration] = ()
-        self.cascade_levels: dict[Surface, CoarseLevel] = {}
         self.starts_rough = False
         self.is_outdated = False
-        self.check_interval = _check_interval(finest.network)
-        steps = _STEPS_SOFT if self.is_soft else _STEPS
-        self.all = [Level(finest, steps=_STEPS_SMOOTH_START if self.is_lattice or not repair else steps)]
-        ready = {_identity(level.state.network.pieces): level for level in known}
+        self.all = [Level(finest, steps=_STEPS)]
         for coarse_levels in zip(*hierarchies, strict=True):
-            coarse = ready.get(_identity([each.network for each in coarse_levels]))
-            coarse = coarse or Level(_join_states(coarse_levels, finest.options), steps=steps)
-            coarse.steps = steps
+            coarse = Level(_join_states(coarse_levels, finest.options), steps=_STEPS_COARSE)
             fine = self.all[-1]
             if fine.transfer is None:
                 coarsenings = [each.coarsening for each in coarse_levels]
@@ -143,16 +119,9 @@ class Levels:
     def extract(self, finest: Relaxation, pieces: Sequence[int]) -> Levels:
         """Return the levels of some of the pieces, of which `finest` is the relaxation."""
         part = Levels.__new__(Levels)
-        part._join(finest, [self._hierarchies[piece] for piece in pieces], repair=self._repair)
+        part._join(finest, [self._hierarchies[piece] for piece in pieces])
         part.is_outdated = self.is_outdated
         return part
-
-    @property
-    def coarse_levels(self) -> dict[Surface, CoarseLevel]:
-        """The coarser levels of all pieces by their surfaces, cascade levels included."""
-        return self.cascade_levels | {
-            each.coarsening.surface: each for coarse_levels in self._hierarchies for each in coarse_levels
-        }
 
     @property
     def piece_count(self) -> int:
@@ -210,7 +179,7 @@ class Levels:
         state, steps = self.all[level].state, self.all[level].steps if steps is None else steps
         state.velocity.zero_()
         take_steps = state.sweep if self.is_soft else state.smooth
-        take_steps(steps, each_step, check_interval=self.check_interval, evaluated=evaluated)
+        take_steps(steps, each_step, check_interval=CHECK_INTERVAL, evaluated=evaluated)
         self.count_work(level, steps)
         if not self.all[level].has_lines:
             return self.objective(level)
@@ -257,7 +226,6 @@ class Levels:
         pieces: BoolArray,
         *,
         first_fraction: float = 1.0,
-        least_fraction: float = LEAST_FRACTION,
     ) -> FloatArray:
         """Move pieces by a fraction of a displacement, halved until their objective is not above that before.
 
@@ -268,7 +236,7 @@ class Levels:
             base, displacement: #V vec2d [m].
             before: #P, the objective at `base` [J].
             pieces: #P, which ones to move.
-            first_fraction, least_fraction: the first and the least fraction to try.
+            first_fraction: the first fraction to try.
 
         Returns:
             #P, the objective afterwards [J]; that before for all other pieces.
@@ -282,7 +250,7 @@ class Levels:
             now = self.objective(level)
             energy = np.where(pieces & (now <= before), now, energy)
             pieces = pieces & ~(now <= before)
-            fraction = 0.5 * fraction if fraction > least_fraction else 0.0
+            fraction = 0.5 * fraction if fraction > LEAST_FRACTION else 0.0
         return energy
 
     # --- acceleration on one level
@@ -302,8 +270,6 @@ class Levels:
         level: int,
         accelerations: Sequence[SubspaceAcceleration],
         energy: FloatArray,
-        *,
-        least_fraction: float,
     ) -> FloatArray:
         """Move each piece to the minimum in its subspace, as far as its objective is lower there.
 
@@ -311,7 +277,6 @@ class Levels:
             level: index of the level.
             accelerations: of each piece.
             energy: #P, the present objective [J].
-            least_fraction: the least fraction of the way to try.
 
         Returns:
             #P, the objective afterwards [J].
@@ -324,12 +289,7 @@ class Levels:
         # The cycle is over, and its own buffer is free.
         base = wp.empty_like(state.position) if transfer is None else transfer.base
         wp.copy(base, state.position)
-        return self.line_search(level, base, state.scratch, energy, found, least_fraction=least_fraction)
-
-
-def _identity(networks: Sequence[SpringNetwork]) -> tuple[int, ...]:
-    """Return a key of these very networks."""
-    return tuple(map(id, networks))
+        return self.line_search(level, base, state.scratch, energy, found)
 
 
 def _join_states(coarse_levels: Sequence[CoarseLevel], options: RelaxOptions) -> Relaxation:
@@ -340,12 +300,8 @@ def _join_states(coarse_levels: Sequence[CoarseLevel], options: RelaxOptions) ->
 
 
 def _use_lines(level: Level) -> None:
-    """End smoothing with line relaxation where a piece has lines; with two steps less before if every piece has."""
+    """End smoothing with line relaxation where a piece has lines; with fewer steps before if every piece has."""
     network = level.state.network
     level.has_lines = network.line_arrays is not None
     if all(piece.line_arrays is not None for piece in network.pieces):
-        level.steps = _STEPS_SMOOTH_START
-
-
-def _check_interval(network: SpringNetwork) -> int:
-    return int(min(max(_CHECK_INTERVAL_SOFT / math.sqrt(network.fabric.softness), 1.0), _CHECK_INTERVAL))
+        level.steps = _STEPS_BEFORE_LINES

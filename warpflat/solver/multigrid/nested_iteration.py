@@ -11,18 +11,16 @@ import math
 
 import numpy as np
 
-from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
-from warpflat.solver.multigrid.cycle import accelerated_cycle, cycle, solve_coarsest
+from warpflat.solver.multigrid.cycle import cycle, solve_coarsest
 from warpflat.solver.multigrid.levels import Levels
 from warpflat.solver.quasi_newton import relax_quasi_newton
 from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.untangle import untangle
 
-__all__ = ["nested_iteration", "relax_cascade_start"]
+__all__ = ["nested_iteration"]
 
 # The share of the first forces to which those of the coarsest level fall.
 _COARSEST_FORCE_SHARE = 5e-3
-_CYCLES_ALONG_LINES = 2
 # A level of triangles of at most this many vertices is relaxed by L-BFGS, in less time than a cycle of 100,000 vertices takes.
 _MOST_FACTORED = 5_000
 
@@ -41,7 +39,7 @@ def nested_iteration(levels: Levels) -> None:
         assert level.transfer is not None
         sizes = [net.vertex_count for net in level.state.network.pieces]
         if number and any(n > len(step.kept) for n, step in zip(sizes, level.transfer.coarsenings, strict=True)):
-            cycle(levels, number, brief=_starts_smoothly(levels))
+            cycle(levels, number)
     levels.starts_rough = not (levels.is_lattice or levels.is_soft)
 
 
@@ -68,27 +66,6 @@ def _relax_factored(levels: Levels) -> int | None:
         part.copy_into(state)
         levels.count_work(number, outcome.work_units * part.network.vertex_count / state.network.vertex_count)
     return number
-
-
-def relax_cascade_start(levels: Levels) -> None:
-    """Run nested iteration and a cycle on the finest level; two accelerated ones where the smoother uses lines.
-
-    In a cloth so soft more is left after nested iteration, and cycles reduce it further.
-    """
-    nested_iteration(levels)
-    accelerations = [SubspaceAcceleration() for _ in range(levels.piece_count)]
-    if not levels.all[0].has_lines:
-        levels.evaluate_forces(0)
-        cycle(levels, 0, brief=_starts_smoothly(levels))
-        return
-    for _ in range(_CYCLES_ALONG_LINES):
-        levels.evaluate_forces(0)
-        accelerated_cycle(levels, accelerations)
-
-
-def _starts_smoothly(levels: Levels) -> bool:
-    """Return whether each level starts so near to rest that only rough errors are left."""
-    return levels.is_grid and levels.all[0].state.network.is_stiff
 
 
 def _start_from_coarser(levels: Levels, number: int) -> None:

@@ -40,7 +40,6 @@ from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
-from warpflat.solver.multigrid.cascade import start_from_cascade
 from warpflat.solver.multigrid.cycle import accelerated_cycle
 from warpflat.solver.multigrid.levels import ENERGY_WORK, FORCE_WORK, Levels
 from warpflat.solver.multigrid.nested_iteration import nested_iteration
@@ -181,20 +180,13 @@ def relax_multilevel(
     if not state.has_status:
         state.hold_grain()
         state.check_start()
-    cascade = start_from_cascade(state) if nested and levels is None else None
-    from_cascade = cascade is not None
-    if not from_cascade:
-        state.hold_grain()
-    elif each_step is not None:
-        each_step(state, state.status.total, state.status.worst_residual)
-    levels = Levels(state, repair=nested, known=cascade) if levels is None else levels
-    # What the cascade does not share with the levels is no longer needed.
-    del cascade
+    state.hold_grain()
+    levels = Levels(state, repair=nested) if levels is None else levels
     if len(levels.sizes) == 1:
         outcome = relax(state, watch=watch, each_step=each_step)
         return replace(outcome, notes=(f"relaxed by plain steps alone: {_NO_LEVEL}",))
     pieces = _CycledPieces(state=state, levels=levels, progress=_progress_of(state.network.pieces))
-    if nested and not from_cascade:
+    if nested:
         nested_iteration(levels)
         state.hold_grain()
         state.check_start()
