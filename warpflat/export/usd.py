@@ -272,24 +272,31 @@ class FrameWriter:
         self._save_every_few_frames(len(flat))
         return self._count(piece, measures or {}, time)
 
-    def write_between(self, name: str, measures: Mapping[str, Measure]) -> int:
+    def write_between(self, name: str, positions: ArrayLike | None, measures: Mapping[str, Measure]) -> int:
         """Append a frame that lies evenly between the layouts before and after it; return its number.
 
-        Only its measures are stored. USD interpolates points, energies and colours linearly, so readers see all frames.
+        USD interpolates energies, colours and lines linearly, and points that are not stored, so readers see all frames.
 
         Args:
             name: as given to :meth:`add_piece`.
+            positions: #P by 2, the pattern [m]; None to store no points.
             measures: as of :meth:`write`.
 
         Raises:
-            ValueError: the piece has no layout yet.
+            ValueError: the piece has no layout yet, or another number of vertices.
         """
         from pxr import Usd
 
         piece = self._pieces[name]
         if piece.frames == 0:
             raise ValueError(f"the first frame of piece {name!r} needs a layout")
-        return self._count(piece, measures, Usd.TimeCode(FIRST_FRAME + piece.frames))
+        time = Usd.TimeCode(FIRST_FRAME + piece.frames)
+        if positions is not None:
+            flat = np.asarray(positions, dtype=np.float32)
+            if len(flat) != len(piece.to_surface):
+                raise ValueError(f"piece {name!r}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
+            piece.on_pattern.write(time, np.pad(flat, ((0, 0), (0, 1))))
+        return self._count(piece, measures, time)
 
     def _count(self, piece: FramePiece, measures: Mapping[str, Measure], time: Any) -> int:
         """Author a frame's measures, count it and return its number."""

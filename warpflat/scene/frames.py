@@ -40,6 +40,9 @@ _LATER, _LINE = 15 / 60, 6 / 60
 _PARTS = 20 / 60
 # So many vertices of computed layouts a stage keeps at most: they fill some 200 MB. Frames between them take no room.
 _MOST_VERTICES = 6_000_000
+# Points of frames between computed layouts are stored, for readers that look at stored samples only, where a film of one stage has at most
+# so many of them: some 10 MB. In larger films USD interpolates them.
+_MOST_STORED = 1_000_000
 # A layout is kept if it lies at least this share of the stage's way from the one kept before.
 _KEPT = 0.05
 # Measures that are whole numbers.
@@ -68,6 +71,8 @@ class Film:
         self._most = max(_MOST_VERTICES // max(sum(len(surface.vertices) for surface in surfaces), 1), 3)
         self.wanted = FrameSchedule(output).wanted
         self._surfaces = {surface.name: surface for surface in surfaces}
+        vertices = sum(len(surface.vertices) for surface in surfaces)
+        self._all_stored = vertices * max(output.frames, 1) <= _MOST_STORED
         self.recorders = {
             name: FrameRecorder(None, surface, self._schedule) for name, surface in self._surfaces.items()
         }
@@ -155,10 +160,11 @@ class Film:
 
     def _frames(self, stage: FilmStage, keys: Sequence[Key], count: int) -> Iterator[Frame]:
         if self._output.frame_every is None:
-            return self._keys.frames(stage, keys, count)
+            return self._keys.frames(stage, keys, count, between=self._all_stored)
         # Steps are shown as they are; whoever is at rest earlier waits.
         return chain.from_iterable(
-            self._keys.frames(stage, [key], 1 if key is not keys[-1] else count - len(keys) + 1) for key in keys
+            self._keys.frames(stage, [key], 1 if key is not keys[-1] else count - len(keys) + 1, between=False)
+            for key in keys
         )
 
     def _write_frame(
@@ -167,11 +173,11 @@ class Film:
         measures = {
             "stage": stage.name,
             "stage_number": number,
-            "interpolated": frame.positions is None,
+            "interpolated": frame.face_energy_density is None,
             **_counts_whole(frame.measures),
         }
         if frame.positions is None or frame.face_energy_density is None:
-            writer.write_between(name, measures)
+            writer.write_between(name, frame.positions, measures)
             return
         writer.write(
             name,

@@ -49,8 +49,8 @@ class Frame:
 
     Attributes:
         measures: numbers of this layout.
-        positions: #P by 2, the layout [m]; None where it lies evenly between the computed ones before and after.
-        face_energy_density: #F, strain energy per area [J/m2]; None there, too.
+        positions: #P by 2, the layout [m]; None of one in between that is not asked for.
+        face_energy_density: #F, strain energy per area [J/m2]; None of a layout evenly between the computed ones before and after.
     """
 
     measures: Mapping[str, float]
@@ -177,17 +177,26 @@ class KeyFile:
                 return keys, max(wanted, at_least)
             spacing *= 1.5
 
-    def frames(self, stage: FilmStage, keys: Sequence[Key], number: int) -> Iterator[Frame]:
+    def frames(self, stage: FilmStage, keys: Sequence[Key], number: int, *, between: bool) -> Iterator[Frame]:
         """Yield `number` frames along the path through these keys, each of which is one of the frames.
 
-        Those between two keys have no layout of their own: the way from one to the next is straight and even.
+        Those between two keys have no energies of their own: the way from one to the next is straight and even. Their layouts are there
+        if `between` asks for them.
         """
         distances = [_largest_move(self.positions(stage, a), self.positions(stage, b)) for a, b in pairwise(keys)]
         yield self._computed(stage, keys[0])
         counts = spread(distances, number - 1)
         for (begin, end), count in zip(pairwise(keys), counts, strict=True):
             for step in range(1, count):
-                yield _between(begin, end, step / count)
+                share = step / count
+                measures = {
+                    key: (1.0 - share) * value + share * end.measures[key]
+                    for key, value in begin.measures.items()
+                    if key in end.measures
+                }
+                first, last = (self.positions(stage, key) if between else None for key in (begin, end))
+                layout = None if first is None or last is None else first + np.float32(share) * (last - first)
+                yield Frame(positions=layout, measures=measures)
             yield self._computed(stage, end)
         for _ in range(number - 1 - sum(counts)):
             yield self._computed(stage, keys[-1])
@@ -212,17 +221,6 @@ def spread(distances: Sequence[float], number: int) -> list[int]:
         counts[index] += 1
         heapq.heapreplace(queue, (-distances[index] / counts[index], index))
     return counts
-
-
-def _between(first: Key, last: Key, share: float) -> Frame:
-    """Return the frame at this share of the way between two computed ones."""
-    return Frame(
-        measures={
-            key: (1.0 - share) * value + share * last.measures[key]
-            for key, value in first.measures.items()
-            if key in last.measures
-        }
-    )
 
 
 def _largest_move(before: NDArray[np.float32], after: NDArray[np.float32]) -> float:
