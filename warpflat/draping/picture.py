@@ -20,7 +20,6 @@ from warpflat.export.picture_garment import Body, crop_body
 from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import DrawnView, View, make_facets
-from warpflat.surface.connectivity import join_labels
 
 __all__ = ["body_around", "draw_scale", "seen_from", "write_drape_picture"]
 
@@ -28,8 +27,6 @@ _VIEWS = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _SKIN = (0.80, 0.79, 0.77)
 # The body is drawn this much smaller [m], so that cloth that lies on it is seen.
 _SHRUNK = 0.003
-# A part of the body with a smaller share of the largest part's triangles is not drawn.
-_SCRAP = 0.1
 _TALLEST, _TOP, _BOTTOM, _BAR = 8.0, 0.55, 0.1, 1.0
 
 
@@ -103,10 +100,6 @@ def body_around(drape: Drape) -> tuple[FloatArray, IntArray, int]:
     # Arms and legs far from the cloth would only make the pictures small.
     corners = np.column_stack([body.triangles, np.full(len(body.triangles), -1)])
     kept, inner = crop_body(Body(vertices=inner, faces=corners), x)
-    # Nor are scraps of hands of use that hang in the air.
-    label = join_labels(len(inner), kept[:, :2].ravel(), kept[:, 1:].ravel())[kept[:, 0]]
-    count = np.bincount(label)
-    kept = kept[count[label] >= _SCRAP * count.max()] if len(kept) else kept
     triangles = np.column_stack([kept + len(x), np.full(len(kept), -1)])
     faces = np.concatenate([drape.cloth.faces, triangles]).astype(np.int32)
     return np.concatenate([x, inner]), faces, len(drape.cloth.faces)

@@ -12,6 +12,7 @@ from warpflat.export.colours import energy_colours
 from warpflat.export.geometry import area_vectors, outline_edges
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_views import DrawnView, Facets, View, make_facets
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
@@ -22,6 +23,8 @@ _HEIGHT, _HEAD, _FOOT = 9.0, 0.26, 0.30  # [in], as all that follows
 _LEAST_GAP = 0.25
 # How far the mannequin shows around the garment [m].
 _AROUND = 0.06
+# A part of the body with a smaller share of the largest part's triangles is not drawn.
+_SCRAP = 0.1
 # The garment lies on the mannequin: it is drawn this much nearer to the eye [m].
 _NEARER = 0.012
 _SKIN = (0.88, 0.86, 0.83)
@@ -103,18 +106,29 @@ def crop_body(body: Body, worn: FloatArray) -> tuple[IntArray, FloatArray]:
 
     Arms end beside the garment, as those of a dress form do: they would take a third of the page. Their ends are closed.
     """
-    triangles, vertices = triangulate(body.faces)[0], body.vertices
+    triangles, vertices, ends = triangulate(body.faces)[0], body.vertices, list[IntArray]()
     for axis, sign in ((1, 1.0), (1, -1.0), (0, 1.0), (0, -1.0)):
         limit = float((sign * worn[:, axis]).max()) + _AROUND
         triangles, vertices, edges = _cut(triangles, vertices, sign * vertices[:, axis] - limit)
-        if axis == 0 and len(edges):
+        ends += [edges] if axis == 0 else []
+    triangles = _without_scraps(triangles, len(vertices))
+    for end in ends:
+        edges = end[np.isin(end, triangles).all(axis=1)]
+        if len(edges):
             # With vertices of its own: light does not bend around its edge.
             rim = vertices[edges.ravel()]
             own = len(vertices) + np.arange(len(rim)).reshape(-1, 2)
-            end = np.column_stack([own, np.full(len(own), len(vertices) + len(rim))])
+            cap = np.column_stack([own, np.full(len(own), len(vertices) + len(rim))])
             vertices = np.concatenate([vertices, rim, rim.mean(axis=0)[None]])
-            triangles = np.concatenate([triangles, end])
+            triangles = np.concatenate([triangles, cap])
     return triangles.astype(np.int32), vertices
+
+
+def _without_scraps(triangles: IntArray, count: int) -> IntArray:
+    """Return the triangles of a mesh of `count` vertices without small parts of hands and arms, which would hang in the air."""
+    label = join_labels(count, triangles[:, :2].ravel(), triangles[:, 1:].ravel())[triangles[:, 0]]
+    size = np.bincount(label)
+    return triangles[size[label] >= _SCRAP * size.max(initial=0)]
 
 
 def _cut(triangles: IntArray, vertices: FloatArray, beyond: FloatArray) -> tuple[IntArray, FloatArray, IntArray]:
