@@ -161,7 +161,7 @@ def _armpit(
         higher = [y[i] for i in range(window[-1] + 1, len(y) - 1) if reach[i + 1] > 1.22 * reach[i]]
         if higher:
             raise InputError(
-                f"scan: its armpits lie at {higher[0] / stature:.2f} of its height, those of a body with a head at 0.66 to 0.84; "
+                f"scan: its armpits lie at {higher[0] / stature:.3f} of its height, those of a body with a head at 0.66 to 0.84; "
                 "the head is missing"
             )
         raise InputError(f"scan: no {where} armpit between 0.66 and 0.84 of the height; arms must stand off the body")
