@@ -35,7 +35,7 @@ from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
-from warpflat.pattern.piece_checks import FOLD_STRAIGHT
+from warpflat.pattern.piece_parts import FOLD_STRAIGHT
 from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
 from warpflat.surface.cut.dart_legs import are_curved, open_length
 

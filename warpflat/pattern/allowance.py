@@ -16,7 +16,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.pattern.dart_allowance import dart_allowance
 from warpflat.pattern.hem_allowance import find_hem_end, fold_hem
-from warpflat.pattern.piece_checks import FOLD_STRAIGHT
+from warpflat.pattern.piece_parts import FOLD_STRAIGHT
 from warpflat.pattern.polygons import LOST, close_slits, half_plane, intersection, union, unit_vector
 from warpflat.pattern.sides import MITRE_REACH, Side, Wedge, allowance_strip, corner_fill, outline_points
 

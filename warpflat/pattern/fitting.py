@@ -9,7 +9,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, turning_angles
 from warpflat.pattern.curves import TOLERANCE, Curve, chords, fit_curve
-from warpflat.pattern.piece_checks import SAME_POINT
+from warpflat.pattern.piece_parts import SAME_POINT
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 

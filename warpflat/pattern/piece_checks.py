@@ -3,70 +3,55 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
+from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 if TYPE_CHECKING:
     import shapely
 
-    from warpflat.pattern.pieces import Edge, Piece
+__all__ = ["check_piece"]
 
-__all__ = ["FOLD_STRAIGHT", "SAME_POINT", "check_piece", "check_points"]
-
-#: Ends of neighbouring edges that are closer than this [m] are one corner.
-SAME_POINT = 1e-6
-#: How far [m] an edge on the fold of the cloth may stray from straight.
-FOLD_STRAIGHT = 5e-4
 # A place in Shapely's messages: "Self-intersection[0.036 0.674]".
 _PLACE = re.compile(r"\[(\S+) (\S+)\]")
 
 
-def check_piece(piece: Piece, where: str) -> None:
+def check_piece(
+    where: str, *, edges: Sequence[Edge], darts: Sequence[Dart], holes: Sequence[Hole], lines: Mapping[str, FloatArray]
+) -> None:
     """Check a piece of a pattern.
 
     Args:
-        piece: its edges, darts and holes are set.
         where: what messages begin with.
+        edges, darts, holes: of the piece.
+        lines: inside it, by name.
 
     Raises:
         InputError: a name that is unfit or occurs twice, edges that do not follow each other around a simple outline, a fold that is
             not straight, a dart whose legs are none, or a hole that crosses itself.
     """
-    _check_names(piece, where)
-    _check_outline(piece, where)
-    _check_darts(piece, where)
-    _check_holes(piece, where)
+    _check_names(where, edges=edges, darts=darts, holes=holes, lines=lines)
+    _check_outline(edges, where)
+    _check_darts(edges, darts, where)
+    _check_holes(holes, where)
 
 
-def check_points(points: ArrayLike, where: str, *, at_least: int) -> FloatArray:
-    """Return points (#P by 2 [m]) as an array.
-
-    Raises:
-        InputError: another shape, fewer than `at_least`, or a value that is not finite.
-    """
-    array = np.asarray(points, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) < at_least:
-        raise InputError(f"{where}: points have shape {array.shape}; they must be #P by 2 with #P at least {at_least}")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise InputError(f"{where}: point {row} is not finite; all coordinates are metres")
-    return array
-
-
-def _check_names(piece: Piece, where: str) -> None:
+def _check_names(
+    where: str, *, edges: Sequence[Edge], darts: Sequence[Dart], holes: Sequence[Hole], lines: Mapping[str, FloatArray]
+) -> None:
     """Check that names are printable and unique."""
     for what, names in (
-        ("edge", [e.name for e in piece.edges]),
-        ("dart", [d.name for d in piece.darts]),
-        ("hole", [h.name for h in piece.holes]),
-        ("line", list(piece.internal_lines)),
+        ("edge", [e.name for e in edges]),
+        ("dart", [d.name for d in darts]),
+        ("hole", [h.name for h in holes]),
+        ("line", list(lines)),
     ):
         for name in names:
             check_label(name, f"{where}: {what}")
@@ -75,13 +60,13 @@ def _check_names(piece: Piece, where: str) -> None:
             raise InputError(f"{where}: {what} {doubled[0]!r} occurs twice; names are unique in a piece")
 
 
-def _check_outline(piece: Piece, where: str) -> None:
+def _check_outline(edges: Sequence[Edge], where: str) -> None:
     """Check that edges follow each other around a simple outline, counter-clockwise."""
     import shapely
 
-    if not piece.edges:
+    if not edges:
         raise InputError(f"{where} has no edges; its outline needs at least one")
-    for edge, follows in zip(piece.edges, [*piece.edges[1:], piece.edges[0]], strict=True):
+    for edge, follows in zip(edges, [*edges[1:], edges[0]], strict=True):
         gap = float(np.linalg.norm(edge.points[-1] - follows.points[0]))
         if gap > SAME_POINT:
             raise InputError(
@@ -90,7 +75,7 @@ def _check_outline(piece: Piece, where: str) -> None:
             )
         if edge.kind == "fold":
             _check_straight(edge, where)
-    outline = piece.outline
+    outline = np.concatenate([edge.points[:-1] for edge in edges])
     if len(outline) < 3:
         raise InputError(f"{where}: the outline has {len(outline)} points; it needs at least 3")
     polygon = shapely.Polygon(outline)
@@ -127,15 +112,18 @@ def _check_straight(edge: Edge, where: str) -> None:
         )
 
 
-def _check_darts(piece: Piece, where: str) -> None:
+def _check_darts(edges: Sequence[Edge], darts: Sequence[Dart], where: str) -> None:
     """Check that a dart's legs are edges of its kind that follow each other."""
-    names = [edge.name for edge in piece.edges]
+    by_name = {edge.name: edge for edge in edges}
+    names = list(by_name)
     legs = []
-    for dart in piece.darts:
+    for dart in darts:
         for leg in (dart.left, dart.right):
-            if piece.edge(leg).kind != "dart":
+            if leg not in by_name:
+                raise InputError(f"{where} has no edge {leg!r}; {nearest(leg, names)}")
+            if by_name[leg].kind != "dart":
                 raise InputError(
-                    f"{where}: dart {dart.name!r} uses edge {leg!r} of kind {piece.edge(leg).kind!r}, not 'dart'"
+                    f"{where}: dart {dart.name!r} uses edge {leg!r} of kind {by_name[leg].kind!r}, not 'dart'"
                 )
         if names[(names.index(dart.left) + 1) % len(names)] != dart.right:
             raise InputError(
@@ -143,16 +131,16 @@ def _check_darts(piece: Piece, where: str) -> None:
                 "first, counter-clockwise, and ends in the tip)"
             )
         legs += [dart.left, dart.right]
-    for edge in piece.edges:
+    for edge in edges:
         if edge.kind == "dart" and legs.count(edge.name) != 1:
             raise InputError(
                 f"{where}: edge {edge.name!r} is of kind 'dart' but belongs to {legs.count(edge.name)} darts, not 1"
             )
 
 
-def _check_holes(piece: Piece, where: str) -> None:
+def _check_holes(holes: Sequence[Hole], where: str) -> None:
     """Check that the cloth around holes does not overlap."""
-    for hole in piece.holes:
+    for hole in holes:
         width = overlap_width(hole.points)
         if width <= OVERLAP:
             continue

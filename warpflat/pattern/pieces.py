@@ -1,4 +1,4 @@
-"""The parts of a pattern: edges, darts, pieces, seams, and a garment in its sizes; validated when they are made."""
+"""A pattern: pieces, seams, and a garment in its sizes; validated when they are made."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
-from warpflat.core.polyline import polyline_length
 from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
-from warpflat.pattern.piece_checks import SAME_POINT, check_piece, check_points
+from warpflat.pattern.piece_checks import check_piece
+from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, EDGE_KINDS, SAME_POINT, Dart, Edge, Hole, check_points
 from warpflat.pattern.seam_difference import eased_length
 from warpflat.pattern.words import translate_name
 
@@ -30,114 +30,7 @@ __all__ = [
     "unknown_size",
 ]
 
-#: Allowance [m] of an edge that names none, by its kind.
-DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
-EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
 ROLES = ("shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Edge:
-    """One named stretch of a piece's outline, from corner to corner.
-
-    Attributes:
-        name: unique in its piece; it survives into every file.
-        points: #P by 2 [m], from the first corner to the last, in the direction of the outline (counter-clockwise).
-        kind: "seam", "hem", "fold" (lies on the fold of the cloth), "cut" (raw, no allowance) or "dart" (a dart's leg).
-        allowance: [m]; None for the default of the kind.
-        vertices: #P, the mesh vertex of each point, where the edge comes from a mesh.
-    """
-
-    name: str
-    points: FloatArray
-    kind: str = "seam"
-    allowance: float | None = None
-    vertices: IntArray | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in EDGE_KINDS:
-            raise InputError(f"edge {self.name!r}: unknown kind {self.kind!r}; {nearest(self.kind, EDGE_KINDS)}")
-        points = check_points(self.points, f"edge {self.name!r}", at_least=2)
-        if polyline_length(points) < SAME_POINT:
-            raise InputError(f"edge {self.name!r} has no length; an edge runs between two different corners")
-        if self.allowance is not None and not 0 <= self.allowance <= 0.5:
-            raise InputError(f"edge {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and 0.5 m")
-        if self.kind == "fold" and self.allowance:
-            raise InputError(f"edge {self.name!r} lies on the fold: its allowance must be 0, not {self.allowance!r} m")
-        object.__setattr__(self, "points", points)
-
-    @property
-    def width(self) -> float:
-        """Allowance [m] of this edge, its own or that of its kind."""
-        return DEFAULT_ALLOWANCE[self.kind] if self.allowance is None else float(self.allowance)
-
-    @property
-    def length(self) -> float:
-        """Length [m] along the points."""
-        return polyline_length(self.points)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Dart:
-    """A wedge that is sewn shut: two neighbouring edges of kind "dart" that meet in its tip.
-
-    Attributes:
-        name: unique in its piece.
-        left: the edge that runs from the border to the tip (it comes first, counter-clockwise).
-        right: the edge that runs from the tip back to the border.
-        fold_to: the side to which the wedge is pressed, "left" or "right"; None lets the piece decide: downwards for
-            a dart that lies across the grain, towards the fold or the middle of the piece for one along it.
-        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts, where the mouth has room for
-            that.
-        pleat: how far from the border a pleat is sewn [m]; it is folded, and open from there on. None for a dart.
-    """
-
-    name: str
-    left: str
-    right: str
-    fold_to: str | None = None
-    cut: bool = False
-    pleat: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.fold_to not in (None, "left", "right"):
-            raise InputError(f"dart {self.name!r}: fold_to is {self.fold_to!r}; it must be 'left', 'right' or None")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Hole:
-    """A closed line inside a piece.
-
-    Attributes:
-        name: unique in its piece.
-        points: #P by 2 [m], counter-clockwise, the first not repeated.
-        kind: "cutout" (cut away) or "dart" (a fish-eye dart: sewn shut, not cut; drill holes at its two ends).
-        allowance: [m] of a cutout, inwards from its points; None for that of a seam.
-    """
-
-    name: str
-    points: FloatArray
-    kind: str = "cutout"
-    allowance: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.kind not in ("cutout", "dart"):
-            raise InputError(
-                f"hole {self.name!r}: unknown kind {self.kind!r}; {nearest(self.kind, ('cutout', 'dart'))}"
-            )
-        if self.allowance is not None and not 0 <= self.allowance <= 0.5:
-            raise InputError(f"hole {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and 0.5 m")
-        points = check_points(self.points, f"hole {self.name!r}", at_least=3)
-        if np.linalg.norm(points[0] - points[-1]) < SAME_POINT:
-            points = points[:-1]
-        object.__setattr__(self, "points", points)
-
-    @property
-    def width(self) -> float:
-        """Allowance [m] inside a cutout."""
-        if self.kind == "dart":
-            return 0.0
-        return DEFAULT_ALLOWANCE["seam"] if self.allowance is None else float(self.allowance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,7 +90,7 @@ class Piece:
             if len(grain) != 2 or np.linalg.norm(grain[1] - grain[0]) < SAME_POINT:
                 raise InputError(f"{where}: the grain needs two different points, from and to")
             object.__setattr__(self, "grain", grain)
-        check_piece(self, where)
+        check_piece(where, edges=self.edges, darts=self.darts, holes=self.holes, lines=lines)
 
     @property
     def printed_name(self) -> str:

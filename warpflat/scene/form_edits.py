@@ -151,19 +151,19 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
     cuts = _cuts_without(scene, old)
     if into == "nothing":
         return scene_with(scene, cuts=cuts)
+    if into == "seam":
+        # The book's dart there goes with the piece.
+        kept = [cut for cut in cuts if not (cut.get("omit") and place_of(cut) == old.place)]
+        seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0]}
+        return scene_with(scene, cuts=[*cuts_beside(*scene_recipe(scene), kept, seam), seam])
     eyes = {f"{name}.{eye}" for name, piece in garment.form.pieces.items() for eye in piece.eyes}
-    if into != "seam" and any(f"{old.piece}.{old.name}{side}" in eyes for side in ("", " left", " right")):
+    if any(f"{old.piece}.{old.name}{side}" in eyes for side in ("", " left", " right")):
         raise InputError(
             f"dart {dart!r} has no mouth on the border, so it cannot become {into}; turn it into seam or nothing"
         )
     if into == "pleat":
         pleat = cut_of_dart(replace(old, pleat_mm=PLEAT_MM))
         return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), pleat])
-    if into == "seam":
-        # The book's dart there goes with the piece.
-        kept = [cut for cut in cuts if not (cut.get("omit") and place_of(cut) == old.place)]
-        seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0]}
-        return scene_with(scene, cuts=[*cuts_beside(*scene_recipe(scene), kept, seam), seam])
     seams = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.seams]
     for name, (longer, share) in _shares(old, garment).items():
         how = {"fullness": round(share, 4)} if into == "ease" else {"gather": round(1.0 + share, 4)}
