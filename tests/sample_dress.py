@@ -12,7 +12,8 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Dart, Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["sample_dress"]
 

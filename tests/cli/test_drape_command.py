@@ -11,7 +11,8 @@ import pytest
 from warpflat.cli.main import main
 from warpflat.export.svg import write_svg
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 
 @pytest.fixture

@@ -25,7 +25,8 @@ from warpflat.export.pattern_json import pattern_json
 from warpflat.export.svg import SvgPage
 from warpflat.fabric.file import read_fabrics
 from warpflat.pattern.draft import draft_garment, draft_piece
-from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 from warpflat.surface.paths.lines import with_lines
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape

@@ -24,7 +24,8 @@ from warpflat.export.read_dxf import read_dxf
 from warpflat.export.read_svg import read_svg
 from warpflat.export.svg import write_svg
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Dart, Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 from warpflat.scene.outside_pattern import OutsideJob
 
 

@@ -20,7 +20,8 @@ from shapely.geometry import LinearRing, Point
 from warpflat.core.errors import InputError
 from warpflat.export.dxf import block_name, write_dxf
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Edge, Garment, Piece
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_words import seam_words
 
 SIZES = ("36", "38", "40")

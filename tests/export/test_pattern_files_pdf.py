@@ -17,7 +17,8 @@ from warpflat.export.pdf import PAPERS, write_pdf
 from warpflat.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Edge, Garment, Piece
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece
 
 needs_poppler = pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="pdftoppm (poppler) is not installed")
 MM = 1 / 25.4

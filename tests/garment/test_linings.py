@@ -13,7 +13,8 @@ from warpflat.garment.facings import with_facings
 from warpflat.garment.linings import add_interfacing, add_lining
 from warpflat.pattern.cut_list import cut_list
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 from warpflat.pattern.shrinkage import Shrinkage, enlarged
 
 

@@ -35,7 +35,8 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece
 from warpflat.pattern.drafted import DraftedGarment
-from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece
+from warpflat.pattern.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.repair.validate import make_surface

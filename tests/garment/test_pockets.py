@@ -10,7 +10,8 @@ from warpflat.core.errors import InputError
 from warpflat.garment.pockets import Pocket, add_pockets
 from warpflat.garment.shaped_band import with_shaped_waistband
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 PATCH = Pocket(kind="patch", where="front", width=0.12, height=0.14, line="hip", below=0.02, from_centre=0.05)
 BAGS = Pocket(kind="inseam", where="side left", width=0.15, height=0.16, below=0.06)

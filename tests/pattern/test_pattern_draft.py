@@ -17,7 +17,8 @@ from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece, nest_label
 from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.layout import lay_out, nests
-from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 SIZES = ("36", "38", "40", "42", "44")
 

@@ -9,7 +9,8 @@ import shapely
 from warpflat.pattern.curves import chords, fit_curve
 from warpflat.pattern.draft import draft_piece
 from warpflat.pattern.fitting import is_wavy, smooth_line
-from warpflat.pattern.pieces import Dart, Edge, Piece
+from warpflat.pattern.piece_parts import Dart, Edge
+from warpflat.pattern.pieces import Piece
 
 
 def bent(count: int = 24) -> np.ndarray:

@@ -14,7 +14,8 @@ from warpflat.export.svg import write_marker_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Cloth, make_marker, unfold_piece
-from warpflat.pattern.pieces import Edge, Garment, Hole, Piece
+from warpflat.pattern.piece_parts import Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,8 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import points_at_lengths
 from warpflat.draping.whole_pieces import hole_edges
-from warpflat.pattern.pieces import Edge, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
 __all__ = ["FlatMesh", "mesh_pieces"]
 

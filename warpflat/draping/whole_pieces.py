@@ -10,7 +10,8 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.pattern.drafted_darts import fisheye_legs
-from warpflat.pattern.pieces import Dart, Edge, Hole, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
 __all__ = ["MIRRORED", "hole_edges", "whole_pieces"]
 

@@ -36,7 +36,8 @@ from warpflat.pattern.drafted import (
     SeamReport,
 )
 from warpflat.pattern.label import Label
-from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["pattern_from_json", "read_pattern_json"]
 

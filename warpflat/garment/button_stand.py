@@ -12,8 +12,8 @@ from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import STAND, STAND_END
 from warpflat.garment.openings import Buttons, Opening
-from warpflat.pattern.piece_parts import FOLD_STRAIGHT
-from warpflat.pattern.pieces import Edge, Piece
+from warpflat.pattern.piece_parts import FOLD_STRAIGHT, Edge
+from warpflat.pattern.pieces import Piece
 
 __all__ = ["bust_depth", "button_depths", "with_button_stand"]
 

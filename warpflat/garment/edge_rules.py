@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from warpflat.core.errors import InputError, nearest
-from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, EDGE_KINDS
+from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, EDGE_KINDS
 
 __all__ = ["HEMMED_LEVELS", "EdgeRules"]
 

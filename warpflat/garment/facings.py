@@ -16,7 +16,8 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name, without_side
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["INNER", "STAND", "STAND_END", "Stand", "centre_notch", "with_facings", "with_stand_facings"]
 

@@ -12,7 +12,8 @@ from warpflat.core.text import find_unused_name, without_side
 from warpflat.garment.facings import Stand, centre_notch, with_facings, with_stand_facings
 from warpflat.garment.free_edges import FreeChain, free_chain, free_edges
 from warpflat.garment.shaped_band import with_shaped_waistband
-from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges"]
 

@@ -11,7 +11,8 @@ from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import INNER, centre_notch
 from warpflat.garment.shaped_band import without_strip
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["add_interfacing", "add_lining"]
 

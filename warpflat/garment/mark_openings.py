@@ -13,7 +13,8 @@ from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_leng
 from warpflat.core.text import find_unused_name
 from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand
 from warpflat.garment.openings import Opening, OpeningPart
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["mark_openings", "with_notches"]
 

@@ -13,7 +13,8 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name, other_side
 from warpflat.garment.mark_openings import with_notches
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["Pocket", "add_pockets"]
 

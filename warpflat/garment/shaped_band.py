@@ -11,7 +11,8 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import INNER, centre_notch, facing_edges
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["with_shaped_waistband", "without_strip"]
 

@@ -17,7 +17,8 @@ from warpflat.flattening.applied_cut import seam_kind
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
-from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.dart import fish_eye_measure
 from warpflat.surface.cut.dart_legs import are_curved, pull_back, pull_back_eye

@@ -35,8 +35,8 @@ from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
-from warpflat.pattern.piece_parts import FOLD_STRAIGHT
-from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import FOLD_STRAIGHT, Dart, Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 from warpflat.surface.cut.dart_legs import are_curved, open_length
 
 if TYPE_CHECKING:

@@ -36,7 +36,8 @@ from warpflat.pattern.drafted_darts import (
 from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
-from warpflat.pattern.pieces import Edge, Garment, Hole, Piece, Seam
+from warpflat.pattern.piece_parts import Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
 from warpflat.pattern.truing import CornerReport, true_corners

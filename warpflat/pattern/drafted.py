@@ -11,7 +11,8 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.label import Label
-from warpflat.pattern.pieces import Dart, Edge, Garment, Piece
+from warpflat.pattern.piece_parts import Dart, Edge
+from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE
 from warpflat.pattern.truing import CornerReport
 

@@ -12,8 +12,8 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.curves import TOLERANCE, fit_curve
 from warpflat.pattern.dart_allowance import WIDEST_DART
 from warpflat.pattern.drafted import DraftedDart, DraftedEdge, drawn_leg
-from warpflat.pattern.piece_parts import SAME_POINT
-from warpflat.pattern.pieces import Dart, Piece
+from warpflat.pattern.piece_parts import SAME_POINT, Dart
+from warpflat.pattern.pieces import Piece
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Wedge
 from warpflat.surface.cut.dart_legs import are_curved

@@ -12,7 +12,8 @@ from warpflat.core.text import without_side
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.draft import draft_half
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
-from warpflat.pattern.pieces import Edge, Hole, Piece, Seam
+from warpflat.pattern.piece_parts import Edge, Hole
+from warpflat.pattern.pieces import Piece, Seam
 
 __all__ = ["halved", "is_symmetric"]
 

@@ -10,7 +10,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.pattern.corners import find_corners
 from warpflat.pattern.from_mesh import CORNER
-from warpflat.pattern.pieces import Dart, Edge
+from warpflat.pattern.piece_parts import Dart, Edge
 
 __all__ = ["chain_edges", "find_darts", "inset", "split_outline"]
 

@@ -13,17 +13,12 @@ from warpflat.core.file_names import check_label
 from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.piece_checks import check_piece
-from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, EDGE_KINDS, SAME_POINT, Dart, Edge, Hole, check_points
+from warpflat.pattern.piece_parts import SAME_POINT, Dart, Edge, Hole, check_points
 from warpflat.pattern.seam_difference import eased_length
 from warpflat.pattern.words import translate_name
 
 __all__ = [
-    "DEFAULT_ALLOWANCE",
-    "EDGE_KINDS",
-    "Dart",
-    "Edge",
     "Garment",
-    "Hole",
     "Piece",
     "Seam",
     "SeamSide",

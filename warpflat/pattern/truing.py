@@ -10,7 +10,8 @@ import numpy as np
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.end_turn import REACH, end_direction, turned_end
 from warpflat.pattern.fitting import EdgeKey
-from warpflat.pattern.pieces import Edge, Piece, Seam, SeamSide
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
 __all__ = ["CornerReport", "true_corners"]
 
