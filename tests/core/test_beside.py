@@ -6,14 +6,13 @@ import os
 import signal
 import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from warpflat.core.activity import activity_listener
 from warpflat.core.atomic_files import atomic_path, output_folder
-from warpflat.core.beside import Beside, ForkServer, work_beside
+from warpflat.core.beside import Beside, work_beside
 from warpflat.core.errors import InputError
 
 
@@ -112,52 +111,3 @@ def test_a_process_dies_with_its_parent(tmp_path: Path):
     while process.exists() and "Z" not in (process / "stat").read_text().split()[2] and time.monotonic() < deadline:
         time.sleep(0.01)
     assert time.monotonic() < deadline
-
-
-def write_where_imported(folder: Path, module: str) -> tuple[bool, int]:
-    return module in sys.modules, write(folder, "a.txt")
-
-
-def test_a_server_has_imported_what_a_function_needs(tmp_path: Path):
-    module, out = "this", tmp_path / "out"
-    sys.modules.pop(module, None)
-    with work_beside(), ForkServer([module]) as server, output_folder(out):
-        with Beside(partial(write_where_imported, out, module), server=server) as work:
-            imported, process = work.result()
-        assert imported
-        assert process not in (os.getpid(), server.process)
-    assert module not in sys.modules
-    assert [path.name for path in out.iterdir()] == ["a.txt"]
-    with ForkServer([module]) as server:
-        assert server.process == 0
-        assert Beside(os.getpid, server=server).result() == os.getpid()
-
-
-def process_or_wait(own: int) -> int:
-    if os.getpid() != own:
-        time.sleep(60)
-    return os.getpid()
-
-
-def test_a_function_whose_server_dies_runs_again():
-    with (
-        work_beside(),
-        ForkServer(["json"]) as server,
-        Beside(partial(process_or_wait, os.getpid()), server=server) as work,
-    ):
-        os.kill(server.process, signal.SIGKILL)
-        assert work.result() == os.getpid()
-
-
-def test_a_server_ends_with_its_block():
-    begun = time.monotonic()
-    with (
-        pytest.raises(InputError),
-        work_beside(),
-        ForkServer(["json"]) as server,
-        Beside(partial(process_or_wait, os.getpid()), server=server),
-    ):
-        raise InputError("the disk is full")
-    assert time.monotonic() - begun < 30
-    with pytest.raises(ProcessLookupError):
-        os.kill(server.process, 0)

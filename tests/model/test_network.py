@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
@@ -19,7 +18,6 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.model.membrane import MODELS, Model
 from warpflat.model.network import SpringNetwork, _repeated
 from warpflat.model.springs import quad_stiffness, springs_of
-from warpflat.model.strain import worn_strain
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.cells import make_cells
@@ -403,22 +401,3 @@ def test_one_number_for_all_rows_stays_one_on_a_device():
     got = wp.zeros(5, dtype=wp.vec2d, device=DEVICE)
     launch_each(subtract, 5, [got, rows], [got], device=DEVICE)
     assert got.numpy().tolist() == [[-1.0, -2.0]] * 5
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_a_sewn_network_that_was_pickled_has_its_energies(model: Model):
-    surface = make_shape("dome")
-    stretch = np.full((len(surface.faces), 2), 1.1)
-    flat = np.ascontiguousarray(surface.vertices[:, :2])
-    network = SpringNetwork.build(surface, cloth(), flat, grain_angle=20.0, model=model, stretch=stretch, device=DEVICE)
-    network.sew(np.array([[0, 1, 2, 3]], dtype=np.int32), np.array([0.9]), np.array([150.0]))
-    assert network.seams is not None
-    network.seams.offset.assign(np.array([0.01]))
-    network.keep_vertical(np.array([4, 5]))
-    again = pickle.loads(pickle.dumps(network))
-    position = wp.array(flat, dtype=wp.vec2d, device=DEVICE)
-    np.testing.assert_array_equal(worn_strain(again, flat).energy, worn_strain(network, flat).energy)
-    assert again.seam_energy(position) == network.seam_energy(position) > 0.0
-    for struct, name in (("bonds", "freedom"), ("bonds", "slot"), ("springs", "stiffness"), ("seams", "lever")):
-        arrays = [getattr(getattr(one, struct), name).numpy() for one in (again, network)]
-        np.testing.assert_array_equal(*arrays)

@@ -31,7 +31,7 @@ still the matrix of the approximate implicit step.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -77,8 +77,6 @@ _PAIR_SHARE = 0.5
 # grid has only rough errors.
 _SOFT = 12.0
 _STIFF = 5.0
-# The arrays of seam and constraint equations.
-_SEAMS = ("ends", "kind", "ratio", "target", "lever", "stiffness", "offset")
 
 
 class CellModel(NamedTuple):
@@ -242,33 +240,6 @@ class SpringNetwork:
     def _sum_stiffness(self, around: wp.array) -> None:
         given = [self.springs.offset, self.springs.stiffness, _PAIR_SHARE]
         launch_each(sum_stiffness, self.vertex_count, given, [around], device=self.device)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what the network is made from, on the host: another process makes its arrays on the device again."""
-        state = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        state["device"] = self.device.alias
-        seams = self.seams
-        return {
-            "made_from": state,
-            "seams": None if seams is None else {name: getattr(seams, name).numpy() for name in _SEAMS},
-            "freedom": self.bonds.freedom.numpy(),
-            "stiffness": None if self.model == "springs" else self.springs.stiffness.numpy(),
-        }
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Make the network again."""
-        vars(self).update(
-            state["made_from"], cloth=None, seams=None, device=wp.get_device(state["made_from"]["device"])
-        )
-        self.__post_init__()
-        if state["stiffness"] is not None:
-            self.springs.stiffness.assign(state["stiffness"])
-        if state["seams"] is not None:
-            offset = state["seams"].pop("offset")
-            self.sew(**state["seams"])
-            assert self.seams is not None
-            self.seams.offset.assign(offset)
-        self.bonds.freedom = wp.array(state["freedom"], dtype=wp.vec2d, device=self.device)
 
     # Needed for steps only: a network that is only measured, or a part of a joined one, never makes them.
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from warpflat.core.beside import Beside, ForkServer
+from warpflat.core.beside import Beside
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.scene.cuts import CutSequence
@@ -23,7 +23,7 @@ from warpflat.scene.load import (
     scene_wear,
 )
 from warpflat.scene.surface import scene_surface
-from warpflat.scene.write import SceneResult, measure_fit, modules_of_files, write_pieces, write_surface
+from warpflat.scene.write import SceneResult, measure_fit, write_pieces, write_surface
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.mesh import Surface
 
@@ -36,8 +36,7 @@ if TYPE_CHECKING:
     from warpflat.scene.frames import FrameRecorder
     from warpflat.scene.schema import SceneTable
 
-# From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run. With fewer
-# they get a copy of what they write.
+# From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
 _MANY = 500_000
 
 __all__ = ["files_of_run", "flatten_scene", "run_scene", "scene_cuts", "scene_ledger"]
@@ -112,8 +111,7 @@ def _run_surface(
     _check_edges(scene, sequence, drawing)
     wanted = FrameSchedule(settings.output).wanted
     require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
-    few = len(sequence.surface.vertices) < _MANY
-    with ForkServer(modules_of_files(scene) if few else ()) as server, ExitStack() as beside:
+    with ExitStack() as beside:
         with Film(folder, settings.output, [sequence.surface]) as film:
             recorder = film.recorders[sequence.surface.name]
 
@@ -124,10 +122,10 @@ def _run_surface(
             result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
             pieces = separate(result)
             fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
-            pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures", server=server)
+            pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
             drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
-            pattern = Beside(drawn, "drafting the pattern", server=server)
-            if few:
+            pattern = Beside(drawn, "drafting the pattern")
+            if len(sequence.surface.vertices) < _MANY:
                 beside.enter_context(pictures)
                 beside.enter_context(pattern)
         drape_metrics, drape_files = write_drape(scene, result, folder, device=device)

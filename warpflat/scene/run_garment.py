@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
-from warpflat.core.beside import Beside, ForkServer
+from warpflat.core.beside import Beside
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.fabric.library import as_fabric
@@ -38,7 +38,7 @@ from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fab
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
-from warpflat.scene.write import SceneResult, modules_of_files, packed_film, packed_pictures, review_files
+from warpflat.scene.write import SceneResult, packed_film, packed_pictures, review_files
 
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
 
@@ -211,9 +211,8 @@ def run_garment(
     notes: tuple[str, ...] = ()
     while True:
         try:
-            with ForkServer(modules_of_files(scene)) as server:
-                plan = plan_garment(scene, device=device)
-                result = _run_plan(plan, out, server, on_progress=on_progress, device=device)
+            plan = plan_garment(scene, device=device)
+            result = _run_plan(plan, out, on_progress=on_progress, device=device)
         except ClosedDarts as closed:
             scene, left_out = closed.without, closed.notes
             notes += left_out
@@ -224,12 +223,11 @@ def run_garment(
 def _run_plan(
     plan: GarmentPlan,
     out: Path,
-    server: ForkServer,
     *,
     on_progress: Callable[[Progress], bool | None] | None,
     device: str | None,
 ) -> SceneResult:
-    """Flatten the garment and write its files; pictures and pattern in processes of the server.
+    """Flatten the garment and write its files; pictures and pattern in processes of their own.
 
     Raises:
         ClosedDarts: some darts of the scene's shape do not open.
@@ -251,7 +249,7 @@ def _run_plan(
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
             pictures = [  # the quickest first
-                beside.enter_context(Beside(partial(write, plan, garment, out), "drawing the pictures", server=server))
+                beside.enter_context(Beside(partial(write, plan, garment, out), "drawing the pictures"))
                 for write in (_write_wear, _write_pieces)
             ]
             graded = {
@@ -260,7 +258,7 @@ def _run_plan(
             }
             require_open_darts(scene, graded.values())
             drafted = partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out)
-            pattern = beside.enter_context(Beside(drafted, "drafting the pattern", server=server))
+            pattern = beside.enter_context(Beside(drafted, "drafting the pattern"))
         draped = write_drape(scene, garment, out, device=device)
         return _finish(plan, garment, graded, out, draped=draped, pictures=pictures, pattern=pattern)
 

@@ -18,20 +18,12 @@ if TYPE_CHECKING:
 __all__ = [
     "SceneResult",
     "measure_fit",
-    "modules_of_files",
     "packed_film",
     "packed_pictures",
     "review_files",
     "write_pieces",
     "write_surface",
 ]
-
-
-# What pictures and pattern files need, and the solvers do not.
-_OF_PICTURES = ("warpflat.export.picture", "warpflat.flattening.fit_picture", "matplotlib.backends.backend_agg", "matplotlib.figure",
-                "matplotlib.patheffects", "PIL.PngImagePlugin")  # fmt: skip
-_OF_PATTERN = ("shapely", "warpflat.garment.to_pattern", "warpflat.export.dxf", "warpflat.export.pdf", "warpflat.export.pattern_json",
-               "warpflat.pattern.draft", "reportlab.pdfbase.ttfonts", "reportlab.pdfgen.canvas", "scipy.interpolate")  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,13 +39,6 @@ class SceneResult:
     metrics: dict[str, Any]
     files: tuple[str, ...]
     notes: tuple[str, ...]
-
-
-def modules_of_files(scene: Scene) -> list[str]:
-    """Return the modules that write the pictures and the pattern of a scene, which takes a while to import."""
-    settings = scene.settings
-    drafted = settings.pattern.formats or settings.marker is not None
-    return [*(_OF_PICTURES if settings.output.picture else ()), *(_OF_PATTERN if drafted else ())]
 
 
 def write_pieces(scene: Scene, pieces: Sequence[Flattening], folder: Path) -> list[str]:
