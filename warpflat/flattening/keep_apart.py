@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.flattening.conformal_layout import conformal_layout
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.flattening.progress import CONTACT, Stage
 from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
@@ -12,6 +13,7 @@ from warpflat.solver.grain_alignment import grain_alignments
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.connectivity import components_of
 from warpflat.surface.injective import overlap_area
+from warpflat.surface.laplacian import factor_pays
 
 __all__ = ["keep_apart"]
 
@@ -28,7 +30,8 @@ def keep_apart(
     Args:
         task: of the piece.
         end: the piece relaxed without contact.
-        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective [m].
+        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective and a conformal layout is
+            not [m].
         cut_sides: the vertices on the sides of its cuts; a cut whose sides lie over each other is left as it is.
 
     Returns:
@@ -44,6 +47,8 @@ def keep_apart(
     starts = [lambda: open_cracks(surface, start)]
     if not components_of(surface).any():
         starts.append(lambda: harmonic_layout(surface))
+        if factor_pays(surface):
+            starts.insert(0, lambda: open_cracks(surface, conformal_layout(surface)))
     for first in starts:
         state = Relaxation(network, task.options, start=first(), alignments=alignments)
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
