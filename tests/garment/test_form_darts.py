@@ -7,7 +7,7 @@ import pytest
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.darts import EYE_CLOSED, closed_darts
+from warpflat.garment.darts import closed_darts
 from warpflat.garment.garment import flatten_form
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.darts import FormDart
@@ -20,6 +20,7 @@ from warpflat.pattern.half_pieces import halved
 from warpflat.scene.load import make_scene
 from warpflat.scene.run_garment import plan_garment
 from warpflat.surface.cut.dart_legs import open_length
+from warpflat.surface.overlap import OVERLAP
 
 
 @pytest.fixture(scope="module")
@@ -180,8 +181,8 @@ def test_a_dress_has_darts_with_two_tips(body):
     form = body.form(shaped_form(body.layout, eased, "darts"))
     waist, bust = (body.layout.lines[level] for level in ("waist", "bust"))
     for piece in form.pieces.values():
-        assert set(piece.eyes) == {"waist dart left", "waist dart right"}
-        for left, right in piece.eyes.values():
+        assert set(piece.fisheyes) == {"waist dart left", "waist dart right"}
+        for left, right in piece.fisheyes.values():
             # The legs part at one tip and meet at the other.
             assert (left[0], left[-1]) == (right[0], right[-1])
             assert not set(left[1:-1]) & set(right)
@@ -198,10 +199,10 @@ def test_a_dress_has_darts_with_two_tips(body):
     assert energy[0] < 0.4 * energy[1]
     for name, piece in form.pieces.items():
         flat = sewn.pieces[name].positions
-        for left, right in piece.eyes.values():
+        for left, right in piece.fisheyes.values():
             assert np.linalg.norm(flat[left] - flat[right], axis=1).max() > 0.01
             assert polyline_length(flat[left]) == pytest.approx(polyline_length(flat[right]), abs=1e-4)
-            assert open_length(flat[left], flat[right])[1] < EYE_CLOSED
+            assert open_length(flat[left], flat[right])[1] < OVERLAP
     assert closed_darts(form, {name: piece.positions for name, piece in sewn.pieces.items()}) == []
 
     pattern, _ = pattern_of_garment({"": sewn}, name="dress")
@@ -218,7 +219,7 @@ def test_the_width_of_a_dart_with_two_tips_can_be_asked_for(body):
     dart = FormDart(name="eye", piece="front", line="princess front left", part=(0.5, 0.8), mouth_mm=12.0)
     form = body.form(replace(shipped_form("a_line_skirt"), darts=(dart,)))
     sewn = flatten_form(body, form, curves_mm=0)
-    left, right = form.pieces["front"].eyes["eye left"]
+    left, right = form.pieces["front"].fisheyes["eye left"]
     middle = len(left) // 2
     flat = sewn.pieces["front"].positions
     assert np.linalg.norm(flat[left[middle]] - flat[right[middle]]) == pytest.approx(0.012, abs=2e-4)

@@ -12,16 +12,17 @@ from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.garment.constraints import DartMouth
 from warpflat.garment.sewn import SeamPair
 from warpflat.surface.cut.dart_legs import open_length
+from warpflat.surface.overlap import OVERLAP
 
 if TYPE_CHECKING:
     from warpflat.mannequin.darts import FormDart
     from warpflat.mannequin.forms import FormResult
 
-__all__ = ["CLOSED", "EYE_CLOSED", "closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
+__all__ = ["CLOSED", "closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
 
 
-#: Legs of a dart, and of one with two tips, that overlap by no more than this [m] before a tip are closed there.
-CLOSED, EYE_CLOSED = 1e-4, 5e-4
+#: Legs of a dart that overlap by no more than this [m] before its tip are closed there.
+CLOSED = 1e-4
 # A mouth narrower than this [m] is no dart that anybody would sew.
 _NARROW = 3e-3
 
@@ -78,7 +79,7 @@ def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[
         left, right = (positions[dart.piece][leg] for leg in legs[dart.name])
         # The tips of a fish-eye dart may close a little.
         overlap = open_length(left, right)[1]
-        most = EYE_CLOSED if dart.name in form.pieces[dart.piece].eyes else CLOSED
+        most = OVERLAP if dart.name in form.pieces[dart.piece].fisheyes else CLOSED
         if overlap > most or np.linalg.norm(left - right, axis=1).max() < _NARROW:
             found.append(dart.asked)
     return found
@@ -104,7 +105,7 @@ def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[di
             {
                 "name": dart,
                 "line": placed[dart].asked.line,
-                "intake_m": float(width.max() if dart in piece.eyes else width[0]),
+                "intake_m": float(width.max() if dart in piece.fisheyes else width[0]),
                 "legs_m": [polyline_length(leg) for leg in legs],
                 "tip_to_point_m": placed[dart].to_point,
                 **({"pleat_m": pleats[name, dart]} if (name, dart) in pleats else {}),

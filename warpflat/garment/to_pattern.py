@@ -319,10 +319,10 @@ def _piece(
         for dart, (left, right) in piece.darts.items()
     ]
     holes = [
-        Hole(name=eye, points=np.vstack([flat.positions[left], flat.positions[right[-2:0:-1]]])[::-1], kind="dart")
-        for eye, (left, right) in piece.eyes.items()
+        Hole(name=dart, points=np.vstack([flat.positions[left], flat.positions[right[-2:0:-1]]])[::-1], kind="dart")
+        for dart, (left, right) in piece.fisheyes.items()
     ]
-    border = [*piece.edges.values(), *(leg for legs in piece.eyes.values() for leg in legs)]
+    border = [*piece.edges.values(), *(leg for legs in piece.fisheyes.values() for leg in legs)]
     along = _inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
     return Piece(
         name=name,

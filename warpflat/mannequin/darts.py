@@ -171,7 +171,7 @@ def standard_darts(
             dart = FormDart(name="waist dart", piece=piece, line=f"princess {face} left")
             run = _longest_run(_grid_line(layout, dart), cloth)
             at_waist = {int(run[at]) for at in (0, -1)} & set(layout.lines["waist"].tolist()) if len(run) else set()
-            if at_waist or _waist_of_eye(layout, run) is not None:
+            if at_waist or _waist_of_fisheye(layout, run) is not None:
                 found.append(dart)
             if at_waist and int(run[-1]) in at_waist and face == "back":
                 found.append(replace(dart, name="second waist dart", towards="side left", like=dart.name))
@@ -261,8 +261,8 @@ def _place(layout: Layout, vertices: FloatArray, cloth: _Cloth, dart: FormDart) 
     point: int | None = None
     if dart.part is not None:
         row = _part_of(vertices, run, dart)
-    elif dart.at is None and (waist := _waist_of_eye(layout, run)) is not None:
-        row = _default_eye(layout, vertices, run, waist, dart)
+    elif dart.at is None and (waist := _waist_of_fisheye(layout, run)) is not None:
+        row = _default_fisheye(layout, vertices, run, waist, dart)
     else:
         run, point, length = _default_run(layout, vertices, cloth, run, dart)
         arc = arc_lengths(vertices[run])
@@ -299,14 +299,14 @@ def _part_of(vertices: FloatArray, run: list[int], dart: FormDart) -> list[int]:
     return run[begin : max(begin + 1, end) + 1]
 
 
-def _waist_of_eye(layout: Layout, run: Sequence[int]) -> int | None:
+def _waist_of_fisheye(layout: Layout, run: Sequence[int]) -> int | None:
     """Return where in a run that goes on below the waist, as in a dress, the waist lies between two tips; None if nowhere."""
     waist, bust = (set(layout.lines[level].tolist()) for level in ("waist", "bust"))
     at = next((place for place, vertex in enumerate(run) if vertex in waist), 0)
     return at if 0 < at < len(run) - 1 and any(vertex in bust for vertex in run) else None
 
 
-def _default_eye(layout: Layout, vertices: FloatArray, run: list[int], waist: int, dart: FormDart) -> list[int]:
+def _default_fisheye(layout: Layout, vertices: FloatArray, run: list[int], waist: int, dart: FormDart) -> list[int]:
     """Return the fish-eye dart of a dress: its upper tip where a bodice's waist dart ends, its lower one where a skirt's does.
 
     Raises:

@@ -46,8 +46,8 @@ class FormPiece:
         grid_vertices: #V, for each vertex of the piece its vertex on the mannequin.
         face_brick: #F, for each face its brick's name.
         darts: by name, the edges along the left leg, from the border to the tip, and along the right one, back to the border.
-        eyes: fish-eye darts by name, the vertices along their left and right leg, both from the first tip to the second. They are there in
-            `surface.lines`, too, as "NAME.left" and "NAME.right".
+        fisheyes: darts with two tips by name, the vertices along their left and right leg, both from the first tip to the second. They
+            are there in `surface.lines`, too, as "NAME.left" and "NAME.right".
         parts: where darts interrupt an edge, the name of the whole edge by each of its parts.
     """
 
@@ -58,13 +58,13 @@ class FormPiece:
     grid_vertices: IntArray
     face_brick: tuple[str, ...]
     darts: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    eyes: Mapping[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
+    fisheyes: Mapping[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
     parts: Mapping[str, str] = field(default_factory=dict)
 
     def legs(self) -> dict[str, tuple[IntArray, IntArray]]:
         """Return by dart the vertices along its left and right leg, from the border to the tip; of a fish-eye dart from tip to tip."""
         darts = {dart: (self.edges[left], self.edges[right][::-1]) for dart, (left, right) in self.darts.items()}
-        return {**darts, **self.eyes}
+        return {**darts, **self.fisheyes}
 
 
 def cut_pieces(
@@ -149,13 +149,13 @@ def _piece(
     slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}
     corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened) | slits)
     loop, holes = _borders(corners, name, opened=bool(opened), darts=darts)
-    eyes = _eyes(holes, grid_vertices, darts)
-    if len(eyes) != len(holes):
+    fisheyes = _fisheyes(holes, grid_vertices, darts)
+    if len(fisheyes) != len(holes):
         raise InputError(_not_one_disk(name, opened=bool(opened), darts=darts))
-    darts = {dart: row for dart, row in darts.items() if dart not in eyes}
+    darts = {dart: row for dart, row in darts.items() if dart not in fisheyes}
     edges, parts = _edges(layout, loop, grid_vertices, darts)
     lines = _lines(layout, corners, grid_vertices, edges)
-    lines |= {leg: ids for eye, legs in eyes.items() for leg, ids in zip(_legs(eye), legs, strict=True)}
+    lines |= {leg: ids for dart, legs in fisheyes.items() for leg, ids in zip(_legs(dart), legs, strict=True)}
     fold = fold_among(edges, opened, name) if folded else None
     surface = Surface(
         vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
@@ -166,7 +166,7 @@ def _piece(
     return FormPiece(
         surface=surface, edges=edges, datum=line, fold=fold, grid_vertices=grid_vertices,
         face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
-        darts={dart: _legs(dart) for dart in darts}, eyes=eyes,
+        darts={dart: _legs(dart) for dart in darts}, fisheyes=fisheyes,
     )  # fmt: skip
 
 
@@ -277,7 +277,7 @@ def _not_one_disk(name: str, *, opened: bool, darts: Collection[str]) -> str:
     )
 
 
-def _eyes(
+def _fisheyes(
     holes: Sequence[NDArray[np.int64]], grid_vertices: IntArray, darts: Mapping[str, IntArray]
 ) -> dict[str, tuple[IntArray, IntArray]]:
     """Return by fish-eye dart the vertices along its left and right leg, both from its first tip to its second."""

@@ -156,8 +156,8 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
         kept = [cut for cut in cuts if not (cut.get("omit") and place_of(cut) == old.place)]
         seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0]}
         return scene_with(scene, cuts=[*cuts_beside(*scene_recipe(scene), kept, seam), seam])
-    eyes = {f"{name}.{eye}" for name, piece in garment.form.pieces.items() for eye in piece.eyes}
-    if any(f"{old.piece}.{old.name}{side}" in eyes for side in ("", " left", " right")):
+    fisheyes = {f"{name}.{own}" for name, piece in garment.form.pieces.items() for own in piece.fisheyes}
+    if any(f"{old.piece}.{old.name}{side}" in fisheyes for side in ("", " left", " right")):
         raise InputError(
             f"dart {dart!r} has no mouth on the border, so it cannot become {into}; turn it into seam or nothing"
         )
