@@ -23,8 +23,8 @@ __all__ = ["CELL", "Mask", "Places", "TurnedShape", "nest_on_strip", "nest_on_ti
 
 #: Cells are about this wide [m], at most.
 CELL = 0.008
-#: Orders of the pieces that are tried, and tiles in the sheet, across and down, at most.
-ORDERS, MOST_TILES = 8, 24
+#: Orders of the pieces that are tried.
+ORDERS = 8
 #: What one more row or column of the whole sheet counts as, in tiles: a long strip is hard to glue and to lay out.
 SPREAD = 0.2
 
@@ -98,20 +98,21 @@ def nest_on_tiles(
     masks = [_masks(shape, cell, gap, (0, 1, 2, 3)) for shape in shapes]
     total = sum(float(shape.area) for shape in shapes)
     needed = int(np.ceil(total / float(np.prod(step))))
-    tallest = max(min(m.cells.shape[0] for m in row) for row in masks)
-    least_rows = int(np.ceil((tallest - shared[0]) / per_tile[0]))
+    counts = _column_counts(masks, per_tile, shared, needed)
+    heights = [_heights(masks, count, per_tile, shared) for count in counts]
+    sizes = [(max(height) + needed // count + 2, count) for count, height in zip(counts, heights, strict=True)]
+    # Where shapes do not fit together there is room at last for all above each other.
+    stacked = sum(max(len(mask.cells) for mask in row) // per_tile[0] + 1 for row in masks)
     best: tuple[float, list[tuple[Mask, int, int]]] | None = None
-    for columns in _column_counts(masks, per_tile, shared, needed):
-        rows = min(MOST_TILES, least_rows + needed // columns + 2)
-        grid = _Grid(cell=cell, per_tile=(per_tile[0], per_tile[1]), shared=shared, tiles=(rows, columns))
-        shape = rows * per_tile[0] + shared[0], columns * per_tile[1] + shared[1]
-        sheet = Places(shape)
-        for order in orders(masks):
-            laid = _lay(masks, order, grid, sheet)
-            if laid is not None and (best is None or laid[0] < best[0]):
-                best = laid
-    if best is None:
-        raise ValueError("the shapes do not fit on the grid")
+    for tries in (sizes, [(stacked, counts[-1])]):
+        for tiles in tries if best is None else []:
+            grid = _Grid(cell=cell, per_tile=(per_tile[0], per_tile[1]), shared=shared, tiles=tiles)
+            sheet = Places((tiles[0] * per_tile[0] + shared[0], tiles[1] * per_tile[1] + shared[1]))
+            for order in orders(masks):
+                laid = _lay(masks, order, grid, sheet)
+                if laid is not None and (best is None or laid[0] < best[0]):
+                    best = laid
+    assert best is not None
     return _places(best[1], cell, step, overlap, gap)
 
 
@@ -174,6 +175,15 @@ def _column_counts(
     least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
     square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
     return list(range(least, max(least, square) + 3))
+
+
+def _heights(
+    masks: Sequence[Sequence[Mask]], columns: int, per_tile: tuple[int, ...], shared: tuple[int, int]
+) -> list[int]:
+    """Return for each shape how many rows of tiles it takes where it is lowest, of its positions that fit into the columns."""
+    across = columns * per_tile[1] + shared[1]
+    low = [min(len(mask.cells) for mask in row if mask.cells.shape[1] <= across) for row in masks]
+    return [max(1, int(np.ceil((height - shared[0]) / per_tile[0]))) for height in low]
 
 
 def orders(masks: Sequence[Sequence[Mask]]) -> list[list[int]]:
