@@ -12,8 +12,9 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.text import find_unused_name
+from warpflat.core.text import find_unused_name, quote_value
 from warpflat.flattening.applied_cut import seam_kind
+from warpflat.garment.closed_cuts import CLOSED, are_closed, close_cuts
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
@@ -24,6 +25,7 @@ from warpflat.surface.cut.dart import fish_eye_measure
 from warpflat.surface.cut.dart_legs import are_curved, pull_back, pull_back_eye
 
 if TYPE_CHECKING:
+    from warpflat.flattening.applied_cut import AppliedCut
     from warpflat.flattening.result import Flattening
     from warpflat.surface.border_seams import NamedSeam
     from warpflat.surface.cut.cut_mesh import Seam as Cut
@@ -97,6 +99,14 @@ def pattern_of_surface(
     named = [_named_seam(seam, results, pieces) for seam in seams]
     names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
     rules, notes = rules.known(names)
+    notes = (
+        *notes,
+        *(
+            f"cut {quote_value(title)} opens by less than {1e3 * CLOSED:g} mm: the pattern is whole there, with a line"
+            for result in results
+            for title in _closed_cuts(result)
+        ),
+    )
     rules.check(names)
     pieces = [
         replace(
@@ -113,23 +123,26 @@ def _piece(result: Flattening, size: str) -> Piece:
     """Return one piece with its cuts as darts, and its grain."""
     darts: dict[str, tuple[int, int, int]] = {}
     fisheyes: dict[str, Cut] = {}
-    tip_back: dict[str, float] = {}
-    loops = border_loops(result.faces)
-    for cut in result.cuts:
-        for number, seam in enumerate(cut.seams, start=1):
-            title = cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}"
-            tip_back[title] = cut.tip_back
-            kind = seam_kind(seam)
-            if kind == "fish-eye":
-                fisheyes[title] = seam
-            elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
-                darts[title] = places
+    tip_back = {title: cut.tip_back for title, cut, _ in _cuts(result)}
+    closed = _closed_cuts(result)
+    faces, lines = result.faces, dict(result.network.surface.lines)
+    if closed:
+        faces, lines = close_cuts(faces, lines, closed, count=len(result.positions))
+    loops = border_loops(faces)
+    for title, _, seam in _cuts(result):
+        kind = seam_kind(seam)
+        if title in closed:
+            continue
+        if kind == "fish-eye":
+            fisheyes[title] = seam
+        elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
+            darts[title] = places
     piece = piece_from_mesh(
-        result.faces,
+        faces,
         result.positions,
         name=result.surface.name,
         features=MeshFeatures(
-            lines=result.network.surface.lines,
+            lines=lines,
             darts=darts,
             fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in fisheyes.items()},
         ),
@@ -152,6 +165,19 @@ def _piece(result: Flattening, size: str) -> Piece:
     datum = None if on_border else result.positions[result.datum]
     grain = _clear_of_holes(grain_of(piece.outline, result, datum), piece)
     return replace(piece, darts=drawn, grain=grain)
+
+
+def _cuts(result: Flattening) -> list[tuple[str, AppliedCut, Cut]]:
+    """Return the seams of all cuts, each with its name in the pattern and its cut."""
+    return [
+        (cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}", cut, seam)
+        for cut in result.cuts
+        for number, seam in enumerate(cut.seams, start=1)
+    ]
+
+
+def _closed_cuts(result: Flattening) -> dict[str, Cut]:
+    return {title: seam for title, _, seam in _cuts(result) if are_closed(result.positions, seam)}
 
 
 def _clear_of_holes(grain: FloatArray, piece: Piece) -> FloatArray:
