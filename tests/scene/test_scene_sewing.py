@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from warpflat.cli.summary import notes_line, summary_lines
-from warpflat.cli.tables import energy_words, run_summary, warnings_of
+from warpflat.cli.tables import run_summary, warnings_of
 from warpflat.core.errors import InputError
+from warpflat.core.text import energy_words
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 

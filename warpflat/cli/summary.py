@@ -6,8 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from warpflat.cli.tables import energy_words
-from warpflat.core.text import format_count
+from warpflat.core.text import energy_words, format_count
 from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words, wearer_words
 from warpflat.garment.rings import rings_line
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
+from warpflat.core.text import energy_words
 from warpflat.fabric.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = [
     "drape_lines",
     "edit_table",
-    "energy_words",
     "fabric_data",
     "fabric_sheet",
     "fabric_table",
@@ -111,11 +111,6 @@ def _seam_table(seams: Iterable[Mapping[str, Any]]) -> str:
 def _constraint_table(constraints: Iterable[Mapping[str, Any]]) -> str:
     rows = [(held["name"], f"{held['amiss_mm']:.2f} mm", _price(held["price_j"])) for held in constraints]
     return _aligned(("constraint", "amiss", "price"), rows)
-
-
-def energy_words(joules: float, digits: int = 4) -> str:
-    """Return an energy in words; what is below a microjoule is rounding."""
-    return f"{1e3 * joules:.{digits}g} mJ" if abs(joules) >= 1e-6 else "0 mJ"
 
 
 def _price(joules: float | None) -> str:

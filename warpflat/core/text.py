@@ -74,6 +74,13 @@ def _is_control(letter: str) -> bool:
     return unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
 
 
+def energy_words(joules: float, digits: int = 3) -> str:
+    """Return an energy in J, or in mJ if it is below one; what is below a microjoule is rounding."""
+    if abs(joules) >= 1.0:
+        return f"{joules:.{digits}g} J" if abs(joules) < 10**digits else f"{joules:,.0f} J"
+    return f"{1e3 * joules:.{digits}g} mJ" if abs(joules) >= 1e-6 else "0 mJ"
+
+
 def quote_value(value: object) -> str:
     """Return a value as messages quote it: in one line, control characters escaped, a long one without its middle."""
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.export.colours import energy_colours
+from warpflat.export.colours import SMALLEST_SCALE, energy_colours
 from warpflat.export.picture_pen import DPI, GREY, POINT, Pen
 from warpflat.export.picture_views import INK
 
@@ -52,6 +52,9 @@ def draw_colour_bar(
     from warpflat.export.picture_pixels import Pixels
 
     above = density > scale
+    if scale <= SMALLEST_SCALE:
+        pen.write(left, top - 0.24, f"no {quantity}: the cloth lies flat without strain", 9.5)
+        return
     words = f"{quantity} [J/m²]"
     pen.write(left, top - 0.24, words, 9.5)
     left += pen.measure(words, 9.5)[0] + 0.15

@@ -14,6 +14,7 @@ import warp as wp
 
 from warpflat._version import __version__
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.text import energy_words
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.applied_cut import AppliedCut, cut_sides, measure_cut
 from warpflat.flattening.develop import Development
@@ -284,7 +285,7 @@ class Flattening:
         m = self.layout_measures
         captions = {
             "fabric": self.fabric.name,
-            "strain energy": f"{1e3 * m['strain_energy_j']:.3g} mJ",
+            "strain energy": energy_words(m["strain_energy_j"]),
             "length error": f"{100 * m['length_error']:.2f} %",
             "area error": f"{100 * m['area_error']:.2f} %",
         }

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from warpflat.core.text import energy_words
+
 __all__ = ["energy_table", "ledger_table", "piece_table", "seam_table", "size_table", "summary_cards"]
 
 Metrics = Mapping[str, Any]
@@ -29,7 +31,7 @@ def summary_cards(metrics: Metrics) -> str:
     )
     area = sum(piece["area_m2"] for piece in pieces)
     cards = [
-        (_joules(sum(piece["strain_energy_j"] for piece in pieces)), "strain energy"),
+        (energy_words(sum(piece["strain_energy_j"] for piece in pieces)), "strain energy"),
         (f"{100 * max(piece['length_error'] for piece in pieces):.2g} %", "largest length error"),
         (f"{100 * max(piece['area_error'] for piece in pieces):.2g} %", "largest area error"),
         (f"{area:.3g} m²", "cloth"),
@@ -55,9 +57,9 @@ def energy_table(metrics: Metrics) -> str:
                 (
                     name,
                     stage["name"],
-                    _joules(energy),
+                    energy_words(energy),
                     f"{100 * (energy / whole - 1.0):+.1f} %" if after else "",
-                    _joules(stage["model_energy_j"]),
+                    energy_words(stage["model_energy_j"]),
                     f"{stage['steps']:,}",
                     f"{stage['seconds']:.2f} s",
                     "" if stage["name"] == "develop" else "yes" if stage["converged"] else "NO",
@@ -137,8 +139,3 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], *, text: int = 1)
 
     body = "".join(f"<tr>{line(row, 'td')}</tr>" for row in rows)
     return f'<div class="scroll"><table><tr>{line(head, "th")}</tr>{body}</table></div>'
-
-
-def _joules(energy: float) -> str:
-    """Return an energy in J, or in mJ if it is below one tenth."""
-    return f"{energy:.3g} J" if abs(energy) >= 0.1 else f"{1e3 * energy:.3g} mJ"

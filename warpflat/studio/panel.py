@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core.errors import InputError
+from warpflat.core.text import energy_words
 from warpflat.fabric.library import load_library
 from warpflat.mannequin.ease import EASE_PRESETS
 from warpflat.mannequin.forms import form_names
@@ -243,10 +244,10 @@ def _head(session: Session) -> str:
     rows = ""
     if solution is not None:
         state = "at rest" if solution.at_rest else "<b style='color:#b00020'>not at rest</b>"
-        words += [f"strain energy <b>{joules(solution.strain_energy)}</b>", state]
+        words += [f"strain energy <b>{energy_words(solution.strain_energy)}</b>", state]
         if len(solution.pieces) > 1:
             cells = "".join(
-                f"<tr><td>{escape(name)}</td><td style='text-align:right'>{joules(piece.stages[-1].strain_energy_j)}</td></tr>"
+                f"<tr><td>{escape(name)}</td><td style='text-align:right'>{energy_words(piece.stages[-1].strain_energy_j)}</td></tr>"
                 for name, piece in solution.pieces.items()
             )
             rows = f"<table style='width:100%;line-height:1.15'>{cells}</table>"
@@ -263,7 +264,7 @@ def _head(session: Session) -> str:
         lines.append(f"<span style='color:#146c2e'>{escape(session.note)}</span>")
     if session.saved is not None and session.note:
         state = "at rest" if session.saved.at_rest else "NOT at rest"
-        lines.append(f"run from scratch: strain energy <b>{joules(session.saved.strain_energy)}</b>, {state}")
+        lines.append(f"run from scratch: strain energy <b>{energy_words(session.saved.strain_energy)}</b>, {state}")
     text = "".join(f"<div style='margin-bottom:0.2em'>{line}</div>" for line in lines if line)
     return f"<div id='studio-head' style='padding:0.3em 0.9em;font-size:0.9em;overflow-wrap:anywhere'>{text}</div>"
 
@@ -271,7 +272,7 @@ def _head(session: Session) -> str:
 def _preview(preview: Preview) -> str:
     """Return what a cut that is tried would do."""
     verb = "releases" if preview.released >= 0.0 else "costs"
-    words = f"<b>{escape(str(preview.cut['name']))}</b> {verb} <b>{joules(abs(preview.released))}</b>"
+    words = f"<b>{escape(str(preview.cut['name']))}</b> {verb} <b>{energy_words(abs(preview.released))}</b>"
     words += f" ({-100.0 * preview.share:+.1f} %)".replace("-", "−")
     return words if preview.opening is None else f"{words}, opens <b>{1e3 * preview.opening:.1f} mm</b>"
 
@@ -289,10 +290,3 @@ def _legend(scale: Scale) -> str:
         f"<div style='height:0.9em;border:1px solid #999;background:linear-gradient(90deg,{stops})'></div>"
         f"<div style='display:flex;justify-content:space-between'>{ticks}</div></div>"
     )
-
-
-def joules(energy: float) -> str:
-    """Return an energy with a unit that suits it."""
-    if abs(energy) >= 1.0:
-        return f"{energy:.3g} J"
-    return f"{1e3 * energy:.3g} mJ" if abs(energy) >= 1e-3 else f"{1e6 * energy:.3g} µJ"
