@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from warpflat.cutting.cut_plan import CutPlan, line_part
     from warpflat.cutting.dart_move import move_dart
     from warpflat.cutting.ledger import make_ledger
+    from warpflat.cutting.open_tube import open_tube
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
     from warpflat.draping.correct_pattern import Correction, correct_pattern
@@ -152,6 +153,7 @@ _HOME = {
     "make_shape": "surface.shapes",
     "make_surface": "surface.repair.validate",
     "move_dart": "cutting.dart_move",
+    "open_tube": "cutting.open_tube",
     "pattern_of_garment": "garment.to_pattern",
     "read_dxf": "export.read_dxf",
     "read_pattern_json": "export.read_pattern_json",
@@ -229,6 +231,7 @@ __all__ = [
     "make_shape",
     "make_surface",
     "move_dart",
+    "open_tube",
     "pattern_of_garment",
     "read_dxf",
     "read_pattern_json",

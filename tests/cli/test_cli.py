@@ -258,10 +258,13 @@ def test_a_pattern_is_exported_from_its_folder_or_its_file(warpflat: Run):
     assert told == "out/cap.obj: is a file; give the folder of a run, where its pattern.json lies"
 
 
-def test_two_border_loops_are_flattened_or_refused_in_one_line(warpflat: Run):
+def test_a_tube_is_cut_open_with_a_note_and_a_line_of_ones_own_is_checked(warpflat: Run):
     Path("ring.obj").write_text(RING)
-    result = warpflat("flatten", "ring.obj", "--units", "m")
-    assert "border" in mistake(result)
+    code, _, told = warpflat("flatten", "ring.obj", "--units", "ft", "--no-picture")
+    assert code == 0
+    assert "it is a tube, cut open where its borders are nearest, 30.5 cm" in told
+    assert warpflat("flatten", "ring.obj", "--units", "ft", "--no-picture", "--open", "1,5")[0] == 0
+    assert "no line 'back'" in mistake(warpflat("flatten", "ring.obj", "--units", "ft", "--open", "back"))
 
 
 @pytest.mark.parametrize("suffix", ["ply", "stl", "glb", "usd", "usda", "usdc", "obj"])

@@ -6,18 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from devices import DEVICE
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.cutting.cut_plan import CutPlan
-from warpflat.cutting.separate_pieces import cut_surfaces
 from warpflat.export.read_pattern_json import read_pattern_json
-from warpflat.flattening.flatten_piece import flatten
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
-from warpflat.surface.io.read import read_surface
-from warpflat.surface.paths.lines import line_between
 
 pxr = pytest.importorskip("pxr")
 
@@ -143,27 +137,51 @@ def test_a_tip_moved_back_too_far_for_the_dart_as_it_lies_is_a_note(tmp_path: Pa
     assert any("dart 'd': tip_back is 142.0 mm; it must be 0 or more and less than" in note for note in result.notes)
 
 
-def test_a_tube_that_cuts_are_to_open_is_told_what_opens_it(tmp_path: Path):
-    """Cuts are made on the flat piece, which a tube cannot be; cut open on the body it can."""
+@pytest.mark.parametrize(
+    ("cuts", "at"), [([], None), ([{"name": "x", "from": 6, "to": 54}], 6)], ids=["nearest", "cut"]
+)
+def test_a_tube_is_cut_open_where_its_borders_are_nearest_or_along_a_cut(
+    cuts: list[dict[str, object]], at: int | None, tmp_path: Path
+):
     rim = [(0.05 * np.cos(a), 0.05 * np.sin(a)) for a in np.linspace(0.0, 2 * np.pi, 24, endpoint=False)]
-    lines = [f"v {x} {0.1 * row} {z}" for row in range(3) for x, z in rim]
+    lines = [f"v {x} {0.1 * row * (1.0 - 4.0 * x)} {z}" for row in range(3) for x, z in rim]
     lines += [
         "f " + " ".join(str(24 * (row + up) + (k + on) % 24 + 1) for up, on in ((0, 0), (0, 1), (1, 1), (1, 0)))
         for row in range(2)
         for k in range(24)
     ]
     (tmp_path / "tube.obj").write_text("\n".join(lines))
-    surface = {"file": str(tmp_path / "tube.obj"), "units": "m"}
-    data = {"surface": surface, "cuts": [{"name": "x", "from": 0, "to": 48}], **QUIET}
+    data = {"surface": {"file": str(tmp_path / "tube.obj"), "units": "m"}, "cuts": cuts, **QUIET}
     made = make_scene(data, name="tube", folder=tmp_path, where="tube.toml")
-    told = r"closed tube .*: cut it open along a line first, in the mesh .*cut_surfaces; \[\[cuts\]\] cut what is flat"
-    with pytest.raises(InputError, match=told):
-        run_scene(made, tmp_path / "out")
-    tube = read_surface(tmp_path / "tube.obj", units="m")
-    (open_tube,) = cut_surfaces(tube, [CutPlan(name="x", paths=(line_between(tube, 0, 48),))])
-    flat = flatten(open_tube, device=DEVICE)
-    assert flat.converged
-    assert flat.measures["length_error"] < 1e-3
+    result = run_scene(made, tmp_path / "out")
+    assert any("a tube, cut open where its borders are nearest, 16.0 cm" in note for note in result.notes) == (not cuts)
+    piece = result.metrics["pieces"]["tube"]
+    assert piece["converged"]
+    assert piece["length_error"] < 1e-3
+    pattern = read_pattern_json(tmp_path / "out" / "pattern.json")
+    (seam,) = pattern.seams
+    assert seam.name == ("x" if cuts else "opening")
+    height = 0.2 if cuts else 0.16
+    assert seam.length_mm == pytest.approx((1e3 * height, 1e3 * height), rel=1e-6)
+
+
+def test_a_cut_that_does_not_open_is_a_line_of_a_whole_pattern(tmp_path: Path):
+    """A placket in flat cloth, from the border, and a slit inside."""
+    flat = {"surface": {"shape": "cone", "resolution": 17}} | QUIET
+    lay = run_scene(make_scene(flat, name="flat", folder=tmp_path, where="flat.toml"), tmp_path / "whole")
+    whole = read_pattern_json(tmp_path / "whole" / "pattern.json").pieces[""][0]
+    assert lay.metrics["pieces"]["flat"]["strain_energy_j"] < 1e-9
+    for name, part in (("placket", [0.0, 0.5]), ("slit", [0.25, 0.75])):
+        cuts = [{"name": name, "line": "centre", "part": part}]
+        made = make_scene({**flat, "cuts": cuts}, name="flat", folder=tmp_path, where="flat.toml")
+        result = run_scene(made, tmp_path / name)
+        assert any(f"cut '{name}' opens by less than 0.1 mm" in note for note in result.notes)
+        drawn = read_pattern_json(tmp_path / name / "pattern.json").pieces[""][0]
+        assert {edge.kind for edge in drawn.edges} == {"seam"}
+        assert not drawn.darts
+        assert not drawn.fisheyes
+        assert sum(e.length for e in drawn.edges) == pytest.approx(sum(e.length for e in whole.edges), rel=1e-4)
+        assert name in drawn.internal_lines
 
 
 def test_a_plane_all_through_may_be_given_by_any_of_its_points(tmp_path: Path):

@@ -32,6 +32,13 @@ __all__ = ["flatten"]
     "middle]",
 )
 @click.option(
+    "--open",
+    "opening",
+    metavar="LINE",
+    help="Where a tube, such as a sleeve or a skirt, is cut open: two vertices A,B, one on each border, or a line of the file.  "
+    "[default: where its borders are nearest]",
+)
+@click.option(
     "--start",
     metavar="FILE",
     help="An OBJ file of the same mesh: relax from its texture coordinates.  [default: chosen by cost]",
@@ -65,6 +72,7 @@ def flatten(
     as_json: bool,
     device: str | None,
     datum: str | None,
+    opening: str | None,
     **options: Any,
 ) -> int:
     """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF or USD.
@@ -110,6 +118,11 @@ def flatten(
     elif datum is not None:
         # A USD curve becomes a line of its name.
         tables["datum"] = datum.rstrip("/").rpartition("/")[2]
+    if opening is not None and re.fullmatch(r"[0-9]{1,18},[0-9]{1,18}", opening):
+        start, end = opening.split(",")
+        tables["cuts"] = [{"name": "opening", "from": int(start), "to": int(end)}]
+    elif opening is not None:
+        tables["cuts"] = [{"line": opening.rstrip("/").rpartition("/")[2]}]
     scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
     try:
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)

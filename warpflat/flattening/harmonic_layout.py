@@ -10,6 +10,7 @@ from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
+from warpflat.surface.tubes import tube_borders
 
 __all__ = ["harmonic_layout"]
 
@@ -62,26 +63,10 @@ def harmonic_layout(surface: Surface) -> FloatArray:
 
 
 def refuse_tubes(surface: Surface) -> None:
-    """A flat ring turns once around at each of its borders, a closed tube at neither."""
-    for loop in border_loops(surface.faces, surface.vertices)[1:]:
-        corner_angle = _border_angles(surface)[loop]
-        turning = float((np.pi - corner_angle).sum())
-        if turning > -np.pi:
-            size = polyline_length(surface.vertices[loop], closed=True)
-            raise InputError(
-                f"piece {surface.name!r} is a closed tube (a second border, {100 * size:.0f} cm long, runs around it at "
-                f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first, in the mesh (its vertices "
-                "doubled there) or by warpflat.cutting.separate_pieces.cut_surfaces; [[cuts]] cut what is flat already"
-            )
-
-
-def _border_angles(surface: Surface) -> FloatArray:
-    """Return the sum of the triangles' angles at each vertex (#V) [rad]."""
-    triangles, _ = triangulate(surface.faces)
-    total = np.zeros(len(surface.vertices))
-    for k in range(3):
-        i, j, o = triangles[:, k], triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3]
-        u, v = surface.vertices[j] - surface.vertices[i], surface.vertices[o] - surface.vertices[i]
-        sine = np.linalg.norm(np.cross(u, v), axis=1)
-        total += np.bincount(i, np.arctan2(sine, np.einsum("ij,ij->i", u, v)), minlength=len(total))
-    return total
+    """Raise InputError for a closed tube."""
+    for loop in tube_borders(surface):
+        size = polyline_length(surface.vertices[loop], closed=True)
+        raise InputError(
+            f"piece {surface.name!r} is a closed tube (a second border, {100 * size:.0f} cm long, runs around it at "
+            f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first; warpflat.open_tube(surface) does"
+        )

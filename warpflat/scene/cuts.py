@@ -48,27 +48,32 @@ class CutSequence:
 
 
 def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutSequence:
-    """Work the paths of all cuts into the edges of a surface.
+    """Cut a tube open and work the paths of all other cuts into the edges of the surface.
 
     Raises:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
     """
+    surface, left, notes = _open_tubes(surface, dict(enumerate(tables)))
+    return replace(_plan_paths(surface, left), notes=notes)
+
+
+def _plan_paths(surface: Surface, tables: dict[int, CutTable]) -> CutSequence:
+    from warpflat.core.text import find_unused_name
     from warpflat.cutting.cut_plan import CutPlan, draw_line, line_part
     from warpflat.scene.load import errors_named
 
-    names = [table.name or table.line or f"cut {number}" for number, table in enumerate(tables, start=1)]
+    names = {number: table.name or table.line or f"cut {number + 1}" for number, table in tables.items()}
     drawn: dict[int, str] = {}
-    for number, (name, table) in enumerate(zip(names, tables, strict=True)):
+    for number, table in tables.items():
         if table.line is None:
-            line, copy = name, 2
-            while line in surface.lines:
-                line, copy = f"{name} {copy}", copy + 1
+            line = find_unused_name(names[number], surface.lines)
             with errors_named(f"cuts[{number}]"):
                 surface = draw_line(surface, line, _path(surface, table))
             drawn[number] = line
     paths: dict[str, list[IntArray]] = {}
     tip_back: dict[str, float] = {}
-    for number, (name, table) in enumerate(zip(names, tables, strict=True)):
+    for number, table in tables.items():
+        name = names[number]
         with errors_named(f"cuts[{number}]"):
             part = (0.0, 1.0) if table.part is None else (table.part[0], table.part[1])
             row = line_part(surface, table.line or drawn[number], part)
@@ -77,6 +82,41 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutSequence:
         tip_back[name] = max(tip_back.get(name, 0.0), table.tip_back)
     plans = tuple(CutPlan(name=name, paths=tuple(rows), tip_back=tip_back[name]) for name, rows in paths.items())
     return CutSequence(surface=surface, plans=plans, first_auto=len(plans))
+
+
+def _open_tubes(surface: Surface, tables: dict[int, CutTable]) -> tuple[Surface, dict[int, CutTable], tuple[str, ...]]:
+    """Cut a tube open along those cuts that do so, or else where its borders are nearest to each other.
+
+    Returns:
+        The surface, which is the same where it is no tube; the cuts that are left; and what was chosen, one sentence each.
+    """
+    from warpflat.cutting.cut_plan import make_cuts
+    from warpflat.cutting.open_tube import open_tube
+    from warpflat.surface.paths.edge_paths import path_length
+    from warpflat.surface.tubes import tube_borders
+
+    left, borders = dict(tables), len(tube_borders(surface))
+    for number, table in tables.items():
+        if borders:
+            sequence = _plan_paths(surface, {number: table})
+            opened = make_cuts(sequence.surface, sequence.plans).surface
+            if len(tube_borders(opened)) < borders:
+                surface, borders = opened, len(tube_borders(opened))
+                del left[number]
+    if not borders:
+        return surface, left, ()
+    opened = open_tube(surface)
+    lines = [line for name, line in opened.lines.items() if name not in surface.lines and name.endswith(".left")]
+    ends = " and ".join(f"from {_centimetres(opened, line[0])} to {_centimetres(opened, line[-1])}" for line in lines)
+    note = (
+        f"it is a tube, cut open where its borders are nearest, {100 * path_length(opened, lines):.1f} cm, {ends} cm; "
+        "[[cuts]] or --open choose another line"
+    )
+    return opened, left, (note,)
+
+
+def _centimetres(surface: Surface, vertex: int) -> str:
+    return f"({', '.join(f'{100 * x:.0f}' for x in surface.vertices[vertex])})"
 
 
 def _check_tip_back(surface: Surface, path: IntArray, tip_back: float) -> None:

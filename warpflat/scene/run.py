@@ -139,7 +139,7 @@ def _run_surface(
             more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
             files=drape_files,
             frames=wanted,
-            notes=(*result.messages, *sequence.notes),
+            notes=(*sequence.notes, *result.messages),
         )
 
 

@@ -114,7 +114,7 @@ def _solve_surface(
             result = cut(before.pieces[scene.name], plan, relax=scene_relax_options(scene), callback=each_step)
     else:
         result, _ = flatten_scene(scene, sequence, callback=each_step)
-    return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*result.messages, *sequence.notes))
+    return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*sequence.notes, *result.messages))
 
 
 def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutPlan | None:

@@ -1,0 +1,36 @@
+"""Tubes: surfaces with a border that runs around them, such as sleeves and skirts. None lies flat before it is cut open."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.surface.connectivity import border_loops
+from warpflat.surface.mesh import Surface
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["tube_borders"]
+
+
+def tube_borders(surface: Surface) -> list[IntArray]:
+    """Return the borders around which the surface is a tube, each a row of vertices; the longest border is none of them.
+
+    A flat ring turns once around at each of its borders, a tube at neither.
+    """
+    loops = border_loops(surface.faces, surface.vertices)
+    if len(loops) < 2:
+        return []
+    angle = _corner_angles(surface)
+    return [loop for loop in loops[1:] if float((np.pi - angle[loop]).sum()) > -np.pi]
+
+
+def _corner_angles(surface: Surface) -> FloatArray:
+    """Return the sum of the triangles' angles at each vertex (#V) [rad]."""
+    triangles, _ = triangulate(surface.faces)
+    total = np.zeros(len(surface.vertices))
+    for k in range(3):
+        i, j, o = triangles[:, k], triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3]
+        u, v = surface.vertices[j] - surface.vertices[i], surface.vertices[o] - surface.vertices[i]
+        sine = np.linalg.norm(np.cross(u, v), axis=1)
+        total += np.bincount(i, np.arctan2(sine, np.einsum("ij,ij->i", u, v)), minlength=len(total))
+    return total
