@@ -7,7 +7,7 @@ are refused with advice. Vertices that stay keep their order and their exact pos
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -16,11 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import check_file_name, check_label
-from warpflat.core.text import format_count, quote_value
+from warpflat.core.file_names import check_file_name
+from warpflat.core.text import format_count
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.mesh_lines import checked_line, renumber_lines
 from warpflat.surface.repair.polygons import (
     distinct_corners,
     list_some,
@@ -142,7 +143,7 @@ def _checked_surface(
 ) -> Surface:
     positions = check_positions(vertices)
     mesh = _checked_faces(positions, polygons)
-    paths = {key: _checked_line(key, line, len(positions)) for key, line in lines.items()}
+    paths = {key: checked_line(key, line, len(positions)) for key, line in lines.items()}
     place = _weld(mesh, weld, split_corners, component is not None)
     _drop_double_faces(mesh)
     _choose_component(mesh, component)
@@ -153,7 +154,10 @@ def _checked_surface(
         mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
     _separate_touching_fans(mesh)
     _drop_unused(mesh)
-    kept_lines = _renumber_lines(mesh, {key: place[path] for key, path in paths.items()})
+    kept_lines, off = renumber_lines(
+        mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
+    )
+    mesh.notes += off
     _check_border(mesh.half_edges)
     return _finish(mesh, kept_lines, name, positions, tolerance)
 
@@ -229,19 +233,6 @@ def _note_repeated(notes: list[str], dropped: NDArray[np.integer], reduced: NDAr
         notes.append(f"{format_count(len(dropped), 'face')} with repeated vertices dropped: {list_some(dropped)}")
     if len(reduced):
         notes.append(f"{format_count(len(reduced), 'face')} with a doubled corner reduced by it: {list_some(reduced)}")
-
-
-def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
-    check_label(name, "lines")
-    path = np.asarray(line)
-    if path.ndim != 1 or len(path) < 2 or not np.issubdtype(path.dtype, np.integer):
-        raise InputError(f"line {quote_value(name)} must be a list of at least two vertex indices")
-    wrong = path[(path < 0) | (path >= size)]
-    if len(wrong):
-        raise InputError(
-            f"line {quote_value(name)} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})"
-        )
-    return path.astype(np.int64)
 
 
 def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> IntArray:
@@ -380,47 +371,6 @@ def _drop_unused(mesh: _Mesh) -> None:
 def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
     """Return the vertices that faces (filled up with -1) have, sorted."""
     return np.flatnonzero(np.bincount(faces.ravel() + 1)[1:])
-
-
-def _renumber_lines(mesh: _Mesh, paths: Mapping[str, IntArray]) -> dict[str, list[int]]:
-    """Return lines given in input rows, in the mesh's own vertices; one off the component is left out with a note."""
-    if not paths:
-        return {}
-    places: dict[int, list[int]] = {}
-    wanted = np.isin(mesh.index, np.concatenate(list(paths.values())))
-    for vertex in np.flatnonzero(wanted).tolist():
-        places.setdefault(int(mesh.index[vertex]), []).append(vertex)
-    edges = {tuple(edge) for edge in mesh.half_edges.edges.tolist()}
-    lines = {}
-    for name, path in paths.items():
-        rows = [row for i, row in enumerate(path.tolist()) if i == 0 or row != path[i - 1]]
-        if not any(row in places for row in rows):
-            mesh.notes.append(f"line {quote_value(name)} does not lie on the piece and was left out")
-            continue
-        lines[name] = _trace_line(name, rows, places, edges)
-    return lines
-
-
-def _trace_line(
-    name: str, rows: list[int], places: dict[int, list[int]], edges: Iterable[tuple[int, ...]]
-) -> list[int]:
-    missing = [row for row in rows if row not in places]
-    if missing:
-        raise InputError(f"line {quote_value(name)} leaves the piece at vertex {missing[0]} (counted from 0)")
-    line: list[int] = []
-    for i, row in enumerate(rows):
-        choice = places[row]
-        if i > 0:
-            choice = [v for v in choice if (min(v, line[-1]), max(v, line[-1])) in edges]
-            if not choice:
-                raise InputError(
-                    f"line {quote_value(name)} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
-                )
-        elif len(choice) > 1 and len(rows) > 1:
-            follow = places[rows[1]]
-            choice = [v for v in choice if any((min(v, w), max(v, w)) in edges for w in follow)] or choice
-        line.append(choice[0])
-    return line
 
 
 def _check_border(he: HalfEdges) -> None:
