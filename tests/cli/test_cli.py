@@ -218,7 +218,7 @@ def test_components_are_chosen_by_the_option(warpflat: Run):
     assert "choose it with --component largest or a number from 0 to 1" in told
     for wrong in ("big", "-1"):
         told = mistake(warpflat("flatten", "two.obj", "--units", "m", "--component", wrong))
-        assert 'component: should be "largest" or a number from 0' in told
+        assert 'component: should be "largest", "all" or a number from 0' in told
 
 
 def test_parts_that_meet_without_common_vertices_are_told_so(warpflat: Run):

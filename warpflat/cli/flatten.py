@@ -19,7 +19,11 @@ __all__ = ["flatten"]
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
 @click.argument("mesh", type=click.Path(path_type=Path))
 @click.option("--units", metavar="UNIT", help="Unit of the file: m, cm, mm, in ... Needed unless the file says (USD).")
-@click.option("--component", metavar="WHICH", help="Which connected part: largest, or 0, 1, ... by size.")
+@click.option(
+    "--component",
+    metavar="WHICH",
+    help="Which connected part: largest, or 0, 1, ... by size; all makes a piece of each, and seams of edges that meet.",
+)
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
@@ -83,6 +87,7 @@ def flatten(
       warpflat flatten scan.ply --units mm --component largest --fabric jersey
       warpflat flatten dress.usdc --prim /World/front --datum /World/centre_front
       warpflat flatten front.obj --units m --datum 120,2087 --out front
+      warpflat flatten garment.obj --units cm --component all
     """
     from warpflat.scene.load import make_scene
 
@@ -127,7 +132,7 @@ def flatten(
     try:
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
     except InputError as error:
-        raise InputError(str(error).replace('component = "largest"', "--component largest")) from None
+        raise InputError(re.sub(r'component = "(largest|all)"', r"--component \1", str(error))) from None
 
 
 def _safe_name(mesh: Path) -> str:

@@ -20,7 +20,8 @@ from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
 from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, Edge, Hole
 from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
-from warpflat.surface.connectivity import border_loops
+from warpflat.surface.border_seams import SAME_PLACE
+from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.cut.dart import fish_eye_measure
 from warpflat.surface.cut.dart_legs import are_curved, pull_back, pull_back_eye
 
@@ -274,8 +275,8 @@ def _seams(
     seams: list[Seam] = [*named]
     for edges in _edges_by_ends(results, pieces, named):
         for (first, curve), (second, other) in combinations(edges, 2):
-            against = not np.array_equal(curve, other)
-            if len(curve) == len(other) and np.array_equal(curve, other[::-1] if against else other):
+            against = not _are_one(curve, other)
+            if _are_one(curve, other[::-1] if against else other):
                 name = first.edge.removesuffix(".left").removesuffix(".right")
                 name = find_unused_name(name, {seam.name for seam in seams})
                 sides = ((first,), (replace(second, reversed=against),))
@@ -283,18 +284,28 @@ def _seams(
     return tuple(seams)
 
 
+def _are_one(curve: FloatArray, other: FloatArray) -> bool:
+    return len(curve) == len(other) and bool(np.linalg.norm(curve - other, axis=1).max() < SAME_PLACE)
+
+
 def _edges_by_ends(
     results: Sequence[Flattening], pieces: Sequence[Piece], named: Sequence[Seam]
 ) -> list[list[tuple[SeamSide, FloatArray]]]:
     """Group the edges that may be sewn by their two ends in space, each with its curve (#P by 3 [m])."""
+    from scipy.spatial import cKDTree
+
     done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
-    groups: dict[tuple[bytes, ...], list[tuple[SeamSide, FloatArray]]] = {}
-    for result, piece in zip(results, pieces, strict=True):
-        vertices = result.network.surface.vertices
-        for edge in piece.edges:
-            if edge.kind not in ("seam", "cut") or edge.vertices is None or (piece.name, edge.name) in done:
-                continue
-            curve = vertices[edge.vertices]
-            ends = tuple(sorted((curve[0].tobytes(), curve[-1].tobytes())))
-            groups.setdefault(ends, []).append((SeamSide(piece=piece.name, edge=edge.name), curve))
+    edges = [
+        (SeamSide(piece=piece.name, edge=edge.name), result.network.surface.vertices[edge.vertices])
+        for result, piece in zip(results, pieces, strict=True)
+        for edge in piece.edges
+        if edge.kind in ("seam", "cut") and edge.vertices is not None and (piece.name, edge.name) not in done
+    ]
+    if not edges:
+        return []
+    ends = np.array([curve[[0, -1]] for _, curve in edges]).reshape(-1, 3)
+    place = join_labels(len(ends), *cKDTree(ends).query_pairs(SAME_PLACE, output_type="ndarray").T)
+    groups: dict[tuple[int, ...], list[tuple[SeamSide, FloatArray]]] = {}
+    for edge, here in zip(edges, np.sort(place.reshape(-1, 2), axis=1).tolist(), strict=True):
+        groups.setdefault(tuple(here), []).append(edge)
     return list(groups.values())

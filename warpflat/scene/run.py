@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
     from warpflat.garment.pattern_files import PatternOptions
+    from warpflat.garment.sew_pieces import SewnPieces
     from warpflat.garment.sew_surface import SewnSurface
-    from warpflat.scene.frames import FrameRecorder
+    from warpflat.scene.frames import Film, FrameRecorder
     from warpflat.scene.schema import SceneTable
 
 # From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
@@ -101,34 +102,45 @@ def _run_surface(
     from warpflat.scene.frames import Film
     from warpflat.scene.pattern_options import pattern_options
     from warpflat.scene.seams import scene_surface_seams
+    from warpflat.scene.surface import scene_pieces
 
     settings = scene.settings
     scene_relax_options(scene)  # a mistake is reported before anything is made
     with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         seams = scene_surface_seams(settings.seams, scene.name)
-    sequence = cuts or scene_cuts(scene, device=device)
-    _check_edges(scene, sequence, drawing)
+    parts = None if cuts is not None else scene_pieces(scene)
+    sequences = [cuts or scene_cuts(scene, device=device)] if parts is None else _opened(scene, parts)
+    _check_edges(scene, sequences, drawing)
+    surfaces = [sequence.surface for sequence in sequences]
+    notes = [note for sequence in sequences for note in sequence.notes]
     wanted = FrameSchedule(settings.output).wanted
-    require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
+    require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=wanted)
     with ExitStack() as beside:
-        with Film(folder, settings.output, [sequence.surface]) as film:
-            recorder = film.recorders[sequence.surface.name]
+        with Film(folder, settings.output, surfaces) as film:
 
-            def each_step(progress: Progress) -> bool | None:
-                recorder(progress)
+            def each_step(number: int, progress: Progress) -> bool | None:
+                film.recorders[surfaces[number].name](progress)
                 return None if on_progress is None else on_progress(progress)
 
-            result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
-            pieces = separate(result)
+            sewn: SewnSurface | SewnPieces | None
+            if parts is None:
+                recorder, callback = film.recorders[surfaces[0].name], partial(each_step, 0)
+                result, sewn = flatten_scene(scene, sequences[0], recorder=recorder, callback=callback, device=device)
+                pieces, whole = separate(result), [result]
+            else:
+                pieces, sewn = _flatten_pieces(scene, surfaces, film, callback=each_step, device=device)
+                whole = list(pieces)
+            notes += [message for piece in whole for message in piece.messages]
+            vertices = sum(len(surface.vertices) for surface in surfaces)
             fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
             pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
             drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
             pattern = Beside(drawn, "drafting the pattern")
-            if len(sequence.surface.vertices) < _MANY:
+            if vertices < _MANY:
                 beside.enter_context(pictures)
                 beside.enter_context(pattern)
-        drape_metrics, drape_files = write_drape(scene, result, folder, device=device)
+        drape_metrics, drape_files = write_drape(scene, whole[0], folder, device=device)
         return write_surface(
             scene,
             pieces,
@@ -139,7 +151,7 @@ def _run_surface(
             more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
             files=drape_files,
             frames=wanted,
-            notes=(*sequence.notes, *result.messages),
+            notes=notes,
         )
 
 
@@ -154,7 +166,7 @@ def files_of_run(scene: Scene) -> list[str]:
     worn = output.picture and settings.wear is not None
     asked = {
         "metrics.json": True,
-        f"{name}.obj": not garment,
+        f"{name}.obj": not garment and not _takes_all(settings),
         "frames.usdc": FrameSchedule(output).wanted,
         "picture.png": output.picture,
         "drape.png": output.picture and settings.drape is not None,
@@ -218,7 +230,61 @@ def flatten_scene(
     return sewn.result, sewn
 
 
-def _check_edges(scene: Scene, sequence: CutSequence, drawing: PatternOptions) -> None:
+def _takes_all(settings: SceneTable) -> bool:
+    """Return whether every part of a file is a piece."""
+    return getattr(settings.surface, "component", None) == "all"
+
+
+def _opened(scene: Scene, parts: Sequence[Surface]) -> list[CutSequence]:
+    """Return the pieces of a file, tubes among them cut open, with their seams as lines."""
+    from warpflat.garment.sew_pieces import name_seams
+    from warpflat.scene.cuts import plan_cuts
+
+    with errors_named(scene.where):
+        sequences = [plan_cuts(part, []) for part in parts]
+    return [
+        replace(sequence, surface=surface, notes=tuple(f"{surface.name}: {note}" for note in sequence.notes))
+        for sequence, surface in zip(sequences, name_seams([each.surface for each in sequences]), strict=True)
+    ]
+
+
+def _flatten_pieces(
+    scene: Scene,
+    surfaces: Sequence[Surface],
+    film: Film,
+    *,
+    callback: Callable[[int, Progress], bool | None],
+    device: str | None,
+) -> tuple[tuple[Flattening, ...], SewnPieces | None]:
+    """Flatten all pieces of a file, and sew borders that meet."""
+    from warpflat.flattening.flatten_all import flatten_all
+    from warpflat.garment.sew_pieces import sew_pieces
+
+    settings, relax = scene.settings, scene_relax_options(scene)
+    with errors_named(scene.where):
+        pieces = tuple(
+            flatten_all(
+                surfaces,
+                fabric=scene_fabric(scene),
+                grain_angle=settings.grain_angle,
+                model=settings.model,
+                wear=scene_wear(scene),
+                relax=relax,
+                callback=callback,
+                device=device or settings.device,
+            )
+        )
+        for piece in pieces:
+            film.recorders[piece.surface.name].record_result(piece)
+        sewn = sew_pieces(pieces, options=relax)
+    if sewn is None:
+        return pieces, None
+    for piece in sewn.pieces:
+        film.recorders[piece.surface.name].record_result(piece)
+    return sewn.pieces, sewn
+
+
+def _check_edges(scene: Scene, sequences: Sequence[CutSequence], drawing: PatternOptions) -> None:
     """Check that the pattern's kinds and allowances name edges, and its names pieces, whichever of the automatic cuts are made.
 
     Raises:
@@ -233,10 +299,13 @@ def _check_edges(scene: Scene, sequence: CutSequence, drawing: PatternOptions) -
         return
     with errors_named(scene.where):
         surfaces = [
-            piece for count in sequence.counts for piece in cut_surfaces(sequence.surface, list(sequence.plans[:count]))
+            piece
+            for sequence in sequences
+            for count in sequence.counts
+            for piece in cut_surfaces(sequence.surface, list(sequence.plans[:count]))
         ]
     with errors_named(f"{scene.where}: pattern"):
-        check_edge_names(surfaces, rules, cuts=[plan.name for plan in sequence.plans])
+        check_edge_names(surfaces, rules, cuts=[plan.name for sequence in sequences for plan in sequence.plans])
         check_names(drawing.names, {surface.name: None for surface in surfaces})
 
 

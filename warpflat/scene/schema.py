@@ -43,12 +43,12 @@ __all__ = [
 
 
 def _as_component(value: Any) -> Any:
-    if value != "largest" and not (is_number(value, whole=True) and value >= 0):
-        raise ValueError(f'should be "largest" or a number from 0, largest first; got {quote_value(value)}')
+    if value not in ("largest", "all") and not (is_number(value, whole=True) and value >= 0):
+        raise ValueError(f'should be "largest", "all" or a number from 0, largest first; got {quote_value(value)}')
     return value
 
 
-Component = Annotated[Literal["largest"] | int, BeforeValidator(_as_component)]
+Component = Annotated[Literal["largest", "all"] | int, BeforeValidator(_as_component)]
 
 
 def text_or_table(value: Any) -> str:
@@ -61,6 +61,7 @@ class FileSurface(Table):
     file: str = Field(min_length=1)
     units: str | None = None
     component: Component | None = None
+    """Which connected part of the mesh; with "all" every part of every object is a piece, and edges that meet in space are seams."""
     prim: str | None = None
 
     @model_validator(mode="before")
@@ -337,6 +338,10 @@ class SceneTable(Table):
             raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
         if self.ease is not None:
             raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
+        if isinstance(self.surface, FileSurface) and self.surface.component == "all":
+            for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "constraints", "drape"):
+                if getattr(self, key):
+                    raise ValueError(f'{key} belongs to one piece; with component = "all" leave it out')
         for number, cut in enumerate(self.cuts):
             cut.check_for_surface(f"cuts[{number}]")
         if self.half:

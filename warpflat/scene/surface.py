@@ -9,6 +9,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.scene.load import Scene, errors_named, expand_variables
 from warpflat.scene.schema import (
     BorderTable,
+    FileSurface,
     LineTable,
     ShapeSurface,
 )
@@ -17,7 +18,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.border import SIDES, line_on_border
 from warpflat.surface.paths.lines import line_between, line_from_curve, line_from_indices, line_on_plane, with_lines
 
-__all__ = ["scene_surface"]
+__all__ = ["scene_pieces", "scene_surface"]
 
 
 def scene_surface(scene: Scene) -> Surface:
@@ -40,6 +41,10 @@ def scene_surface(scene: Scene) -> Surface:
     else:
         with errors_named(f"{scene.where}: surface.file"):
             path = scene.folder / expand_variables(table.file)
+        if table.component == "all":
+            raise InputError(
+                f'{scene.where}: surface.component: this needs one piece; "all" is for `warpflat run` and `flatten`'
+            )
         surface = read_surface(path, units=table.units, component=table.component, prim=table.prim, name=scene.name)
     surface = replace(surface, name=scene.name)
     for name, line in scene.settings.lines.items():
@@ -58,6 +63,22 @@ def scene_surface(scene: Scene) -> Surface:
     with errors_named(f"{scene.where}: seams"):
         surface_seams(surface, named)
     return surface
+
+
+def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
+    """Read all pieces of a scene whose `surface.component` is "all"; None for other scenes.
+
+    Raises:
+        InputError: the file is wrong, or an environment variable is not set.
+    """
+    from warpflat.surface.io.read_pieces import read_pieces
+
+    table = scene.settings.surface
+    if not isinstance(table, FileSurface) or table.component != "all":
+        return None
+    with errors_named(f"{scene.where}: surface.file"):
+        path = scene.folder / expand_variables(table.file)
+    return read_pieces(path, units=table.units, name=scene.name)
 
 
 def _line(surface: Surface, table: LineTable) -> IntArray:

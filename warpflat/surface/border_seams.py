@@ -19,9 +19,11 @@ from warpflat.core.polyline import arc_lengths, project_on_segments
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
 
-__all__ = ["NamedSeam", "SurfaceSeam", "surface_seams"]
+__all__ = ["SAME_PLACE", "NamedSeam", "SurfaceSeam", "surface_seams"]
 
 
+#: Points nearer to each other than this [m] are at one place in space.
+SAME_PLACE = 1e-5
 #: Sides that keep this near [m] to each other in space are one curve.
 _SHARED = 1e-3
 #: Other sides differ in length by no more than these shares: any, and those with as many vertices.

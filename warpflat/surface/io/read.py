@@ -20,13 +20,14 @@ from warpflat.surface.io.read_obj import read_obj
 from warpflat.surface.io.read_off import read_off
 from warpflat.surface.io.read_trimesh import GLTF, read_with_trimesh
 from warpflat.surface.io.read_usd import read_usd
+from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import line_from_curve, with_lines
 from warpflat.surface.repair.polygons import distinct_corners, pad_corners, split_polygons
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 from warpflat.surface.repair.validate import check_positions, make_surface
 
-__all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_scan", "read_surface"]
+__all__ = ["METRES_PER_UNIT", "SUFFIXES", "RawMesh", "check_size", "read_mesh_file", "read_scan", "read_surface"]
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
@@ -39,8 +40,19 @@ _USUAL = (0.02, 5.0)
 
 
 @dataclass(kw_only=True)
-class _Raw:
-    """A mesh as any format gives it; `scale` is metres per unit, None where the file does not say."""
+class RawMesh:
+    """A mesh as any format gives it.
+
+    Attributes:
+        vertices: #V by 3, in the file's unit.
+        polygons: #F by the largest corner count, filled up with -1.
+        scale: metres per unit, None where the file does not say.
+        split_corners: whether the format has one vertex per corner of a face, or per texture coordinate.
+        name: of the mesh in the file.
+        curves: #P by 3 by name; `chains`: vertices by name.
+        notes: one sentence each.
+        groups: objects, nodes or prims as (first vertex, name), in their order.
+    """
 
     vertices: FloatArray
     polygons: NDArray[np.int64]
@@ -50,6 +62,7 @@ class _Raw:
     curves: dict[str, FloatArray] = field(default_factory=dict)
     chains: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    groups: list[tuple[int, str]] = field(default_factory=list)
 
 
 def read_surface(
@@ -82,21 +95,7 @@ def read_surface(
     Raises:
         InputError: one line that names the file.
     """
-    expect(path, (str, PathLike), "path", "that of a mesh file")
-    file = Path(path)
-    note_read(file)
-    report_activity(f"reading {file.name}")
-    sources = [file.absolute()]
-    try:
-        if name:
-            check_file_name(name)
-        with listening_to_reads(sources.append):
-            raw, scale = _read_with_unit(file, units, prim)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from error
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
-    report_activity("checking the mesh")
+    file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim, name=name)
     if component is None:
         _refuse_stray_vertex(raw, scale, file)
     surface = make_surface(
@@ -109,7 +108,7 @@ def read_surface(
         split_corners=raw.split_corners,
         source=str(file),
     )
-    _check_size(surface, file, scale)
+    check_size(surface, file, scale)
     surface = _snap_curves(surface, {plain_label(key): curve * scale for key, curve in raw.curves.items()})
     return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
 
@@ -135,7 +134,36 @@ def read_scan(path: str | PathLike[str]) -> tuple[FloatArray, IntArray]:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
 
 
-def _read_with_unit(file: Path, units: str | None, prim: str | None) -> tuple[_Raw, float]:
+def read_mesh_file(
+    path: str | PathLike[str], *, units: str | None, prim: str | None, name: str | None
+) -> tuple[Path, RawMesh, float, list[Path]]:
+    """Read a mesh file as it stands.
+
+    Returns:
+        The file, its mesh, the metres per unit, and the files that were read for it.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    expect(path, (str, PathLike), "path", "that of a mesh file")
+    file = Path(path)
+    note_read(file)
+    report_activity(f"reading {file.name}")
+    sources = [file.absolute()]
+    try:
+        if name:
+            check_file_name(name)
+        with listening_to_reads(sources.append):
+            raw, scale = _read_with_unit(file, units, prim)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    report_activity("checking the mesh")
+    return file, raw, scale, sources
+
+
+def _read_with_unit(file: Path, units: str | None, prim: str | None) -> tuple[RawMesh, float]:
     """Read a mesh file, and return the metres per unit beside it.
 
     Raises:
@@ -164,35 +192,50 @@ def _check_file(file: Path) -> None:
         raise InputError("is empty")
 
 
-def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
+def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
     suffix = file.suffix.lower()
     scale = METRES_PER_UNIT[units] if units else None
     if suffix in _USD:
-        mesh = read_usd(file, prim=prim, metres_per_unit=scale)
-        return _Raw(
-            vertices=mesh.vertices,
-            polygons=pad_corners(mesh.corners, mesh.sizes),
+        usd = read_usd(file, prim=prim, metres_per_unit=scale)
+        return RawMesh(
+            vertices=usd.vertices,
+            polygons=pad_corners(usd.corners, usd.sizes),
             scale=1.0,
-            name=mesh.name,
-            curves=mesh.curves,
-            notes=mesh.notes,
+            name=usd.name,
+            curves=usd.curves,
+            notes=usd.notes,
+            groups=usd.groups,
         )
+    if prim == ALL_PRIMS:
+        prim = None
     if prim is not None and suffix not in GLTF:
         raise InputError(f"prim = {prim!r} only means something in a USD or GLB file; use component to choose a part")
     if suffix == ".obj":
         return _from_obj(file, scale)
     if suffix == ".off":
         vertices, polygons = read_off(file)
-        return _Raw(vertices=vertices, polygons=polygons, scale=scale)
-    vertices, triangles, split_corners = read_with_trimesh(file, node=prim)
+        return RawMesh(vertices=vertices, polygons=polygons, scale=scale)
+    mesh = read_with_trimesh(file, node=prim)
     if scale is None and suffix in GLTF:
         scale = 1.0
-    return _Raw(vertices=vertices, polygons=triangles, scale=scale, split_corners=split_corners)
+    return RawMesh(
+        vertices=mesh.vertices,
+        polygons=mesh.faces,
+        scale=scale,
+        split_corners=mesh.split_corners,
+        groups=mesh.groups,
+    )
 
 
-def _from_obj(file: Path, scale: float | None) -> _Raw:
+def _from_obj(file: Path, scale: float | None) -> RawMesh:
     obj = read_obj(file)
-    raw = _Raw(vertices=obj.vertices, polygons=obj.polygons, scale=scale, split_corners=obj.split_corners)
+    raw = RawMesh(
+        vertices=obj.vertices,
+        polygons=obj.polygons,
+        scale=scale,
+        split_corners=obj.split_corners,
+        groups=obj.groups,
+    )
     if not obj.lines:
         return raw
     edges = _directed_edges(obj.polygons)
@@ -220,7 +263,7 @@ def _directed_edges(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.unique(np.concatenate([a * stride + b, b * stride + a]))
 
 
-def _refuse_stray_vertex(raw: _Raw, scale: float, file: Path) -> None:
+def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:
     """Name a vertex far from all others, which would otherwise show as a piece too large, or as slivers.
 
     Raises:
@@ -242,7 +285,7 @@ def _extent(points: FloatArray, scale: float) -> str:
     return " x ".join(f"{side:.3g}" for side in (np.ptp(points, axis=0) * scale).tolist())
 
 
-def _ask_for_units(raw: _Raw) -> str:
+def _ask_for_units(raw: RawMesh) -> str:
     used = np.unique(raw.polygons[raw.polygons >= 0])
     points = raw.vertices[used[used < len(raw.vertices)]]
     points = points[np.isfinite(points).all(axis=1)]
@@ -253,7 +296,12 @@ def _ask_for_units(raw: _Raw) -> str:
     )
 
 
-def _check_size(surface: Surface, file: Path, scale: float) -> None:
+def check_size(surface: Surface, file: Path, scale: float) -> None:
+    """Check that a piece of a file of this scale [metres per unit] is as large as a piece of a garment can be.
+
+    Raises:
+        InputError: it is not; names the unit that would be right.
+    """
     size = float(np.ptp(surface.vertices, axis=0).max())
     if _POSSIBLE[0] <= size <= _POSSIBLE[1]:
         return

@@ -34,12 +34,14 @@ class ObjMesh:
         polygons: #F by the largest corner count, vertex indices from 0, filled up with -1.
         lines: line elements by the name of their group or object, each a list of chains of vertex indices.
         split_corners: the exporter wrote one `v` per texture coordinate.
+        groups: objects and groups as (first vertex, name), in their order.
     """
 
     vertices: FloatArray
     polygons: NDArray[np.int64]
     lines: dict[str, list[list[int]]] = field(default_factory=dict)
     split_corners: bool = False
+    groups: list[tuple[int, str]] = field(default_factory=list)
 
 
 @dataclass
@@ -53,6 +55,7 @@ class _Statements:
     face_seen: list[int] = field(default_factory=list)
     lines: list[tuple[str, str, int, int]] = field(default_factory=list)
     texture: int = 0
+    groups: list[tuple[int, str]] = field(default_factory=list)
 
 
 def read_obj(path: Path) -> ObjMesh:
@@ -80,6 +83,7 @@ def read_obj(path: Path) -> ObjMesh:
         polygons=polygons,
         lines=_line_elements(statements, len(vertices)),
         split_corners=_split_per_texture(statements, len(vertices)),
+        groups=statements.groups,
     )
 
 
@@ -98,6 +102,7 @@ def _plain_mesh(raw: bytes) -> ObjMesh | None:
         polygons=pad_corners(plain.corners, plain.counts),
         lines=_line_elements(found, len(plain.vertices)),
         split_corners=plain.split_corners,
+        groups=found.groups,
     )
 
 
@@ -142,8 +147,9 @@ def _collect_line(found: _Statements, line: str, number: int, seen: int, group: 
         found.texture += 1
     elif key == "l":
         found.lines.append((group, rest, number, seen))
-    elif key in ("g", "o"):
-        return rest.strip() or group
+    elif key in ("g", "o") and rest.strip():
+        group = rest.strip()
+        found.groups.append((seen, group))
     return group
 
 

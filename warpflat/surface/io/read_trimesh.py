@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +22,29 @@ __all__ = ["GLTF", "read_with_trimesh"]
 GLTF = (".glb", ".gltf")
 
 
-def read_with_trimesh(file: Path, *, node: str | None) -> tuple[FloatArray, NDArray[np.int64], bool]:
+@dataclass(frozen=True, kw_only=True)
+class TrimeshMesh:
+    """The meshes of a file as one.
+
+    Attributes:
+        vertices: #V by 3, positions in the file's unit.
+        faces: #F by 3 vertices.
+        split_corners: whether the format splits vertices per corner of a face or per texture coordinate.
+        groups: the nodes as (first vertex, name), in their order.
+    """
+
+    vertices: FloatArray
+    faces: NDArray[np.int64]
+    split_corners: bool
+    groups: list[tuple[int, str]]
+
+
+def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
     """Read a file's meshes as one.
 
     Args:
         file: .ply, .stl, .glb or .gltf.
         node: the name of the one node of a scene to read; None for all.
-
-    Returns:
-        #V by 3, positions in the file's unit; #F by 3 vertices; and whether the format splits vertices per corner of a face or
-        per texture coordinate.
 
     Raises:
         InputError: without the file's name: it cannot be read, has no such node, or no faces.
@@ -45,11 +59,12 @@ def read_with_trimesh(file: Path, *, node: str | None) -> tuple[FloatArray, NDAr
             raise InputError(f"there is no mesh node {node!r}; {nearest(node, names)}")
     if not any(len(faces) for _, _, faces in meshes):
         raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
-    start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)])
-    return (
-        np.concatenate([vertices for _, vertices, _ in meshes]),
-        np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
-        suffix in (".stl", *GLTF) or (suffix == ".ply" and _is_textured(scene)),
+    start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)]).tolist()
+    return TrimeshMesh(
+        vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
+        faces=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
+        split_corners=suffix in (".stl", *GLTF) or (suffix == ".ply" and _is_textured(scene)),
+        groups=[(at, name) for (name, _, _), at in zip(meshes, start, strict=False)] if suffix in GLTF else [],
     )
 
 

@@ -20,21 +20,24 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.memory_limit import require_memory_for_usd
 from warpflat.core.text import quote_value
 
-__all__ = ["UNREADABLE", "UsdMesh", "answer", "read_usd_stage"]
+__all__ = ["ALL_PRIMS", "UNREADABLE", "UsdMesh", "answer", "read_usd_stage"]
 
 # Memory that reading may take beside the library's own, and more per byte of the file, since lists of corners pack tightly [bytes].
 _MEMORY, _MEMORY_PER_BYTE = 2**30, 200
 _SECONDS, _BYTES_PER_SECOND = 20, 10**6
+
+#: Stands for all mesh prims of a stage.
+ALL_PRIMS = "*"
 
 UNREADABLE = "not a readable USD file: damaged, cut short, or with values of another type than its schema's"
 
 
 @dataclass(kw_only=True)
 class UsdMesh:
-    """A mesh of a stage, with its curves.
+    """A mesh of a stage, or several as one, with its curves.
 
     Attributes:
-        name: of the prim.
+        name: of the prim, the first of several.
         vertices: #V by 3 [m], Y up.
         sizes: #F, the number of corners of each face.
         corners: the vertex indices of all faces' corners, one face after the other, wound as USD's right-handed faces are.
@@ -42,6 +45,7 @@ class UsdMesh:
             name, #P by 3 [m]; a periodic one repeats its first point.
         notes: what could not be read, one sentence each.
         layers: the files of which the stage is composed.
+        groups: the meshes as (first vertex, name of the prim), in their order.
     """
 
     name: str
@@ -51,6 +55,7 @@ class UsdMesh:
     curves: dict[str, FloatArray] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     layers: list[str] = field(default_factory=list)
+    groups: list[tuple[int, str]] = field(default_factory=list)
 
 
 def read_usd_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
@@ -58,7 +63,7 @@ def read_usd_stage(path: Path, *, prim: str | None, metres_per_unit: float | Non
 
     Args:
         path: .usd, .usda, .usdc or .usdz.
-        prim: the path of the mesh prim, or its name where that is unique; needed if there are several.
+        prim: the path of the mesh prim, or its name where that is unique; needed if there are several; `ALL_PRIMS` for all.
         metres_per_unit: overrides what the stage says.
 
     Raises:
@@ -133,7 +138,6 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
     if not stage:
         raise InputError(UNREADABLE)
     chosen = _choose(stage, prim)
-    mesh = UsdGeom.Mesh(chosen)
     notes: list[str] = []
     if metres_per_unit is None:
         metres_per_unit = float(UsdGeom.GetStageMetersPerUnit(stage))
@@ -154,14 +158,24 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
             world = np.column_stack([world[:, 0], world[:, 2], -world[:, 1]])
         return world * metres_per_unit, bool(np.linalg.det(matrix[:3, :3]) < 0)
 
-    sizes, corners = _faces(mesh)
-    vertices, mirrored = to_metres(_value(mesh.GetPointsAttr()), chosen)
-    left_handed = _value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
-    if left_handed != mirrored:
-        corners = _turned(sizes, corners)
-    out = UsdMesh(name=chosen.GetName(), vertices=vertices, sizes=sizes, corners=corners, notes=notes)
-    out.layers = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
-    for curves in _curve_prims(chosen):
+    parts = []
+    for one in chosen:
+        mesh = UsdGeom.Mesh(one)
+        sizes, corners = _faces(mesh)
+        vertices, mirrored = to_metres(_value(mesh.GetPointsAttr()), one)
+        left_handed = _value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
+        parts.append((vertices, sizes, _turned(sizes, corners) if left_handed != mirrored else corners))
+    start = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)]).tolist()
+    out = UsdMesh(
+        name=chosen[0].GetName(),
+        vertices=np.concatenate([vertices for vertices, _, _ in parts]),
+        sizes=np.concatenate([sizes for _, sizes, _ in parts]),
+        corners=np.concatenate([corners + at for (_, _, corners), at in zip(parts, start, strict=False)]),
+        notes=notes,
+        layers=[layer.realPath for layer in stage.GetUsedLayers() if layer.realPath],
+        groups=[(at, one.GetName()) for one, at in zip(chosen, start, strict=False)],
+    )
+    for curves in _curve_prims(chosen[0]) if len(chosen) == 1 else []:
         _add_curves(out, UsdGeom.BasisCurves(curves), to_metres)
     return out
 
@@ -174,23 +188,25 @@ def _value(attribute: Any) -> Any:
     return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
 
 
-def _choose(stage: Any, prim: str | None) -> Any:
+def _choose(stage: Any, prim: str | None) -> list[Any]:
     from pxr import Usd, UsdGeom
 
     meshes = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
     paths = [str(p.GetPath()) for p in meshes]
     if not meshes:
         raise InputError("holds no mesh prim")
+    if prim == ALL_PRIMS:
+        return meshes
     if prim is None:
         if len(meshes) > 1:
             some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
             raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
-        return meshes[0]
+        return meshes
     found = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
     if len(found) != 1:
         what = "is not a mesh prim" if not found else "names several mesh prims"
         raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
-    return found[0]
+    return found
 
 
 def _faces(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -32,12 +32,16 @@ from warpflat.surface.repair.polygons import (
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
 
-__all__ = ["check_positions", "make_surface"]
+__all__ = ["ClosedSurfaceError", "check_positions", "count_parts", "make_surface"]
 
 # Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
 _SMALLEST, _LARGEST = 1e-20, 1e20
 # Odd factors by which the vertices of a face are mixed to one number.
 _HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93], dtype=np.uint64)
+
+
+class ClosedSurfaceError(InputError):
+    """A surface without a border."""
 
 
 @dataclass
@@ -127,7 +131,22 @@ def make_surface(
             tolerance=sliver_tolerance,
         )
     except InputError as error:
-        raise InputError(f"{source or name}: {error}") from error
+        raise type(error)(f"{source or name}: {error}") from error
+
+
+def count_parts(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool) -> int:
+    """Return the number of connected parts, of which `component` of :func:`make_surface` takes one.
+
+    Args:
+        vertices, polygons: as :func:`make_surface`.
+        weld: whether vertices at the same place are joined before.
+
+    Raises:
+        InputError: without the input's name, as :func:`make_surface`.
+    """
+    mesh = _checked_faces(check_positions(vertices), polygons)
+    _weld(mesh, weld, split_corners=False, chosen=True)
+    return int(mesh.part.max()) + 1
 
 
 def _checked_surface(
@@ -291,7 +310,7 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
                 )
             raise InputError(
                 f"{len(sizes):,} components that share no edge, of {_sizes(sizes[rank])} faces; a piece is one: choose "
-                f"it with {valid}, or give each in a file of its own"
+                f'it with {valid}, or take all with component = "all" (in Python warpflat.read_pieces)'
             )
         return
     if component == "largest":
@@ -376,7 +395,7 @@ def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
 def _check_border(he: HalfEdges) -> None:
     loops = border_loops(he)
     if not loops:
-        raise InputError(
+        raise ClosedSurfaceError(
             "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled there, or give the part that "
             "becomes one piece of cloth; [[cuts]] cut what is flat already"
         )

@@ -1,0 +1,115 @@
+"""All pieces of a garment from one file: read apart, named, flattened, and sewn where their borders meet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from warpflat.core.errors import InputError
+from warpflat.export.read_pattern_json import read_pattern_json
+from warpflat.garment.sew_pieces import meeting_borders
+from warpflat.scene.load import make_scene
+from warpflat.scene.run import run_scene
+from warpflat.surface.io.read_pieces import read_pieces
+
+QUIET = {"output": {"frames": 0, "picture": False}}
+
+
+def _barrel() -> dict[str, trimesh.Trimesh]:
+    """Front and back of a barrel that is 60 mm wider at its middle, and a button."""
+    v = np.linspace(0.0, 1.0, 13)
+    parts = {}
+    for name, start in (("front", 0.0), ("back", np.pi)):
+        a = start + np.linspace(0.0, np.pi, 17)
+        radius = 0.1 + 0.03 * np.sin(np.pi * v)[None, :]
+        points = np.stack(
+            [radius * np.cos(a)[:, None], np.broadcast_to(0.4 * v, (17, 13)), radius * np.sin(a)[:, None]], axis=-1
+        )
+        at = np.arange(17 * 13).reshape(17, 13)
+        quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        parts[name] = trimesh.Trimesh(points.reshape(-1, 3).round(9), triangles, process=False)
+    parts["button"] = trimesh.creation.icosphere(1, 0.01)
+    return parts
+
+
+def _write_obj(path: Path, parts: dict[str, trimesh.Trimesh], *, named: bool = True, textured: bool = False) -> None:
+    lines, first = list[str](), 1
+    for name, mesh in parts.items():
+        lines += [f"o {name}"] if named else []
+        lines += [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
+        lines += [f"vt {k / 1000} 0" for k in range(len(mesh.vertices))] if textured else []
+        corner = "{0}/{0}" if textured else "{0}"
+        lines += ["f " + " ".join(corner.format(first + k) for k in face) for face in mesh.faces.tolist()]
+        first += len(mesh.vertices)
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize("kind", ["named.obj", "plain.obj", "textured.obj", "scene.glb", "stage.usda"])
+def test_pieces_stay_apart_in_any_format(kind: str, tmp_path: Path):
+    parts, path = _barrel(), tmp_path / kind
+    if path.suffix == ".obj":
+        _write_obj(path, parts, named=kind == "named.obj", textured=kind == "textured.obj")
+    elif path.suffix == ".glb":
+        scene = trimesh.Scene()
+        for name, mesh in parts.items():
+            scene.add_geometry(mesh, node_name=name, geom_name=name)
+        scene.export(path)
+    else:
+        pxr = pytest.importorskip("pxr")
+        from pxr import Usd, UsdGeom
+
+        assert pxr
+        stage = Usd.Stage.CreateNew(str(path))
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        for name, mesh in parts.items():
+            prim = UsdGeom.Mesh.Define(stage, f"/{name}")
+            prim.GetPointsAttr().Set([tuple(point) for point in mesh.vertices.tolist()])
+            prim.GetFaceVertexCountsAttr().Set([3] * len(mesh.faces))
+            prim.GetFaceVertexIndicesAttr().Set(mesh.faces.ravel().tolist())
+        stage.Save()
+    pieces = read_pieces(path, units="m" if path.suffix == ".obj" else None)
+    names = [f"{path.stem}_1", f"{path.stem}_2"] if kind in ("plain.obj", "textured.obj") else ["front", "back"]
+    assert sorted(piece.name for piece in pieces) == sorted(names)
+    assert any("1 closed part, such as a button, left out" in note for note in pieces[0].notes)
+    pairs = meeting_borders({piece.name: piece for piece in pieces})
+    assert len(pairs) == 2
+    for pair in pairs:
+        one, other = (
+            next(p for p in pieces if p.name == name).vertices[row]
+            for name, row in zip(pair.pieces, pair.vertices, strict=True)
+        )
+        assert len(one) == 13
+        np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+def test_a_garment_is_flattened_and_its_seams_match(tmp_path: Path):
+    _write_obj(tmp_path / "barrel.obj", _barrel())
+    data = {"surface": {"file": str(tmp_path / "barrel.obj"), "units": "m", "component": "all"}, **QUIET}
+    made = make_scene(data, name="barrel", folder=tmp_path, where="barrel.toml")
+    result = run_scene(made, tmp_path / "out")
+    assert set(result.metrics["pieces"]) == {"front", "back"}
+    assert all(piece["converged"] and not piece["flipped_faces"] for piece in result.metrics["pieces"].values())
+    assert [seam["name"] for seam in result.metrics["seams"]] == ["front to back", "front to back 2"]
+    assert all(abs(seam["difference_mm"]) < 0.01 for seam in result.metrics["seams"])
+    pattern = read_pattern_json(tmp_path / "out" / "pattern.json")
+    assert {side for seam in pattern.seams for side in seam.sides} == {
+        "front.to back",
+        "front.to back 2",
+        "back.to front",
+        "back.to front 2",
+    }
+    assert all(seam.matches for seam in pattern.seams)
+
+
+def test_what_belongs_to_one_piece_is_refused(tmp_path: Path):
+    surface = {"file": "barrel.obj", "units": "m", "component": "all"}
+    with pytest.raises(InputError, match='datum belongs to one piece; with component = "all" leave it out'):
+        make_scene({"surface": surface, "datum": "left"}, name="barrel", folder=tmp_path, where="barrel.toml")
+    _write_obj(tmp_path / "ball.obj", {"ball": trimesh.creation.icosphere(2, 0.1)})
+    with pytest.raises(InputError, match=r"ball\.obj: every part is closed .* give the layer of cloth alone"):
+        read_pieces(tmp_path / "ball.obj", units="m")

@@ -1,0 +1,101 @@
+"""All pieces of a garment from one file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import make_file_name
+from warpflat.core.text import format_count
+from warpflat.surface.io.read import RawMesh, check_size, read_mesh_file
+from warpflat.surface.io.usd_stage import ALL_PRIMS
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import ClosedSurfaceError, count_parts, make_surface
+
+__all__ = ["read_pieces"]
+
+
+def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: str | None = None) -> tuple[Surface, ...]:
+    """Read all pieces of a garment: each connected part of each object of an OBJ file, node of a GLB scene or mesh prim of a USD stage.
+
+    Objects are repaired and checked each on its own, so that pieces stay apart whose borders lie at one place, as along a seam. They are
+    named as in the file; those without a name are numbered, as are the parts of one object. Closed parts, such as buttons, are left out
+    with a note.
+
+    Args:
+        path: the file.
+        units: as :func:`warpflat.read_surface`.
+        name: for pieces that have none in the file; by default the file's stem.
+
+    Returns:
+        The pieces, in the order of the file; `input_vertices` are those of the piece's object.
+
+    Raises:
+        InputError: one line that names the file, and the object where there are several.
+    """
+    file, raw, scale, sources = read_mesh_file(path, units=units, prim=ALL_PRIMS, name=name)
+    vertices = raw.vertices * scale
+    found: list[Surface] = []
+    closed = 0
+    objects = list(_objects(raw, name or make_file_name(file.stem)))
+    for title, first, polygons in objects:
+        own = vertices[first : first + int(polygons.max()) + 1]
+        source = str(file) if len(objects) == 1 else f"{file}: {title}"
+        try:
+            parts = count_parts(own, polygons, weld=False)
+            # Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
+            soup = 2 * parts > len(polygons)
+            if soup:
+                parts = count_parts(own, polygons, weld=True)
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from error
+        for number in range(parts):
+            part = f"{title}_{number + 1}" if parts > 1 else title
+            try:
+                surface = make_surface(own, polygons, name=part, component=number, weld=soup, source=source)
+            except ClosedSurfaceError:
+                closed += 1
+                continue
+            check_size(surface, file, scale)
+            own_notes = tuple(note for note in surface.notes if not note.startswith("component "))
+            found.append(replace(surface, notes=own_notes, sources=tuple(dict.fromkeys(sources))))
+    if not found:
+        raise InputError(f"{file}: every part is closed (it has no border); give the layer of cloth alone")
+    notes = [*raw.notes, *([f"{format_count(closed, 'closed part')}, such as a button, left out"] if closed else [])]
+    found[0] = replace(found[0], notes=(*notes, *found[0].notes))
+    return _named_apart(found)
+
+
+def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:
+    """Yield the objects of a file: name, first vertex, and the faces in its own numbering; one of all faces if they share vertices."""
+    used = raw.polygons.max(axis=1)
+    lowest = np.where(raw.polygons >= 0, raw.polygons, len(raw.vertices)).min(axis=1)
+    starts = {first: name for first, name in raw.groups if first < len(raw.vertices)}
+    first = np.array([0, *(start for start in starts if start > 0)], dtype=np.int64)
+    of = np.searchsorted(first, lowest, side="right") - 1
+    if (np.searchsorted(first, used, side="right") - 1 != of).any():
+        yield stem, 0, raw.polygons
+        return
+    for number, start in enumerate(first.tolist()):
+        polygons = raw.polygons[of == number]
+        if len(polygons):
+            title = make_file_name(starts[start]) if start in starts else stem
+            yield title, start, np.where(polygons >= 0, polygons - start, -1)
+
+
+def _named_apart(surfaces: list[Surface]) -> tuple[Surface, ...]:
+    """Return surfaces with a number behind names that occur twice."""
+    often = Counter(surface.name for surface in surfaces)
+    seen = Counter[str]()
+    named = []
+    for surface in surfaces:
+        seen[surface.name] += 1
+        own = f"{surface.name}_{seen[surface.name]}"
+        named.append(replace(surface, name=own) if often[surface.name] > 1 else surface)
+    return tuple(named)
