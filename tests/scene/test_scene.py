@@ -129,7 +129,10 @@ DOME = "[surface]\nshape = 'dome'\n"
             "[surface]\nfile = 'x.obj'\ncomponent = 'big'\n",
             r"surface.component: should be \"largest\", \"all\" or a number from 0, .* got 'big'$",
         ),
-        ("[surface]\nfile = 'x.obj'\ncomponent = -1\n", r"surface.component: should be \"largest\", \"all\" or .* got -1$"),
+        (
+            "[surface]\nfile = 'x.obj'\ncomponent = -1\n",
+            r"surface.component: should be \"largest\", \"all\" or .* got -1$",
+        ),
         (
             DOME + "[lines.a]\nfrom = 1\nto = 2\nvia = 3\n",
             r"lines.a.via: .* valid: border, curve, from, plane, to, vertices",

@@ -110,6 +110,10 @@ def _run_surface(
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         seams = scene_surface_seams(settings.seams, scene.name)
     parts = None if cuts is not None else scene_pieces(scene)
+    if parts is not None and settings.drape is not None:
+        raise InputError(
+            f'{scene.where}: a drape takes one piece, or the folder of a run: warpflat drape DIR --body "EU 38"'
+        )
     sequences = [cuts or scene_cuts(scene, device=device)] if parts is None else _opened(scene, parts)
     _check_edges(scene, sequences, drawing)
     surfaces = [sequence.surface for sequence in sequences]
