@@ -119,7 +119,8 @@ def _run_surface(
     surfaces = [sequence.surface for sequence in sequences]
     notes = [note for sequence in sequences for note in sequence.notes]
     wanted = FrameSchedule(settings.output).wanted
-    require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=wanted)
+    vertices = sum(len(surface.vertices) for surface in surfaces)
+    require_memory_for_run(vertices, frames=wanted)
     with ExitStack() as beside:
         with Film(folder, settings.output, surfaces) as film:
 
@@ -131,12 +132,11 @@ def _run_surface(
             if parts is None:
                 recorder, callback = film.recorders[surfaces[0].name], partial(each_step, 0)
                 result, sewn = flatten_scene(scene, sequences[0], recorder=recorder, callback=callback, device=device)
-                pieces, whole = separate(result), [result]
+                pieces, whole = separate(result), (result,)
             else:
                 pieces, sewn = _flatten_pieces(scene, surfaces, film, callback=each_step, device=device)
-                whole = list(pieces)
+                whole = pieces
             notes += [message for piece in whole for message in piece.messages]
-            vertices = sum(len(surface.vertices) for surface in surfaces)
             fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
             pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
             drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
