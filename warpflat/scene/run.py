@@ -128,6 +128,7 @@ def _run_surface(
                 film.recorders[surfaces[number].name](progress)
                 return None if on_progress is None else on_progress(progress)
 
+            whole: tuple[Flattening, ...]
             sewn: SewnSurface | SewnPieces | None
             if parts is None:
                 recorder, callback = film.recorders[surfaces[0].name], partial(each_step, 0)
