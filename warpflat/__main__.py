@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 
 from warpflat.cli.signals import end_at_once
@@ -18,6 +19,9 @@ def program() -> int:
     """Run the command line on the arguments of this process, and return its exit code."""
     end_at_once()  # before anything is imported that takes a while
     gc.set_threshold(*_SELDOM)
+    # Dense matrices have some hundred rows. A second thread of OpenBLAS gains nothing there, and while other processes run it waits for a
+    # core: a fifth of the processor time of a block.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _silence_libraries()
     from warpflat.cli.main import main
 
