@@ -27,7 +27,16 @@ from warpflat.surface.repair.polygons import distinct_corners, pad_corners, spli
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 from warpflat.surface.repair.validate import check_positions, make_surface
 
-__all__ = ["METRES_PER_UNIT", "SUFFIXES", "RawMesh", "check_size", "read_mesh_file", "read_scan", "read_surface"]
+__all__ = [
+    "METRES_PER_UNIT",
+    "POSSIBLE",
+    "SUFFIXES",
+    "RawMesh",
+    "check_size",
+    "read_mesh_file",
+    "read_scan",
+    "read_surface",
+]
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
@@ -35,7 +44,7 @@ _USD = (".usd", ".usda", ".usdc", ".usdz")
 SUFFIXES = (*GLTF, ".obj", ".off", ".ply", ".stl", *_USD)
 
 # A piece of a garment lies between these extents [m]; a usual one between the other two.
-_POSSIBLE = (3e-3, 20.0)
+POSSIBLE = (3e-3, 20.0)
 _USUAL = (0.02, 5.0)
 
 
@@ -269,13 +278,13 @@ def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:
     Raises:
         InputError: there is one.
     """
-    if float(np.ptp(raw.vertices, axis=0).max(initial=0.0)) * scale <= _POSSIBLE[1]:
+    if float(np.ptp(raw.vertices, axis=0).max(initial=0.0)) * scale <= POSSIBLE[1]:
         return
     used = np.unique(raw.polygons[raw.polygons >= 0])
     used = used[used < len(raw.vertices)]
     points = raw.vertices[used]
     # What is no number, or out of all bounds, is refused with the rest of what no mesh has.
-    if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * scale > _POSSIBLE[1]:
+    if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * scale > POSSIBLE[1]:
         stray = stray_vertex(points)
         if stray is not None:
             raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
@@ -303,7 +312,7 @@ def check_size(surface: Surface, file: Path, scale: float) -> None:
         InputError: it is not; names the unit that would be right.
     """
     size = float(np.ptp(surface.vertices, axis=0).max())
-    if _POSSIBLE[0] <= size <= _POSSIBLE[1]:
+    if POSSIBLE[0] <= size <= POSSIBLE[1]:
         return
     fitting = [u for u, metres in METRES_PER_UNIT.items() if _USUAL[0] <= size / scale * metres <= _USUAL[1]]
     what = "larger than any garment" if size > 1 else "smaller than any piece of a garment"

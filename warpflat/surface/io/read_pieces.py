@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
 from warpflat.core.text import format_count
-from warpflat.surface.io.read import RawMesh, check_size, read_mesh_file
+from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import ClosedSurfaceError, count_parts, make_surface
@@ -25,8 +25,8 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
     """Read all pieces of a garment: each connected part of each object of an OBJ file, node of a GLB scene or mesh prim of a USD stage.
 
     Objects are repaired and checked each on its own, so that pieces stay apart whose borders lie at one place, as along a seam. They are
-    named as in the file; those without a name are numbered, as are the parts of one object. Closed parts, such as buttons, are left out
-    with a note.
+    named as in the file; those without a name are numbered, as are the parts of one object. Closed parts, such as buttons, and crumbs
+    are left out with a note.
 
     Args:
         path: the file.
@@ -42,7 +42,7 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
     file, raw, scale, sources = read_mesh_file(path, units=units, prim=ALL_PRIMS, name=name)
     vertices = raw.vertices * scale
     found: list[Surface] = []
-    closed = 0
+    closed = small = 0
     objects = list(_objects(raw, name or make_file_name(file.stem)))
     for title, first, polygons in objects:
         own = vertices[first : first + int(polygons.max()) + 1]
@@ -62,12 +62,19 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
             except ClosedSurfaceError:
                 closed += 1
                 continue
+            if float(np.ptp(surface.vertices, axis=0).max()) < POSSIBLE[0]:
+                small += 1
+                continue
             check_size(surface, file, scale)
             own_notes = tuple(note for note in surface.notes if not note.startswith("component "))
             found.append(replace(surface, notes=own_notes, sources=tuple(dict.fromkeys(sources))))
     if not found:
-        raise InputError(f"{file}: every part is closed (it has no border); give the layer of cloth alone")
-    notes = [*raw.notes, *([f"{format_count(closed, 'closed part')}, such as a button, left out"] if closed else [])]
+        raise InputError(f"{file}: every part is closed (it has no border) or a crumb; give the layer of cloth alone")
+    notes = list(raw.notes)
+    if closed:
+        notes.append(f"{format_count(closed, 'closed part')}, such as a button, left out")
+    if small:
+        notes.append(f"{format_count(small, 'part')} of less than {1e3 * POSSIBLE[0]:g} mm left out")
     found[0] = replace(found[0], notes=(*notes, *found[0].notes))
     return _named_apart(found)
 
