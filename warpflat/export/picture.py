@@ -18,7 +18,7 @@ from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_garment import Body, GarmentViews
 from warpflat.export.picture_page import CAPTIONS_ALONE, MARGIN, Cell, draw_cell, lay_out
-from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
+from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_scale import STRIP, draw_colour_bar, draw_scale_bar
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
@@ -107,29 +107,38 @@ def draw_figure(
     shown_names = titles([piece.name for piece in pieces], is_drawn)
     alone = body is None and len(pieces) == 1
     cells = [_prepared(piece, shown_names[piece.name], shows_body=body is None, alone=alone) for piece in pieces]
+    shared = "" if alone else _take_shared(cells)
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
     areas = np.concatenate([cell.areas for cell in cells])
     scale = energy_scale(density, areas) if scale is None else scale
     figure = Figure(figsize=(PAGE_WIDTH, 4.0), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    width, height, page_scale = lay_out(pen, cells)
     worn = None
     if body is not None:
-        worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells], width)
-        height += worn.height
+        worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
+    width, height, page_scale = lay_out(pen, cells, worn)
     height += STRIP
     figure.set_size_inches(width, height)
     pen.open_page(figure, width, height)
     if not alone:
         draw_scale_bar(pen, MARGIN, height - 0.27, page_scale)
+        pen.write(MARGIN, height - 0.48, shared, 7.5, color=GREY)
     draw_colour_bar(pen, scale, density, areas, quantity, left=MARGIN + (CAPTIONS_ALONE if alone else 2.3), top=height)
     top = height - STRIP
     if worn is not None:
-        worn.draw(pen, top, scale)
-        top -= worn.height
+        worn.draw(pen, MARGIN, top, scale)
     for cell in cells:
         draw_cell(pen, cell, top, scale, page_scale)
     return figure
+
+
+def _take_shared(cells: Sequence[Cell]) -> str:
+    """Take out of the captions of all cells what is the same in all, and return it as one line."""
+    first = cells[0].captions.items()
+    same = {key: value for key, value in first if all(cell.captions.get(key) == value for cell in cells)}
+    for cell in cells:
+        cell.captions = {key: value for key, value in cell.captions.items() if key not in same}
+    return "  ·  ".join(f"{key} {value}" for key, value in same.items())
 
 
 def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool) -> Cell:
