@@ -90,6 +90,24 @@ def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
     assert not any(tags.Get(at) for at in tags.GetTimeSamples())
 
 
+def test_a_piece_that_ends_without_strain_has_the_colours_of_its_start(tmp_path: Path) -> None:
+    from pxr import Usd, UsdGeom
+
+    settings = {
+        "surface": {"shape": "cone", "resolution": 9},
+        "output": {"frames": 10, "picture": False},
+        "pattern": {"formats": []},
+    }
+    run_scene(make_scene(settings, name="trial", folder=tmp_path, where="trial"), tmp_path)
+    stage = Usd.Stage.Open(str(tmp_path / "frames.usdc"))
+    pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern"))
+    scale = pattern.GetDisplayColorAttr().GetCustomData()["rangeMax"]
+    density = UsdGeom.PrimvarsAPI(pattern).GetPrimvar("strainEnergyDensity").GetAttr()
+    first, last = (np.array(density.Get(at)) for at in (stage.GetStartTimeCode(), stage.GetEndTimeCode()))
+    assert last.max() < 1e-6
+    assert 0.5 * first.max() < scale < 2.0 * first.max()
+
+
 def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
     from pxr import Usd, UsdGeom
 

@@ -104,18 +104,28 @@ class Film:
 
     def _write_at_end(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
-            from warpflat.export.usd import FrameWriter, film_scale
+            from warpflat.export.usd import FrameWriter
 
             report_activity("writing the film")
-            last = [recorder.stages[-1] for recorder in self.recorders.values()]
-            ends = [self._keys.density(stage, stage.keys[-1]) for stage in last]
-            scale = film_scale(list(self._surfaces.values()), ends)
-            with FrameWriter(self._folder / "frames.usdc", scale=scale) as writer:
+            with FrameWriter(self._folder / "frames.usdc", scale=self._scale()) as writer:
                 if self._mannequin is not None:
                     self._show_mannequin(writer, self._mannequin)
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
                 self._write(writer)
+
+    def _scale(self) -> float:
+        """Return the upper end of the colours [J/m2]: by the last frames, or by the first ones if the pieces end without strain."""
+        from warpflat.export.colours import SMALLEST_SCALE
+        from warpflat.export.usd import film_scale
+
+        for at in (-1, 0):
+            stages = [recorder.stages[at] for recorder in self.recorders.values()]
+            densities = [self._keys.density(stage, stage.keys[at]) for stage in stages]
+            scale = film_scale(list(self._surfaces.values()), densities)
+            if scale > SMALLEST_SCALE:
+                break
+        return scale
 
     def _show_mannequin(self, writer: FrameWriter, mannequin: Mannequin) -> None:
         from warpflat.mannequin.normals import vertex_normals
