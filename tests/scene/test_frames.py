@@ -72,6 +72,32 @@ def test_no_frame_moves_a_vertex_by_more_than_a_twentieth_of_its_stage(tmp_path:
     assert validate_usd(tmp_path / "frames.usdc") == []
 
 
+def test_a_compact_film_shows_the_same_in_fewer_bytes(tmp_path: Path) -> None:
+    from pxr import Usd
+
+    settings = {"surface": {"shape": "dome", "resolution": 17}, "pattern": {"formats": []}}
+    for name in ("all", "compact"):
+        output = {"picture": False, "compact_film": name == "compact"}
+        (tmp_path / name).mkdir()
+        run_scene(
+            make_scene({**settings, "output": output}, name="trial", folder=tmp_path, where="trial"), tmp_path / name
+        )
+    whole, compact = (shots_of(tmp_path / name / "frames.usdc", "trial") for name in ("all", "compact"))
+    assert {number: len(shot) for number, shot in whole.items()} == {
+        number: len(shot) for number, shot in compact.items()
+    }
+    np.testing.assert_allclose(np.concatenate(whole[0]), np.concatenate(compact[0]), atol=1e-6)
+    samples, sizes = [], []
+    for name in ("all", "compact"):
+        film = tmp_path / name / "frames.usdc"
+        stage = Usd.Stage.Open(str(film))
+        samples.append(stage.GetPrimAtPath("/World/trial/pattern").GetAttribute("points").GetNumTimeSamples())
+        sizes.append(film.stat().st_size)
+    assert samples[0] == 60
+    assert samples[1] < 20
+    assert sizes[1] < 0.6 * sizes[0]
+
+
 def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
     from pxr import Usd
 

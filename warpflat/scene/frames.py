@@ -41,7 +41,7 @@ _PARTS = 20 / 60
 # So many vertices of computed layouts a stage keeps at most: they fill some 200 MB. Frames between them take no room.
 _MOST_VERTICES = 6_000_000
 # Points of frames between computed layouts are stored, for readers that look at stored samples only, where a film of one stage has at most
-# so many of them: some 10 MB. In larger films USD interpolates them.
+# so many of them, some 10 MB, and the scene does not ask for a compact one. Otherwise USD interpolates them.
 _MOST_STORED = 1_000_000
 # A layout is kept if it lies at least this share of the stage's way from the one kept before.
 _KEPT = 0.05
@@ -72,7 +72,7 @@ class Film:
         self.wanted = FrameSchedule(output).wanted
         self._surfaces = {surface.name: surface for surface in surfaces}
         vertices = sum(len(surface.vertices) for surface in surfaces)
-        self._all_stored = vertices * max(output.frames, 1) <= _MOST_STORED
+        self._all_stored = not output.compact_film and vertices * max(output.frames, 1) <= _MOST_STORED
         self.recorders = {
             name: FrameRecorder(None, surface, self._schedule) for name, surface in self._surfaces.items()
         }
