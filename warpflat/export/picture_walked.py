@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["write_walked_picture"]
 
-#: Seams in a row, the width of each and its greatest height; the height of the page's title, of the cloth above a seam, which bears its
-#: title, and the margin around [in].
+#: Seams in a row at most, the width of each and its greatest height; the height of the page's title, of the cloth above a seam, which
+#: bears its title, and the margin around [in].
 COLUMNS, CELL, TALLEST = 3, 4.4, 1.1
 HEAD, CLOTH, MARGIN = 0.34, 0.62, 0.08
 COLOURS = ("#1f5fa8", "#c8452c")
@@ -51,7 +51,9 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     seams = sorted(seams, key=lambda seam: -float(np.ptp(_fitted(seam)[0], axis=0)[1]))
     fitted = [_fitted(seam) for seam in seams]
     sizes = [(CELL, CLOTH + 2 * MARGIN + float(np.ptp(lines[0], axis=0)[1])) for lines in fitted]
-    places, width, foot = pack_boxes(sizes, COLUMNS * CELL)
+    # As many columns as leave least of the page empty.
+    packed = [pack_boxes(sizes, columns * CELL) for columns in range(2, COLUMNS + 1)]
+    places, width, foot = min(packed, key=lambda found: found[1] * (found[2] + HEAD))
     width, height = max(width, 2 * CELL), HEAD + foot + MARGIN
     figure = Figure(figsize=(width, height), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
@@ -61,7 +63,14 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     for seam, lines, (left, top) in zip(seams, fitted, places, strict=True):
         _draw_seam(axis, seam, lines, left + 0.5 * CELL, height - HEAD - top)
     words = f"{title}: the two sides of each seam laid upon each other, right sides together, darts closed [mm]"
-    axis.text(MARGIN, height - 0.5 * HEAD, words, fontsize=11, va="center", parse_math=False)
+    axis.text(
+        MARGIN,
+        height - 0.5 * HEAD,
+        words,
+        fontsize=min(11.0, 135.0 * (width - 2 * MARGIN) / len(words)),
+        va="center",
+        parse_math=False,
+    )
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
 
