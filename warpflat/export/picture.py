@@ -26,6 +26,8 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["PicturePiece", "draw_figure", "write_picture"]
 
+SCALE_BAR = 2.3  # [in], for the scale of lengths left of the colour bar
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PicturePiece:
@@ -107,12 +109,12 @@ def draw_figure(
     shown_names = titles([piece.name for piece in pieces], is_drawn)
     alone = body is None and len(pieces) == 1
     cells = [_prepared(piece, shown_names[piece.name], shows_body=body is None, alone=alone) for piece in pieces]
-    shared = "" if alone else _take_shared(cells)
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
     areas = np.concatenate([cell.areas for cell in cells])
     scale = energy_scale(density, areas) if scale is None else scale
     figure = Figure(figsize=(PAGE_WIDTH, 4.0), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
+    shared = _take_shared(pen, cells)
     worn = None
     if body is not None:
         worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
@@ -123,7 +125,9 @@ def draw_figure(
     if not alone:
         draw_scale_bar(pen, MARGIN, height - 0.27, page_scale)
         pen.write(MARGIN, height - 0.48, shared, 7.5, color=GREY)
-    draw_colour_bar(pen, scale, density, areas, quantity, left=MARGIN + (CAPTIONS_ALONE if alone else 2.3), top=height)
+    draw_colour_bar(
+        pen, scale, density, areas, quantity, left=MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR), top=height
+    )
     top = height - STRIP
     if worn is not None:
         worn.draw(pen, MARGIN, top, scale)
@@ -132,13 +136,15 @@ def draw_figure(
     return figure
 
 
-def _take_shared(cells: Sequence[Cell]) -> str:
-    """Take out of the captions of all cells what is the same in all, and return it as one line."""
-    first = cells[0].captions.items()
-    same = {key: value for key, value in first if all(cell.captions.get(key) == value for cell in cells)}
-    for cell in cells:
-        cell.captions = {key: value for key, value in cell.captions.items() if key not in same}
-    return "  ·  ".join(f"{key} {value}" for key, value in same.items())
+def _take_shared(pen: Pen, cells: Sequence[Cell]) -> str:
+    """Take out of the captions of several cells the first one that is the same in all, if there is room for it left of the colour bar."""
+    for key, value in cells[0].captions.items() if len(cells) > 1 else ():
+        words = f"{key} {value}"
+        if all(cell.captions.get(key) == value for cell in cells) and pen.measure(words, 7.5)[0] < SCALE_BAR - 0.1:
+            for cell in cells:
+                cell.captions = {other: text for other, text in cell.captions.items() if other != key}
+            return words
+    return ""
 
 
 def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool) -> Cell:

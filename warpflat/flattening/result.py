@@ -282,9 +282,11 @@ class Flattening:
     def captions(self) -> dict[str, str]:
         """Return the key measures as short texts."""
         m = self.layout_measures
+        energy = 1e3 * m["strain_energy_j"]
         captions = {
             "fabric": self.fabric.name,
-            "strain energy": f"{1e3 * m['strain_energy_j']:.3g} mJ",
+            # Below it there is rounding alone.
+            "strain energy": f"{energy if energy >= 1e-6 else 0.0:.3g} mJ",
             "length error": f"{100 * m['length_error']:.2f} %",
             "area error": f"{100 * m['area_error']:.2f} %",
         }
