@@ -42,6 +42,8 @@ _BODY_MAPS = {
 }
 _ALL_MAPS = {**MAPS, **_BODY_MAPS}
 _NOT_AROUND = "#c8c8c8"
+# A map whose values fill less of its scale is told in words.
+_EVEN = 0.1
 # Maps that are compared at a glance share a scale.
 _ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))
 # The fabric's strain limit applies to its threads.
@@ -138,6 +140,11 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
         axis.set_aspect("equal")
         axis.set_axis_off()
         axis.autoscale_view()
+        low, high = (factor * weighted_percentile(getattr(fit, name), fit.area, share) for share in (0.01, 0.99))
+        if high - low < _EVEN * (scales[name].high - scales[name].low):
+            # A scale would show one flat colour.
+            axis.set_title(f"{label}, even: {_shown(low)} to {_shown(high)} {unit}", fontsize=10)
+            continue
         axis.set_title(f"{label}, median {_shown(_median(fit, name) * factor)} {unit}", fontsize=10)
         bar = figure.colorbar(
             drawn, ax=axis, shrink=0.75, extend=scales[name].extend, pad=0.02, fraction=0.06, aspect=25
