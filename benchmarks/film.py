@@ -1,12 +1,13 @@
 """Figures of the films of scenes: how many frames, how much moves in one, and what film and review page add to a run.
 
-    OMP_NUM_THREADS=1 python benchmarks/film.py [SCENE.toml ...] [--repeats 3] [--figures]
+    OMP_NUM_THREADS=1 python benchmarks/film.py [SCENE.toml ...] [--repeats 3] [--figures] [--compact]
 
 A row per scene. `frames` is their number, `stages` how many each stage has. `largest share` is the way of the vertex that moves
 farthest in one frame, as a share of the largest displacement in its stage, over all pieces. `run` is the processor time of the
-whole command, a process of its own with compiled kernels. `film` and `page` are what it spends on `frames.usdc` and on `review.html`,
-libraries loaded for them among it; `share` is both of the run. `MB` are their sizes, `other` is that of all other files. The
-fastest of the repeats counts. `white` is the share of each picture that is white or nearly so. `--figures` runs each scene once.
+whole command, a process of its own with compiled kernels. `film` and `page` are what it spends on `frames.usdc` and on
+`review.html`, libraries loaded for them among it; `share` is both of the run. `MB` are their sizes, `other` is that of all other
+files, the first share is that of film and page in all bytes. The fastest of the repeats counts. `white` is the share of each
+picture that is white or nearly so. `--figures` runs each scene once. `--compact` writes compact films.
 """
 
 from __future__ import annotations
@@ -69,11 +70,11 @@ def white_shares(folder: Path) -> dict[str, float]:
     return found
 
 
-def seconds(scene: Path, folder: Path, repeats: int) -> tuple[float, float, float]:
+def seconds(scene: Path, folder: Path, repeats: int, *, compact: bool) -> tuple[float, float, float]:
     """Run a scene as a command; return the processor seconds of film, page and all, of the fastest repeat."""
     found = []
     for _ in range(repeats):
-        command = [sys.executable, __file__, "--child", str(scene), str(folder)]
+        command = [sys.executable, __file__, "--child", str(scene), str(folder), str(int(compact))]
         before = os.times()
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         after = os.times()
@@ -84,10 +85,11 @@ def seconds(scene: Path, folder: Path, repeats: int) -> tuple[float, float, floa
     return min(found, key=lambda each: each[2])
 
 
-def child(scene: str, folder: str) -> None:
+def child(scene: str, folder: str, compact: str) -> None:
     """Run a scene in this process as the program does; print the processor seconds of film and page, imports among them."""
     from warpflat.cli.run import start_warp_silently
     from warpflat.core.beside import work_beside
+    from warpflat.scene.form_cuts import scene_with
 
     spent, inside = {"film": 0.0, "page": 0.0}, []
 
@@ -108,6 +110,10 @@ def child(scene: str, folder: str) -> None:
 
     start_warp_silently()
     loaded = warpflat.load_scene(scene)
+    if compact == "1":
+        loaded = scene_with(
+            loaded, output={**loaded.settings.output.model_dump(exclude_unset=True), "compact_film": True}
+        )
     frames = importlib.import_module("warpflat.scene.frames")
     page = importlib.import_module("warpflat.review.page")
     for owner, names, part in (
@@ -125,7 +131,7 @@ def child(scene: str, folder: str) -> None:
 def main() -> None:
     """Print a row per scene."""
     if sys.argv[1:2] == ["--child"]:
-        child(*sys.argv[2:4])
+        child(*sys.argv[2:5])
         return
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
@@ -133,26 +139,31 @@ def main() -> None:
     )
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--figures", action="store_true", help="run each scene once")
+    parser.add_argument("--compact", action="store_true", help="with `compact_film`")
     given = parser.parse_args()
     print(
-        f"{'scene':20}{'frames':>7}{'largest share':>15}{'MB':>6}{'page MB':>8}{'other':>6}"
+        f"{'scene':20}{'frames':>7}{'largest share':>15}{'MB':>6}{'page MB':>8}{'other':>6}{'share':>7}"
         f"{'film s':>8}{'page s':>8}{'run s':>7}{'share':>7}  stages; white"
     )
     for path in given.scenes:
         try:
             with tempfile.TemporaryDirectory() as scratch:
                 folder = Path(scratch) / path.stem
-                film_s, page_s, run_s = seconds(path, folder, 1 if given.figures else given.repeats)
+                film_s, page_s, run_s = seconds(
+                    path, folder, 1 if given.figures else given.repeats, compact=given.compact
+                )
                 film = folder / "frames.usdc"
                 frames, counts, share = largest_shares(film)
                 white = [f"{name} {100 * share:.0f} %" for name, share in white_shares(folder).items()]
                 sizes = {file.name: file.stat().st_size / 1e6 for file in folder.iterdir()}
                 size, page = sizes.pop("frames.usdc"), sizes.pop("review.html")
+                other = sum(sizes.values())
+                added = (size + page) / (size + page + other)
         except InputError as error:
             print(f"{path.stem:20}{error}")
             continue
         print(
-            f"{path.stem:20}{frames:7}{100 * share:14.2f}%{size:6.1f}{page:8.2f}{sum(sizes.values()):6.1f}"
+            f"{path.stem:20}{frames:7}{100 * share:14.2f}%{size:6.1f}{page:8.2f}{other:6.1f}{100 * added:6.0f}%"
             f"{film_s:8.2f}{page_s:8.2f}{run_s:7.2f}{100 * (film_s + page_s) / run_s:6.0f}%  {' + '.join(map(str, counts))}"
             f"; {', '.join(white)}",
             flush=True,

@@ -27,6 +27,8 @@ from warpflat.export.picture_garment import Body, crop_body
 from warpflat.export.picture_packing import pack_boxes, pack_rows
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import save_png
+from warpflat.export.picture_silhouette import BETWEEN, Silhouette, place_views
+from warpflat.export.picture_views import make_facets, pattern_view
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
@@ -521,3 +523,34 @@ def test_names_across_a_narrow_piece_stand_beside_it(tmp_path: Path, monkeypatch
         assert [text for text, _, _ in by_height] == list(lines)
         assert np.ptp([x for _, x, _ in view]) < 0.6
         assert np.diff([y for _, _, y in by_height]).min() > 0.1
+
+
+def test_views_reach_into_each_others_boxes_as_far_as_their_outlines_allow() -> None:
+    # A roof above a valley: the lower view's sides rise beside the upper one's ridge turned down.
+    upper = np.array([[0.0, 1.0, 0.0], [2.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    lower = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1.0, 0.0], [1.0, -1.0, 0.0]])
+    tip = Silhouette(pattern_view(upper[:, :2], make_facets(np.array([[0, 1, 2, -1]], np.int32)), {}))
+    valley_faces = np.array([[0, 3, 1, -1], [1, 3, 2, -1]], np.int32)
+    valley = Silhouette(pattern_view(lower[:, :2], make_facets(valley_faces), {}))
+    assert tip.area == pytest.approx(1.0, rel=0.02)
+    assert tip.overlap_below(valley, 0.0) == pytest.approx(1.0, abs=0.03)
+    assert tip.overlap_below(tip, 0.0) == pytest.approx(0.0, abs=0.03)
+    assert valley.room_above(0.9, 1.1) == pytest.approx(0.9, abs=0.03)
+    assert valley.room_above(2.1, 3.0) == np.inf
+    beside, below = (
+        place_views([tip, valley], 2.0, width=w, stacked=s, words=[], top=0.5, has_headings=False)
+        for w, s in ((8.0, False), (4.0, True))
+    )
+    assert [left for left, _ in beside] == [0.0, 4.0]
+    # The lower edge of the upper box is at 2.5; the other box begins a metre, which is two inches, higher, and a gap below.
+    assert below[1][1] == pytest.approx(2.5 - 2.0 + BETWEEN, abs=0.06)
+
+
+def test_cloth_without_strain_has_no_scale_of_colours(tmp_path: Path) -> None:
+    shape = dome(9)
+    write_picture(tmp_path / "none.png", [find_piece(shape, np.full(64, 1e-9))])
+    write_picture(tmp_path / "some.png", [find_piece(shape, np.full(64, 1.0))])
+    none, some = (pixels_of(tmp_path / f"{name}.png")[:80] for name in ("none", "some"))
+    red = energy_colours(0.6, 1.0)
+    assert near(none, red) == 0
+    assert near(some, red) > 200

@@ -72,6 +72,32 @@ def test_no_frame_moves_a_vertex_by_more_than_a_twentieth_of_its_stage(tmp_path:
     assert validate_usd(tmp_path / "frames.usdc") == []
 
 
+def test_a_compact_film_shows_the_same_in_fewer_bytes(tmp_path: Path) -> None:
+    from pxr import Usd
+
+    settings = {"surface": {"shape": "dome", "resolution": 17}, "pattern": {"formats": []}}
+    for name in ("all", "compact"):
+        output = {"picture": False, "compact_film": name == "compact"}
+        (tmp_path / name).mkdir()
+        run_scene(
+            make_scene({**settings, "output": output}, name="trial", folder=tmp_path, where="trial"), tmp_path / name
+        )
+    whole, compact = (shots_of(tmp_path / name / "frames.usdc", "trial") for name in ("all", "compact"))
+    assert {number: len(shot) for number, shot in whole.items()} == {
+        number: len(shot) for number, shot in compact.items()
+    }
+    np.testing.assert_allclose(np.concatenate(whole[0]), np.concatenate(compact[0]), atol=1e-6)
+    samples, sizes = [], []
+    for name in ("all", "compact"):
+        film = tmp_path / name / "frames.usdc"
+        stage = Usd.Stage.Open(str(film))
+        samples.append(stage.GetPrimAtPath("/World/trial/pattern").GetAttribute("points").GetNumTimeSamples())
+        sizes.append(film.stat().st_size)
+    assert samples[0] == 60
+    assert samples[1] < 20
+    assert sizes[1] < 0.6 * sizes[0]
+
+
 def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
     from pxr import Usd
 
@@ -88,6 +114,24 @@ def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
     assert [steps.Get(at) for at in steps.GetTimeSamples()] == [0, 5, 10, 15, 20, 25, 30, 35, 40, 40]
     tags = prim.GetAttribute("warpflat:interpolated")
     assert not any(tags.Get(at) for at in tags.GetTimeSamples())
+
+
+def test_a_piece_that_ends_without_strain_has_the_colours_of_its_start(tmp_path: Path) -> None:
+    from pxr import Usd, UsdGeom
+
+    settings = {
+        "surface": {"shape": "cone", "resolution": 9},
+        "output": {"frames": 10, "picture": False},
+        "pattern": {"formats": []},
+    }
+    run_scene(make_scene(settings, name="trial", folder=tmp_path, where="trial"), tmp_path)
+    stage = Usd.Stage.Open(str(tmp_path / "frames.usdc"))
+    pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern"))
+    scale = pattern.GetDisplayColorAttr().GetCustomData()["rangeMax"]
+    density = UsdGeom.PrimvarsAPI(pattern).GetPrimvar("strainEnergyDensity").GetAttr()
+    first, last = (np.array(density.Get(at)) for at in (stage.GetStartTimeCode(), stage.GetEndTimeCode()))
+    assert last.max() < 1e-6
+    assert 0.5 * first.max() < scale < 2.0 * first.max()
 
 
 def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:

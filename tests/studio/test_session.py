@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from warpflat.scene.run import flatten_scene, scene_cuts
 from warpflat.studio.cut_tables import cut_along, cut_between, cuttable_lines
 from warpflat.studio.frame import PieceFrame, Watch
 from warpflat.studio.maps import face_values, piece_scale, vertex_values
+from warpflat.studio.panel import preview_words
 from warpflat.studio.pick import Hit, nearest_line, pick_flat, pick_on_rays
 from warpflat.studio.save import free_name
 from warpflat.studio.session import Session
@@ -117,6 +119,9 @@ def test_a_cut_is_tried_then_made(tmp_path: Path) -> None:
     assert preview.released > 0.0
     assert preview.opening is not None
     assert preview.opening > 5e-3
+    assert preview.overlap == 0.0
+    assert f"opens <b>{1e3 * preview.opening:.1f} mm</b>" in preview_words(preview)
+    assert "lies over itself: <b>3.2 cm²</b>" in preview_words(replace(preview, overlap=3.2e-4))
     session.apply()
     assert session.preview is None
     assert session.solution is preview.step.solution

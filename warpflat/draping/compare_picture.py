@@ -12,6 +12,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.draping.picture import body_around, draw_scale, seen_from
 from warpflat.draping.result import Drape
+from warpflat.export.colours import on_cloth
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
@@ -30,7 +31,6 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib import colormaps
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -52,7 +52,7 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
         for column, name in enumerate(drapes):
             _, faces, cloth = meshes[name]
             face_colours = np.tile(np.array(_SKIN), (len(faces), 1))
-            face_colours[:cloth] = colormaps[colours](np.clip((values[name] - low) / (high - low), 0.0, 1.0))[:, :3]
+            face_colours[:cloth] = on_cloth(colours)(np.clip((values[name] - low) / (high - low), 0.0, 1.0))[:, :3]
             left = _GAP + column * wide
             DrawnView(views[name], left=left, bottom=bottom, inches_per_metre=scale, dpi=DPI).draw(
                 pen.axes, face_colours

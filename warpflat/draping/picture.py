@@ -14,6 +14,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.core.sums import weighted_percentile
 from warpflat.draping.result import Drape
+from warpflat.export.colours import on_cloth
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_garment import Body, crop_body
@@ -27,7 +28,7 @@ _VIEWS = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _SKIN = (0.80, 0.79, 0.77)
 # The body is drawn this much smaller [m], so that cloth that lies on it is seen.
 _SHRUNK = 0.003
-_TALLEST, _TOP, _BOTTOM, _BAR = 8.0, 0.55, 0.1, 1.0
+_TALLEST, _TOP, _BOTTOM, _BAR = 8.0, 0.48, 0.05, 0.9
 
 
 @all_letters()
@@ -37,7 +38,6 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib import colormaps
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -58,13 +58,13 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
         left = 0.3 + 0.5 * (room - scale * sum(float(view.size[0]) for view in views))
         share = np.clip((values - low) / (high - low), 0.0, 1.0)
         face_colours = np.tile(np.array(_SKIN), (len(faces), 1))
-        face_colours[:cloth] = colormaps[colours](share)[:, :3]
+        face_colours[:cloth] = on_cloth(colours)(share)[:, :3]
         for view, (side, _) in zip(views, _VIEWS, strict=True):
             drawn = DrawnView(view, left=left, bottom=bottom, inches_per_metre=scale, dpi=DPI)
             drawn.draw(pen.axes, face_colours)
             pen.write(left + 0.5 * scale * float(view.size[0]), bottom + tall + 0.12, side, 9, color=GREY, ha="center")
             left += scale * float(view.size[0]) + 0.2
-        pen.write(0.3, bottom + tall + 0.32, title, 11, fontweight="bold")
+        pen.write(0.3, bottom + tall + 0.3, title, 11, fontweight="bold")
         draw_scale(figure, (PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall, height), low, high, colours)
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
@@ -125,4 +125,6 @@ def draw_scale(
     left, bottom, wide, tall, height = place
     axes = figure.add_axes((left / PAGE_WIDTH, bottom / height, wide / PAGE_WIDTH, tall / height))
     extend = "both" if low < 0.0 else "max"
-    figure.colorbar(ScalarMappable(Normalize(low, high), colours), cax=axes, extend=extend).ax.tick_params(labelsize=8)
+    figure.colorbar(ScalarMappable(Normalize(low, high), on_cloth(colours)), cax=axes, extend=extend).ax.tick_params(
+        labelsize=8
+    )

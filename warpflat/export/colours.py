@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.sums import weighted_percentile
 
-__all__ = ["SMALLEST_SCALE", "energy_colours", "energy_scale", "linear_rgb"]
+__all__ = ["SMALLEST_SCALE", "energy_colours", "energy_scale", "linear_rgb", "on_cloth"]
 
 # Cloth of 1 kN/m stores this much per area at a strain of 4e-5. Below it a map would show rounding errors.
 SMALLEST_SCALE = 1e-6  # [J/m2]
@@ -29,6 +31,8 @@ _ANCHORS = np.array(
     ]
 )
 
+_CLOTH = (0.955, 0.94, 0.90)
+
 
 def energy_colours(density: ArrayLike, scale: float) -> FloatArray:
     """Return sRGB colours (#N by 3, 0 to 1) of energy densities [J/m2] (#N), the last colour above `scale`."""
@@ -36,6 +40,14 @@ def energy_colours(density: ArrayLike, scale: float) -> FloatArray:
     lower = np.minimum(position.astype(np.int64), len(_ANCHORS) - 2)
     fraction = (position - lower)[..., None]
     return np.asarray(_ANCHORS[lower] * (1.0 - fraction) + _ANCHORS[lower + 1] * fraction)
+
+
+def on_cloth(name: str) -> Any:
+    """Return a Matplotlib colour map by name, a little darker where it is white: cloth at rest must not look like paper."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps[name](np.linspace(0.0, 1.0, 256))[:, :3] * _CLOTH, name=name)
 
 
 def linear_rgb(colours: ArrayLike) -> FloatArray:

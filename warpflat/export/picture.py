@@ -18,13 +18,15 @@ from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_garment import Body, GarmentViews
 from warpflat.export.picture_page import CAPTIONS_ALONE, MARGIN, Cell, draw_cell, lay_out
-from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
+from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_scale import STRIP, draw_colour_bar, draw_scale_bar
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
 __all__ = ["PicturePiece", "draw_figure", "write_picture"]
+
+SCALE_BAR = 2.3  # [in], for the scale of lengths left of the colour bar
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,24 +114,37 @@ def draw_figure(
     scale = energy_scale(density, areas) if scale is None else scale
     figure = Figure(figsize=(PAGE_WIDTH, 4.0), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    width, height, page_scale = lay_out(pen, cells)
+    shared = _take_shared(pen, cells)
     worn = None
     if body is not None:
-        worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells], width)
-        height += worn.height
+        worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
+    width, height, page_scale = lay_out(pen, cells, worn)
     height += STRIP
     figure.set_size_inches(width, height)
     pen.open_page(figure, width, height)
     if not alone:
         draw_scale_bar(pen, MARGIN, height - 0.27, page_scale)
-    draw_colour_bar(pen, scale, density, areas, quantity, left=MARGIN + (CAPTIONS_ALONE if alone else 2.3), top=height)
+        pen.write(MARGIN, height - 0.48, shared, 7.5, color=GREY)
+    draw_colour_bar(
+        pen, scale, density, areas, quantity, left=MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR), top=height
+    )
     top = height - STRIP
     if worn is not None:
-        worn.draw(pen, top, scale)
-        top -= worn.height
+        worn.draw(pen, MARGIN, top, scale)
     for cell in cells:
         draw_cell(pen, cell, top, scale, page_scale)
     return figure
+
+
+def _take_shared(pen: Pen, cells: Sequence[Cell]) -> str:
+    """Take out of the captions of several cells the first one that is the same in all, if there is room for it left of the colour bar."""
+    for key, value in cells[0].captions.items() if len(cells) > 1 else ():
+        words = f"{key} {value}"
+        if all(cell.captions.get(key) == value for cell in cells) and pen.measure(words, 7.5)[0] < SCALE_BAR - 0.1:
+            for cell in cells:
+                cell.captions = {other: text for other, text in cell.captions.items() if other != key}
+            return words
+    return ""
 
 
 def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool) -> Cell:

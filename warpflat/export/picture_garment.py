@@ -11,6 +11,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.geometry import area_vectors, outline_edges
 from warpflat.export.picture_pen import GREY, Pen
+from warpflat.export.picture_silhouette import Silhouette
 from warpflat.export.picture_views import DrawnView, Facets, View, make_facets
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
@@ -46,15 +47,12 @@ class Body:
 class GarmentViews:
     """A garment on its mannequin, seen from three sides, as a band across the page."""
 
-    def __init__(
-        self, body: Body, surfaces: Sequence[Surface], densities: Sequence[FloatArray], page_width: float
-    ) -> None:
+    def __init__(self, body: Body, surfaces: Sequence[Surface], densities: Sequence[FloatArray]) -> None:
         """
         Args:
             body: under it.
             surfaces: the pieces in space.
             densities: #F [J/m2] for each piece.
-            page_width: [in].
         """
         self._density = np.concatenate(densities)
         worn = np.concatenate([surface.vertices for surface in surfaces])
@@ -79,17 +77,31 @@ class GarmentViews:
         self._skin_faces = len(skin)
         points = np.concatenate([worn, skin_points])
         self._views = [(title, _view(points, len(worn), facets, angle)) for title, angle in _VIEWS]
-        widths = sum(float(view.size[0]) for _, view in self._views)
-        tallest = max(float(view.size[1]) for _, view in self._views)
-        gaps = len(_VIEWS) * _LEAST_GAP
-        self._scale = min((page_width - gaps) / widths, _HEIGHT / tallest)
-        self._gap = (page_width - widths * self._scale) / len(_VIEWS)
-        self.height = _HEAD + tallest * self._scale + _FOOT
+        self._width = sum(float(view.size[0]) for _, view in self._views)
+        self._tallest = max(float(view.size[1]) for _, view in self._views)
+        self._area = sum(Silhouette(view).area for _, view in self._views)
+        self._scale, self._gap = 1.0, _LEAST_GAP
 
-    def draw(self, pen: Pen, top: float, scale: float) -> None:
-        """Draw the band whose upper edge is at `top` [in], colours up to `scale` [J/m2]."""
+    def size(self, share: float, room: float) -> tuple[float, float]:
+        """Return width and height of the band [in] at a share of the largest scale on a page with so much room [in]."""
+        scale = self._scale_at(share, room)
+        return min(self._width * scale + len(_VIEWS) * _LEAST_GAP, room), _HEAD + self._tallest * scale + _FOOT
+
+    def covered(self, share: float, room: float) -> float:
+        """Return the area of the page that the views cover [in2]; arguments as of :meth:`size`."""
+        return self._area * self._scale_at(share, room) ** 2
+
+    def place(self, share: float, room: float, width: float, *, beside: bool) -> None:
+        """Choose the scale, and gaps that fill a width [in] unless pieces stand `beside` the views."""
+        self._scale = self._scale_at(share, room)
+        self._gap = _LEAST_GAP if beside else max((width - self._width * self._scale) / len(_VIEWS), _LEAST_GAP)
+
+    def _scale_at(self, share: float, room: float) -> float:
+        return share * min((room - len(_VIEWS) * _LEAST_GAP) / self._width, _HEIGHT / self._tallest)
+
+    def draw(self, pen: Pen, left: float, top: float, scale: float) -> None:
+        """Draw the band whose upper left corner is at (`left`, `top`) [in], colours up to `scale` [J/m2]."""
         colours = np.concatenate([energy_colours(self._density, scale), np.tile(_SKIN, (self._skin_faces, 1))])
-        left = 0.0
         for title, view in self._views:
             width, height = view.size[:2] * self._scale
             left += 0.5 * self._gap

@@ -7,7 +7,7 @@ room.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -46,10 +46,15 @@ _LEAST_DISTANCE = 0.15
 
 
 def draw_lines(
-    pen: Pen, room: LabelRoom, drawn: DrawnView, datum: str | None, page: tuple[float, float, float, float]
+    pen: Pen,
+    room: LabelRoom,
+    drawn: DrawnView,
+    datum: str | None,
+    page: tuple[float, float, float, float],
+    others: Sequence[DrawnView] = (),
 ) -> list[str]:
-    """Draw the lines of a view with their names, and return the names for which there was no room."""
-    names = _Names(pen, room, drawn, datum, page)
+    """Draw the lines of a view with their names, none of them on the cloth of other views; return the names for which there was no room."""
+    names = _Names(pen, room, drawn, datum, page, others)
     inner, border = names.inside(), names.on_border()
     names.place_along(inner, covered=True)
     names.place_beside(inner)
@@ -65,9 +70,16 @@ class _Names:
     """The names of a view's lines, and which are not written yet."""
 
     def __init__(
-        self, pen: Pen, room: LabelRoom, drawn: DrawnView, datum: str | None, page: tuple[float, float, float, float]
+        self,
+        pen: Pen,
+        room: LabelRoom,
+        drawn: DrawnView,
+        datum: str | None,
+        page: tuple[float, float, float, float],
+        others: Sequence[DrawnView],
     ) -> None:
         """Draw the lines of a view; their names come later."""
+        self._others = others
         self._pen, self._room, self._drawn, self._datum, self._page = pen, room, drawn, datum, page
         stretches = {
             name: _draw_line(pen, drawn, parts, is_datum=name == datum) for name, parts in drawn.view.lines.items()
@@ -177,10 +189,20 @@ class _Names:
             clear = (on if covered else ~on).all(axis=1)
             yield from (batch[k] for k in np.flatnonzero(clear).tolist())
 
+    def _spots_off_others(self, spots: Iterable[Spot], width: float, height: float) -> Iterator[Spot]:
+        """Yield the spots at which a text lies on no cloth of another view."""
+        for batch in in_batches(spots):
+            points = rectangles(batch, width, height)
+            clear = np.ones(len(batch), dtype=bool)
+            for other in self._others:
+                clear &= ~other.covers(points.reshape(-1, 2)).reshape(points.shape[:2]).any(axis=1)
+            yield from (batch[k] for k in np.flatnonzero(clear).tolist())
+
     def _place(self, name: str, spots: Iterable[Spot], *, may_cross: bool = True) -> bool:
         """Write a name at the first spot where there is room for it, and return whether there is one."""
         pen, (width, height) = self._pen, self._size(name)
         others = np.concatenate([np.empty((0, 2)), *(ink for other, ink in self._ink.items() if other != name)])
+        spots = self._spots_off_others(spots, width, height)
         spot = self._room.place(spots, width, height, self._page, others, may_cross=may_cross)
         if spot is None:
             return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -11,28 +12,29 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.labels import LabelRoom, Spot
+from warpflat.export.picture_garment import GarmentViews
 from warpflat.export.picture_lines import draw_lines
 from warpflat.export.picture_packing import pack_boxes, pack_rows
 from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, PAGE_WIDTH, Pen
-from warpflat.export.picture_scale import STRIP, draw_scale_bar
+from warpflat.export.picture_scale import STRIP, STRIP_WORDS, draw_scale_bar
+from warpflat.export.picture_silhouette import Silhouette, Words, heading_room, place_views
 from warpflat.export.picture_views import DrawnView, View
 
 __all__ = ["CAPTIONS_ALONE", "MARGIN", "Cell", "draw_cell", "lay_out"]
 
 MARGIN = 0.25  # [in], as all that follows
-_BESIDE = 0.28  # either side of a view, for names
-_HEADING = 0.32  # above a view, for words and names
-_FOOT = 0.24  # below a view, for names
+_BESIDE, _BESIDE_ALONE = 0.2, 0.12  # either side of a view, for names; those of one piece may stand in the margin
+_FOOT = 0.22  # below a view, for names
+_HIGHEST = 0.15  # a view below the upper edge
 _SMALLEST_PATTERN, _NARROWEST, _NARROWEST_PAGE = 2.0, 1.6, 8.5
-_TALLEST_PIECE, _TALLEST = (
-    8.0,
-    15.0,
-)  # what a piece, half as much again if its views are stacked, and all cells may take
-_SCALES = 0.97 ** np.arange(90)
+_TALLEST_PIECE = 8.0  # half as much again if its views are stacked
+_TALLEST, _TALLEST_WORN = 15.0, 24.0  # all cells, and with the garment on its body
+_SCALES = 0.95 ** np.arange(54)
+_BAND_SCALES = (1.0, 0.9, 0.8, 0.7)  # of the garment on its body
 _REORDERED = 0.02  # how much more of the page pieces must cover to stand otherwise than in rows, in their own order
-_BETWEEN, _CAPTION_SIZE, _TITLE_SIZE = "  ·  ", 7.5, 11.5  # [pt]
+_BETWEEN, _CAPTION_SIZE, _TITLE_SIZE = "  ·  ", 7.5, 10.5  # [pt]
 _STACKED = 2.6  # width of two views side by side over their height, from which they stand one below the other
-CAPTIONS_ALONE = 3.6  # wide, left of the colour bar
+CAPTIONS_ALONE = 4.6  # wide, left of the colour bar
 _SHORTEST_GRAIN = 0.28  # half its length
 
 
@@ -40,8 +42,8 @@ _SHORTEST_GRAIN = 0.28  # half its length
 class Cell:
     """One piece on the page: its name, captions, views, and its place from `left` to the right and from `top` down [in].
 
-    The name of one that is `alone` on its page stands beside the colour bar, above the cell. Views that are `stacked` stand one below
-    the other.
+    The name of one that is `alone` on its page stands beside the colour bar, above the cell; its views stand as near to these words and
+    to each other as their outlines allow. Views that are `stacked` stand one below the other.
     """
 
     name: str
@@ -59,6 +61,9 @@ class Cell:
     left: float = 0.0
     top: float = 0.0
     width: float = 0.0
+    height: float = 0.0
+    places: list[tuple[float, float]] = field(default_factory=list)
+    words: list[Words] = field(default_factory=list)
 
     @property
     def areas(self) -> FloatArray:
@@ -87,17 +92,15 @@ class Cell:
         """Number of views side by side."""
         return 1 if self.stacked else len(self.views)
 
-    @property
-    def head(self) -> float:
-        """Room for the name, the captions and the words or names above the views."""
-        words = _HEADING if self.shows_body else 0.16
-        return words if self.alone else 0.28 + 0.15 * len(self.caption_lines) + words
+    @cached_property
+    def silhouettes(self) -> list[Silhouette]:
+        """Those of the views."""
+        return [Silhouette(view) for view in self.views]
 
     @property
-    def height(self) -> float:
-        """Height of the cell [in]."""
-        between = (_HEADING + _FOOT) * (len(self.views) - self.columns)
-        return self.head + self.inches_per_metre * float(self.extent[1]) + between + _FOOT
+    def covered(self) -> float:
+        """The area of the page that the views cover [in2]."""
+        return self.inches_per_metre**2 * sum(shape.area for shape in self.silhouettes)
 
     def stack_if_wide(self) -> None:
         """Choose whether the two views stand side by side."""
@@ -106,48 +109,94 @@ class Cell:
 
     def fit(self, pen: Pen, scale: float) -> None:
         """Choose scale [in/m], width and captions; a piece that would become too small to read is drawn larger."""
-        beside = 2 * _BESIDE * self.columns
+        beside = 2 * (_BESIDE_ALONE if self.alone else _BESIDE) * self.columns
         widest = (PAGE_WIDTH - 2 * MARGIN - beside) / max(float(self.extent[0]), 1e-9)
         readable = _SMALLEST_PATTERN / max(float(self.pattern.size[:2].max()), 1e-9)
         self.inches_per_metre = max(scale, min(widest, readable))
         named = pen.measure(self.name, _TITLE_SIZE, "bold")[0] + 0.15
         self.width = max(self.inches_per_metre * float(self.extent[0]) + beside, _NARROWEST, named)
+        if self.alone:
+            self.width = max(self.width, _NARROWEST_PAGE - 2 * MARGIN)
         self.caption_lines = _wrapped(pen, self)
+        self._place_views(pen, named)
+
+    def _place_views(self, pen: Pen, named: float) -> None:
+        """Place the views in the cell below its words, whose name is so wide [in]."""
+        words = max(named, *(pen.measure(line, _CAPTION_SIZE)[0] for line in self.caption_lines), 0.0)
+        above = STRIP - 0.08 if self.alone else 0.0
+        self.words = [Words(left=0.0, right=words, bottom=0.25 + 0.15 * len(self.caption_lines) - above)]
+        if self.alone:
+            self.words.append(Words(left=CAPTIONS_ALONE - 0.1, right=PAGE_WIDTH, bottom=STRIP_WORDS - STRIP))
+        self.places = place_views(
+            self.silhouettes,
+            self.inches_per_metre,
+            width=self.width,
+            stacked=self.stacked,
+            words=self.words,
+            top=_HIGHEST - (STRIP if self.alone else 0.0),
+            has_headings=self.shows_body,
+        )
+        ends = [
+            low + self.inches_per_metre * shape.height
+            for (_, low), shape in zip(self.places, self.silhouettes, strict=True)
+        ]
+        self.height = max(ends) + _FOOT
 
 
-def lay_out(pen: Pen, cells: Sequence[Cell]) -> tuple[float, float, float]:
+def lay_out(pen: Pen, cells: Sequence[Cell], worn: GarmentViews | None = None) -> tuple[float, float, float]:
     """Choose the scale and the place of each piece, from the upper left corner; return width and height of the page, and the scale [in/m].
 
     All pieces have the same scale, so that they can be compared; only one that would become too small to read is
-    drawn larger. The scale is the one that leaves least of the page empty.
+    drawn larger. A garment on its body comes first, at a scale of its own. The scales are those that leave least of the page empty.
     """
-    room = PAGE_WIDTH - 2 * MARGIN
-    limits = [
-        min(
-            (room - 2 * _BESIDE * cell.columns) / max(float(cell.extent[0]), 1e-9),
-            _TALLEST_PIECE * (1.5 if cell.stacked else 1.0) / max(float(cell.extent[1]), 1e-9),
-        )
-        for cell in cells
-    ]
+    room, tallest = PAGE_WIDTH - 2 * MARGIN, _TALLEST if worn is None else _TALLEST_WORN
+    if worn is None and len(cells) == 1:
+        return _lay_out_one(pen, cells[0], room)
     own_order = list(range(len(cells)))
     by_height = sorted(range(len(cells)), key=lambda k: -float(cells[k].extent[1]))
     found = []
-    for scale in min(limits) * _SCALES:
+    for scale in min(_largest_scale(cell, room) for cell in cells) * _SCALES:
         for cell in cells:
             cell.fit(pen, scale)
-        covered = sum(float(np.prod(cell.extent)) * cell.inches_per_metre**2 for cell in cells)
-        for order, pack in ((own_order, pack_rows), (by_height, pack_boxes)):
-            places, wide, tall = pack([(cells[k].width, cells[k].height) for k in order], room)
-            wide = max(wide, _NARROWEST_PAGE - 2 * MARGIN)
-            share = covered / (wide * tall) - (_REORDERED if order is by_height else 0.0)
-            found.append((max(0.0, tall - _TALLEST), -share, scale, order, places, wide, tall))
-    _, _, scale, order, places, wide, tall = min(found, key=lambda each: each[:2])
+        covered = sum(cell.covered for cell in cells)
+        for share in _BAND_SCALES if worn is not None else (1.0,):
+            band = [] if worn is None else [worn.size(share, room)]
+            shown = covered + (0.0 if worn is None else worn.covered(share, room))
+            for order, pack in ((own_order, pack_rows), (by_height, pack_boxes)):
+                places, wide, tall = pack([*band, *((cells[k].width, cells[k].height) for k in order)], room)
+                wide = max(wide, _NARROWEST_PAGE - 2 * MARGIN)
+                empty = _REORDERED * (order is by_height) - shown / ((wide + 2 * MARGIN) * (tall + STRIP))
+                found.append((max(0.0, tall - tallest), empty, scale, share, order, places, wide, tall))
+    _, _, scale, share, order, places, wide, tall = min(found, key=lambda each: each[:2])
+    if worn is not None:
+        worn.place(share, room, wide, beside=any(top < worn.size(share, room)[1] for _, top in places[1:]))
+        places = places[1:]
     for k, (left, top) in zip(order, places, strict=True):
         cells[k].fit(pen, scale)
         cells[k].left, cells[k].top = MARGIN + left, top
-    if len(cells) == 1:
-        cells[0].width = wide
     return wide + 2 * MARGIN, tall, float(scale)
+
+
+def _largest_scale(cell: Cell, room: float) -> float:
+    """Return the largest scale of a piece on a page with so much room [in/m]."""
+    beside = 2 * (_BESIDE_ALONE if cell.alone else _BESIDE) * cell.columns
+    tallest = _TALLEST_PIECE * (1.5 if cell.stacked else 1.0)
+    return min((room - beside) / max(float(cell.extent[0]), 1e-9), tallest / max(float(cell.extent[1]), 1e-9))
+
+
+def _lay_out_one(pen: Pen, cell: Cell, room: float) -> tuple[float, float, float]:
+    """Lay out one piece, its views side by side or one below the other; as :func:`lay_out`."""
+    found = []
+    for stacked in (False, True) if cell.alone and len(cell.views) > 1 else (cell.stacked,):
+        cell.stacked = stacked
+        scale = _largest_scale(cell, room)
+        cell.fit(pen, scale)
+        empty = 1.0 - cell.covered / ((cell.width + 2 * MARGIN) * (cell.height + STRIP))
+        found.append((max(0.0, cell.height - _TALLEST), empty, stacked, scale))
+    _, _, cell.stacked, scale = min(found)
+    cell.fit(pen, scale)
+    cell.left, cell.top = MARGIN, 0.0
+    return cell.width + 2 * MARGIN, cell.height, scale
 
 
 def _wrapped(pen: Pen, cell: Cell) -> list[str]:
@@ -184,18 +233,18 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     pen.write(cell.left, title - 0.13, cell.name, _TITLE_SIZE, fontweight="bold")
     for index, text in enumerate(cell.caption_lines):
         pen.write(cell.left, title - 0.32 - 0.15 * index, text, _CAPTION_SIZE, color=GREY)
-    size, shown = cell.inches_per_metre, []
-    frames = _frames(cell, top)
-    for view, (left, bottom, right, upper) in zip(cell.views, frames, strict=True):
-        width, height = view.size[:2] * size
-        x, y = 0.5 * (left + right - float(width)), 0.5 * (bottom + upper - float(height))
-        drawn = DrawnView(view, left=x, bottom=y, inches_per_metre=size, dpi=DPI)
+    size, shown = cell.inches_per_metre, list[DrawnView]()
+    for view, (left, low) in zip(cell.views, cell.places, strict=True):
+        y = top - low - size * float(view.size[1])
+        drawn = DrawnView(view, left=cell.left + left, bottom=y, inches_per_metre=size, dpi=DPI)
         drawn.draw(pen.axes, energy_colours(cell.density, scale))
         shown.append(drawn)
     room = LabelRoom()
+    for box in cell.words:
+        room.take_box(cell.left + box.left, top - box.bottom, cell.left + box.right, top - box.bottom + 0.5)
     if cell.shows_body:
-        for drawn, frame, words in zip(shown, frames, ("on the body", "pattern"), strict=True):
-            _heading(pen, room, drawn, words, frame[3] + 0.24)
+        for drawn, shape, words in zip(shown, cell.silhouettes, ("on the body", "pattern"), strict=True):
+            _heading(pen, room, drawn, words, drawn.box[3] - heading_room(shape, size) + 0.24)
     floor = top - cell.height + 0.02
     if cell.alone or size != page_scale:
         end = draw_scale_bar(pen, cell.left, floor, size)
@@ -203,10 +252,10 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     datum = cell.pattern.lines.get(cell.datum, [None])[0] if cell.datum is not None else None
     has_grain = datum is None or _grain(pen, room, shown[-1], datum, cell.grain_angle)
     unnamed: dict[str, None] = {}
-    # Names may stand below and above a view, and beside it.
-    pages = [(left, bottom - _FOOT + 0.02, right, upper + 0.2) for left, bottom, right, upper in frames]
+    pages = _pages(cell, shown, top)
     for drawn, page in zip(shown, pages, strict=True):
-        unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, cell.datum, page))
+        others = [other for other in shown if other is not drawn]
+        unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, cell.datum, page, others))
     if not has_grain and datum is not None and not _grain(pen, room, shown[-1], datum, cell.grain_angle, pages[-1]):
         unnamed["grain"] = None
     if unnamed:
@@ -214,18 +263,17 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
         pen.write(cell.left, floor + 0.04, text, 7, color=GREY)
 
 
-def _frames(cell: Cell, top: float) -> list[tuple[float, float, float, float]]:
-    """Return left, bottom, right and upper edge of the room of each view of a cell whose upper edge is at `top` [in]."""
-    heights = [cell.inches_per_metre * float(view.size[1]) for view in cell.views]
-    upper = top - cell.head
+def _pages(cell: Cell, shown: Sequence[DrawnView], top: float) -> list[tuple[float, float, float, float]]:
+    """Return left, bottom, right and upper edge of the room for the names of each view of a cell whose upper edge is at `top` [in]."""
+    outside = _BESIDE - _BESIDE_ALONE if cell.alone else 0.0
+    left, right = cell.left - outside, cell.left + cell.width + outside
+    floor = top - cell.height + 0.02
+    edges = [view.box for view in shown]
     if cell.stacked:
-        below = upper - heights[0] - _FOOT - _HEADING
-        right = cell.left + cell.width
-        return [(cell.left, upper - heights[0], right, upper), (cell.left, below - heights[1], right, below)]
-    widths = [cell.inches_per_metre * float(view.size[0]) for view in cell.views]
-    spare = (cell.width - sum(widths)) / len(widths)
-    ends = cell.left + np.cumsum([0.0, *(width + spare for width in widths)])
-    return [(left, upper - max(heights), right, upper) for left, right in pairwise(ends.tolist())]
+        return [(left, max(box[1] - _FOOT, floor), right, box[3] + 0.2) for box in edges]
+    between = [0.5 * (a[2] + b[0]) for a, b in pairwise(edges)]
+    sides = pairwise([left, *between, right])
+    return [(start, floor, end, box[3] + 0.2) for (start, end), box in zip(sides, edges, strict=True)]
 
 
 def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) -> None:

@@ -9,12 +9,13 @@ from warpflat.export.colours import SMALLEST_SCALE, energy_colours
 from warpflat.export.picture_pen import DPI, GREY, POINT, Pen
 from warpflat.export.picture_views import INK
 
-__all__ = ["STRIP", "draw_colour_bar", "draw_scale_bar", "length_text"]
+__all__ = ["STRIP", "STRIP_WORDS", "draw_colour_bar", "draw_scale_bar", "length_text"]
 
 STRIP = 0.66  # [in], as all that follows
+STRIP_WORDS = 0.52  # where the words of the strip end
 _BAR_HEIGHT = 0.17
 _BAR_TIP = 0.03  # of its length, for what lies above the scale
-_NOTE = 2.0  # room right of the bar for what it leaves out
+_NOTE, _POWER = 2.0, 0.7  # room right of the bar for what it leaves out, and for a power of ten
 _TICK_SIZE = 8.5  # [pt]
 
 
@@ -41,6 +42,8 @@ def draw_colour_bar(
 ) -> None:
     """Draw the colour bar from `left` [in] to the right margin, and the share of the area above its end.
 
+    A surface without strain needs no scale: words say so.
+
     Args:
         scale: upper end of the colours [J/m2].
         density, areas: #F [J/m2] and [m2] of all faces.
@@ -52,13 +55,14 @@ def draw_colour_bar(
     from warpflat.export.picture_pixels import Pixels
 
     above = density > scale
-    if scale <= SMALLEST_SCALE:
-        pen.write(left, top - 0.24, f"no {quantity}: the cloth lies flat without strain", 9.5)
+    if scale <= SMALLEST_SCALE and not above.any():
+        pen.write(left, top - 0.24, f"{quantity}: none, the cloth lies flat without strain", 9.5)
         return
     words = f"{quantity} [J/m²]"
     pen.write(left, top - 0.24, words, 9.5)
     left += pen.measure(words, 9.5)[0] + 0.15
-    right = pen.page_width - (_NOTE if above.any() else 0.35)
+    _, _, power = _ticks(scale, 1.0)
+    right = pen.page_width - (_NOTE if above.any() else _POWER if power else 0.35)
     upper = top - 0.24 + 0.5 * _BAR_HEIGHT
     lower = upper - _BAR_HEIGHT
     end = left + (right - left) / (1.0 + _BAR_TIP) if above.any() else right
@@ -80,7 +84,7 @@ def draw_colour_bar(
         pen.line(np.array([(place, lower), (place, lower - 3 * POINT)]), width=0.6, colour="black")
         pen.write(place, lower - 5 * POINT, word, _TICK_SIZE, color="black", ha="center", va="top")
     if power:
-        pen.write(right + 0.08, lower - 5 * POINT, power, 8, color="black", va="top")
+        pen.write(right + 0.16, lower - 5 * POINT, power, 8, color="black", va="top")
     total = float(areas.sum())
     if above.any() and total > 0.0:
         share = float(areas[above].sum()) / total

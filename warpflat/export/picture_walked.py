@@ -13,6 +13,7 @@ from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.export.letters import all_letters
+from warpflat.export.picture_packing import pack_boxes
 from warpflat.export.picture_png import save_png
 from warpflat.pattern.walked import WalkedSeam
 
@@ -21,15 +22,17 @@ if TYPE_CHECKING:
 
 __all__ = ["write_walked_picture"]
 
-#: Seams in a row, the width of each and its greatest height; the height of the page's and of a seam's title, and the margin around [in].
+#: Seams in a row at most, the width of each and its greatest height; the height of the page's title, of the cloth above a seam, which
+#: bears its title, and the margin around [in].
 COLUMNS, CELL, TALLEST = 3, 4.4, 1.1
-HEAD, TITLE, MARGIN = 0.5, 0.36, 0.14
+HEAD, CLOTH, MARGIN = 0.34, 0.62, 0.08
 COLOURS = ("#1f5fa8", "#c8452c")
+_CLOTH_ALPHA = 0.2
 
 
 @all_letters()
 def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSeam], *, title: str) -> None:
-    """Draw every seam with its first side in blue and its second in red, upright lengths true to each other.
+    """Draw every seam with its first side in blue and its second in red, each with the cloth above it, upright lengths true to each other.
 
     Args:
         path: the file, ``*.png``.
@@ -44,20 +47,30 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
 
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
-    rows = [[_fitted(seam) for seam in seams[first : first + COLUMNS]] for first in range(0, len(seams), COLUMNS)]
-    heights = [TITLE + 2 * MARGIN + max(float(np.ptp(lines[0], axis=0)[1]) for lines in row) for row in rows]
-    tops = HEAD + np.cumsum([0.0, *heights])
-    width, height = COLUMNS * CELL, float(tops[-1]) + MARGIN
+    # The tallest first, so that the columns end at nearly the same height.
+    seams = sorted(seams, key=lambda seam: -float(np.ptp(_fitted(seam)[0], axis=0)[1]))
+    fitted = [_fitted(seam) for seam in seams]
+    sizes = [(CELL, CLOTH + 2 * MARGIN + float(np.ptp(lines[0], axis=0)[1])) for lines in fitted]
+    # As many columns as leave least of the page empty.
+    packed = [pack_boxes(sizes, columns * CELL) for columns in range(2, COLUMNS + 1)]
+    places, width, foot = min(packed, key=lambda found: found[1] * (found[2] + HEAD))
+    width, height = max(width, 2 * CELL), HEAD + foot + MARGIN
     figure = Figure(figsize=(width, height), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     # One axis over the page, in inches: an axis for each seam takes longer than all that is drawn in it.
     axis = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(0.0, height))
     axis.set_axis_off()
-    for number, seam in enumerate(seams):
-        row, column = divmod(number, COLUMNS)
-        _draw_seam(axis, seam, rows[row][column], (column + 0.5) * CELL, height - float(tops[row]), heights[row])
+    for seam, lines, (left, top) in zip(seams, fitted, places, strict=True):
+        _draw_seam(axis, seam, lines, left + 0.5 * CELL, height - HEAD - top)
     words = f"{title}: the two sides of each seam laid upon each other, right sides together, darts closed [mm]"
-    axis.text(0.5 * width, height - 0.26, words, fontsize=11, ha="center", va="center", parse_math=False)
+    axis.text(
+        MARGIN,
+        height - 0.5 * HEAD,
+        words,
+        fontsize=min(11.0, 135.0 * (width - 2 * MARGIN) / len(words)),
+        va="center",
+        parse_math=False,
+    )
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
 
@@ -74,18 +87,29 @@ def _fitted(seam: WalkedSeam) -> list[FloatArray]:
     return [scale * (both - middle), *(scale * (rows @ along - middle) for rows in (*seam.sides, *seam.notches))]
 
 
-def _draw_seam(
-    axis: Axes, seam: WalkedSeam, lines: Sequence[FloatArray], middle: float, top: float, height: float
-) -> None:
-    """Draw a seam, fitted, in a cell, whose middle, upper edge and height are given [in]."""
+def _draw_seam(axis: Axes, seam: WalkedSeam, lines: Sequence[FloatArray], middle: float, top: float) -> None:
+    """Draw a seam, fitted, in a cell, whose middle and upper edge are given [in]."""
+    import shapely
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Polygon
 
-    centre = np.array([middle, top - TITLE - 0.5 * (height - TITLE)])
+    upper = top - MARGIN
+    seam_height = float(np.ptp(lines[0], axis=0)[1])
+    centre = np.array([middle, upper - CLOTH - 0.5 * seam_height])
+    half = 0.5 * CELL - MARGIN
+    room = shapely.box(middle - half, upper - CLOTH - seam_height - MARGIN, middle + half, upper)
     for line, notches, colour in zip(lines[1:3], lines[3:], COLOURS, strict=True):
-        axis.add_artist(Line2D(*(line + centre).T, color=colour, linewidth=1.6, alpha=0.85))
+        on_page = line + centre
+        # The pieces lie to the left of their seam: above it, where it runs to the right.
+        cloth = shapely.LineString(on_page).buffer(CLOTH + MARGIN, single_sided=True, join_style="round")
+        for part in shapely.get_parts(shapely.intersection(cloth, room)):
+            axis.add_patch(
+                Polygon(shapely.get_coordinates(part.exterior), facecolor=colour, alpha=_CLOTH_ALPHA, linewidth=0)
+            )
+        axis.add_artist(Line2D(*on_page.T, color=colour, linewidth=1.6, alpha=0.85))
         axis.add_artist(Line2D(*(notches + centre).T, color=colour, marker="|", markersize=9, linestyle=""))
     notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"
     words = (
         f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip()
     )
-    axis.text(middle, top - 0.5 * TITLE, words, fontsize=9, ha="center", va="center", parse_math=False)
+    axis.text(middle, upper - 0.4 * CLOTH, words, fontsize=9, ha="center", va="center", parse_math=False)

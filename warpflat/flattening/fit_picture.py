@@ -41,7 +41,9 @@ _BODY_MAPS = {
     "body_pressure": ("on the wearer: pressure", 1.0, "Pa"),
 }
 _ALL_MAPS = {**MAPS, **_BODY_MAPS}
-_NOT_AROUND = "#e4e4e4"
+_NOT_AROUND = "#c8c8c8"
+# A map whose values fill less of its scale is told in words.
+_EVEN = 0.1
 # Maps that are compared at a glance share a scale.
 _ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))
 # The fabric's strain limit applies to its threads.
@@ -51,8 +53,8 @@ _MMHG = 133.322  # [Pa]
 
 # Of a garment's sheet: a piece's greatest width and height, the labels' width, and the margins [in].
 _COLUMN, _TALLEST = 2.5, 4.2
-_LABEL = 2.5
-_TOP, _BOTTOM = 0.95, 1.0
+_LABEL = 2.4
+_TOP, _BOTTOM = 0.88, 0.9
 _LETTERS = 36  # in a line of a label
 
 
@@ -77,7 +79,7 @@ def _scale_of(values: FloatArray, area: FloatArray, unit: str, *, from_nothing: 
         # Not so narrow that what is as good as even looks uneven.
         start = 0.0 if low < 0.3 * high else min(low, 0.8 * high)
         return _Scale(colours="YlOrRd", low=start, high=max(high, least, start + 0.1 * least))
-    # White is rest; red pulls, blue is slack.
+    # Cloth's own colour is rest; red pulls, blue is slack.
     reach = max(abs(low), abs(high), least, limit)
     return _Scale(colours="RdBu_r", low=-reach, high=reach)
 
@@ -128,7 +130,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     span = np.ptp(result.positions, axis=0)
     width = 3.4
     height = float(np.clip(width * span[1] / max(float(span[0]), 1e-9), 1.6, 6.5))
-    figure = Figure(figsize=(3 * (width + 1.1), 2 * (height + 0.75) + 0.5), dpi=110, facecolor="white")
+    figure = Figure(figsize=(3 * (width + 0.85), 2 * (height + 0.45) + 0.4), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     fit = result.fit
     scales, strokes = _scales([fit], [[name] for name in MAPS]), _Strokes.of(result)
@@ -138,8 +140,15 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
         axis.set_aspect("equal")
         axis.set_axis_off()
         axis.autoscale_view()
+        low, high = (factor * weighted_percentile(getattr(fit, name), fit.area, share) for share in (0.01, 0.99))
+        if high - low < _EVEN * (scales[name].high - scales[name].low):
+            # A scale would show one flat colour.
+            axis.set_title(f"{label}, even: {_shown(low)} to {_shown(high)} {unit}", fontsize=10)
+            continue
         axis.set_title(f"{label}, median {_shown(_median(fit, name) * factor)} {unit}", fontsize=10)
-        bar = figure.colorbar(drawn, ax=axis, shrink=0.75, extend=scales[name].extend, pad=0.02)
+        bar = figure.colorbar(
+            drawn, ax=axis, shrink=0.75, extend=scales[name].extend, pad=0.02, fraction=0.06, aspect=25
+        )
         bar.set_label(unit, fontsize=9)
         bar.ax.tick_params(labelsize=8)
         _mark_limit(bar, name, fit.limit, scales[name])
@@ -147,7 +156,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
         f"{result.surface.name} in {result.fabric.name}, as worn: {_verdict(fit)}; limit {100 * fit.limit:.3g} %",
         fontsize=12,
     )
-    figure.tight_layout()
+    figure.tight_layout(pad=0.5, h_pad=0.8, w_pad=0.8, rect=(0.0, 0.0, 1.0, 0.985))
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
 
@@ -236,10 +245,10 @@ class _Sheet:
         width, height = (max(float(spans[:, axis].max()), 1e-9) for axis in (0, 1))
         inches = min(_COLUMN / width, _TALLEST / height)
         rows = [
-            max(float(span) * inches, 1.35 if result.fit.fits else 2.5) + 0.3
+            max(float(span) * inches, 1.35 if result.fit.fits else 2.5) + 0.18
             for span, result in zip(spans[:, 1], results, strict=True)
         ]
-        column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.25
+        column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.12
         return cls(inches=inches, column=column, rows=tuple(rows), columns=columns)
 
     @property
@@ -370,13 +379,13 @@ def _draw_map(
     axis: Axes, places: FloatArray, result: Flattening, strokes: _Strokes, name: str, scale: _Scale, body: OnBody
 ) -> ScalarMappable:
     """Draw a map of a piece whose vertices come to lie at `places` (#P by 2) in the units of the axis."""
-    from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
+    from warpflat.export.colours import on_cloth
     from warpflat.export.picture_faces import ColouredFaces
 
-    colours = colormaps[scale.colours].with_extremes(bad=_NOT_AROUND)
+    colours = on_cloth(scale.colours).with_extremes(bad=_NOT_AROUND)
     mappable = ScalarMappable(Normalize(scale.low, scale.high), colours)
     axis.add_artist(ColouredFaces(places, result.faces, _values(result.fit, body, name), mappable))
     _draw_segments(axis, places[strokes.lines], "#808080", 0.4)

@@ -23,7 +23,7 @@ from warpflat.core.polyline import polyline_length
 from warpflat.flattening.progress import CONTACT
 from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
-from warpflat.model.springs import spring_geometry
+from warpflat.model.springs import spring_geometry, springs_of
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.cells import make_cells
@@ -94,7 +94,7 @@ class Gradient:
     def vertices(self) -> FloatArray:
         """The derivative by the vertices of the surface in space, #V by 3 [per m].
 
-        Rest lengths and the shapes of faces follow the vertices; the stiffness of the springs is held.
+        Rest lengths, stiffnesses and the shapes of faces follow the vertices. The directions in which springs run over the cloth are held.
         """
         around, step = _Neighbours(self.network), _difference(self.network)
         found = np.zeros((int(self.vertex_origin.max()) + 1, 3))
@@ -104,7 +104,7 @@ class Gradient:
                 for side in (step, -step):
                     vertices = self.network.surface.vertices.copy()
                     vertices[group, axis] += side
-                    force = _forces(_with_vertices(self.network, vertices), self.positions)
+                    force = _forces(_with_vertices(self.network, vertices, self.positions), self.positions)
                     change += np.einsum("ij,ij->i", self.adjoint, force) / (2.0 * side)
                 np.add.at(found[:, axis], self.vertex_origin[group], (around.matrix @ change)[group])
         return found
@@ -215,16 +215,35 @@ def _forces(network: SpringNetwork, positions: FloatArray) -> FloatArray:
     return np.array(Relaxation(network, RelaxOptions(), start=positions).forces())
 
 
-def _with_vertices(network: SpringNetwork, vertices: FloatArray) -> SpringNetwork:
-    """Return the network of a surface whose vertices have moved; an intended stretch and the stiffness of its springs are kept."""
+def _with_vertices(network: SpringNetwork, vertices: FloatArray, positions: FloatArray) -> SpringNetwork:
+    """Return the network of a surface whose vertices have moved; an intended stretch is kept.
+
+    The springs' stiffnesses change as those do whose directions are measured in `positions` (#P by 2 [m]).
+    """
     surface = replace(network.surface, vertices=vertices)
     springs = network.spring_arrays
     shortened = springs.listed_length / spring_geometry(network.surface).listed_length
-    return replace(
-        network,
-        surface=surface,
-        spring_arrays=replace(springs, listed_length=spring_geometry(surface).listed_length * shortened),
-        cell_arrays=make_cells(surface),
+    changed = replace(springs, listed_length=spring_geometry(surface).listed_length * shortened)
+    if network.model == "springs":
+        before, after = (
+            springs_of(each, network.fabric, positions, grain_angle=network.grain_angle)
+            for each in (network.surface, surface)
+        )
+        changed = replace(
+            changed,
+            listed_stiffness=springs.listed_stiffness + after.listed_stiffness - before.listed_stiffness,
+            shear_deficit=_moved(springs.shear_deficit, before.shear_deficit, after.shear_deficit),
+            hourglass=_moved(springs.hourglass, before.hourglass, after.hourglass),
+        )
+    return replace(network, surface=surface, spring_arrays=changed, cell_arrays=make_cells(surface))
+
+
+def _moved(values: FloatArray | None, before: FloatArray | None, after: FloatArray | None) -> FloatArray | None:
+    """Return values changed by what `after` differs from `before`; None stands for noughts."""
+    if before is None and after is None:
+        return values
+    return np.asarray(
+        sum(sign * each for sign, each in ((1.0, values), (1.0, after), (-1.0, before)) if each is not None)
     )
 
 

@@ -13,7 +13,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.errors import InputError
 from warpflat.core.manifest import record_file
-from warpflat.export.colours import energy_colours
+from warpflat.export.colours import SMALLEST_SCALE, energy_colours
 from warpflat.export.geometry import outline_edges
 from warpflat.export.raster import rasterise, shade
 from warpflat.review.film import FilmPiece, Shape, open_film
@@ -153,11 +153,15 @@ def _with_foot(image: Image.Image, words: str, energy: float) -> Image.Image:
     page = Image.new("RGB", (image.width, image.height + _FOOT), (_PAPER,) * 3)
     page.paste(image)
     pen, middle = ImageDraw.Draw(page), image.height + _FOOT // 2 - 2
+    pen.text((_MARGIN, middle), words, fill=_INK, anchor="lm")
+    if energy <= SMALLEST_SCALE:
+        pen.text((page.width - _MARGIN, middle), "no strain", fill=_INK, anchor="rm")
+        return page
     limit = f"{energy:.3g} J/m2"  # the font has no superscripts
     right = page.width - _MARGIN - int(pen.textlength(limit))
     ramp = np.round(255.0 * energy_colours(np.linspace(0.0, 1.0, 60), 1.0)).astype(np.uint8)
     page.paste(Image.fromarray(np.tile(ramp, (8, 1, 1))), (right - 66, middle - 4))
-    for x, text in ((_MARGIN, words), (right - 76, "0"), (right, limit)):
+    for x, text in ((right - 76, "0"), (right, limit)):
         pen.text((x, middle), text, fill=_INK, anchor="lm")
     return page
 

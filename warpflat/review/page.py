@@ -14,6 +14,7 @@ from typing import Any
 from warpflat.core.activity import report_activity
 from warpflat.core.atomic_files import atomic_path, latest_file
 from warpflat.core.errors import InputError
+from warpflat.export.colours import SMALLEST_SCALE
 from warpflat.review.film import open_film, pack_film
 from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
 
@@ -161,11 +162,16 @@ def _film_section(film: Mapping[str, Any]) -> str:
     )
     colours = base64.b64decode(film["colours"])
     stops = ",".join(f"rgb({colours[i]},{colours[i + 1]},{colours[i + 2]})" for i in range(0, len(colours), 3 * 15))
+    hint = "drag to turn, shift-drag to move, wheel to zoom"
+    scale = (
+        f'0 <i style="background:linear-gradient(90deg,{stops})"></i> {film["scale"]:.3g} J/m² strain energy density · '
+    )
+    if film["scale"] <= SMALLEST_SCALE:
+        scale = "No strain energy: the cloth lies flat without strain · "
     return (
         f'<div class="stage"><canvas id="view"></canvas><div class="bar"><button id="play">Play</button>'
         f'<input id="slider" type="range" min="0" value="0" aria-label="frame"><span id="label"></span>{buttons}</div>'
-        f'<div class="scale">0 <i style="background:linear-gradient(90deg,{stops})"></i> {film["scale"]:.3g} J/m² strain '
-        "energy density · drag to turn, shift-drag to move, wheel to zoom</div></div>"
+        f'<div class="scale">{scale}{hint}</div></div>'
         f'<script id="film" type="application/json">{data}</script>'
     )
 

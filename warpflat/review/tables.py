@@ -40,7 +40,7 @@ def summary_cards(metrics: Metrics) -> str:
     ]
     if metrics.get("seams"):
         worst = max(abs(seam["difference_mm"]) for seam in metrics["seams"])
-        cards.insert(3, (f"{worst:.2g} mm", "largest seam difference"))
+        cards.insert(3, (f"{worst:.2f} mm", "largest seam difference"))
     boxes = "".join(f'<div class="card"><b>{escape(value)}</b><span>{what}</span></div>' for value, what in cards)
     return f'{verdict}<div class="cards">{boxes}</div>'
 

@@ -41,7 +41,7 @@ _PARTS = 20 / 60
 # So many vertices of computed layouts a stage keeps at most: they fill some 200 MB. Frames between them take no room.
 _MOST_VERTICES = 6_000_000
 # Points of frames between computed layouts are stored, for readers that look at stored samples only, where a film of one stage has at most
-# so many of them: some 10 MB. In larger films USD interpolates them.
+# so many of them, some 10 MB, and the scene does not ask for a compact one. Otherwise USD interpolates them.
 _MOST_STORED = 1_000_000
 # A layout is kept if it lies at least this share of the stage's way from the one kept before.
 _KEPT = 0.05
@@ -72,7 +72,7 @@ class Film:
         self.wanted = FrameSchedule(output).wanted
         self._surfaces = {surface.name: surface for surface in surfaces}
         vertices = sum(len(surface.vertices) for surface in surfaces)
-        self._all_stored = vertices * max(output.frames, 1) <= _MOST_STORED
+        self._all_stored = not output.compact_film and vertices * max(output.frames, 1) <= _MOST_STORED
         self.recorders = {
             name: FrameRecorder(None, surface, self._schedule) for name, surface in self._surfaces.items()
         }
@@ -104,18 +104,28 @@ class Film:
 
     def _write_at_end(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
-            from warpflat.export.usd import FrameWriter, film_scale
+            from warpflat.export.usd import FrameWriter
 
             report_activity("writing the film")
-            last = [recorder.stages[-1] for recorder in self.recorders.values()]
-            ends = [self._keys.density(stage, stage.keys[-1]) for stage in last]
-            scale = film_scale(list(self._surfaces.values()), ends)
-            with FrameWriter(self._folder / "frames.usdc", scale=scale) as writer:
+            with FrameWriter(self._folder / "frames.usdc", scale=self._scale()) as writer:
                 if self._mannequin is not None:
                     self._show_mannequin(writer, self._mannequin)
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
                 self._write(writer)
+
+    def _scale(self) -> float:
+        """Return the upper end of the colours [J/m2]: by the last frames, or by the first ones if the pieces end without strain."""
+        from warpflat.export.colours import SMALLEST_SCALE
+        from warpflat.export.usd import film_scale
+
+        for at in (-1, 0):
+            stages = [recorder.stages[at] for recorder in self.recorders.values()]
+            densities = [self._keys.density(stage, stage.keys[at]) for stage in stages]
+            scale = film_scale(list(self._surfaces.values()), densities)
+            if scale > SMALLEST_SCALE:
+                break
+        return scale
 
     def _show_mannequin(self, writer: FrameWriter, mannequin: Mannequin) -> None:
         from warpflat.mannequin.normals import vertex_normals

@@ -209,6 +209,8 @@ class OutputTable(Table):
     """About how many frames from the development to rest, with more for every cut; 0 for no `frames.usdc`."""
     frame_every: Annotated[int, Field(ge=1)] | None = None
     """A frame every so many steps instead, as they are."""
+    compact_film: bool = False
+    """Whether `frames.usdc` stores points of computed layouts only; USD interpolates those of frames between."""
     picture: bool = True
     review: bool = True
     """Whether a run with a picture writes `review.html`, too."""

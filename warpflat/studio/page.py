@@ -34,8 +34,9 @@ from warpflat.studio.worker import Worker
 
 __all__ = ["Page"]
 
-# Seconds between two pictures: at most ten a second, and the newest wins.
-_BETWEEN = 0.1
+# Seconds between two pictures: at most ten a second, and the newest wins. Words alone take no picture's turn, so that the first picture
+# of an edit comes as soon as there is one.
+_BETWEEN, _BETWEEN_WORDS = 0.1, 0.02
 
 
 class Page:
@@ -100,27 +101,28 @@ class Page:
         self._dirty.set()
 
     def _paint(self) -> None:
-        """Draw what is new, at most ten times a second."""
+        """Draw what is new, pictures at most ten times a second."""
         while True:
             self._dirty.wait()
             if self._closed:
                 return
             self._drawing = True
             self._dirty.clear()
-            begun = time.monotonic()
+            begun, pause = time.monotonic(), _BETWEEN
             try:
-                self._draw()
+                pause = _BETWEEN if self._draw() else _BETWEEN_WORDS
             except Exception:
                 # The next picture may be a better one; the fault is told where programs tell them.
                 traceback.print_exc()
             self._drawing = False
-            time.sleep(max(0.0, _BETWEEN - (time.monotonic() - begun)))
+            time.sleep(max(0.0, pause - (time.monotonic() - begun)))
 
-    def _draw(self) -> None:
+    def _draw(self) -> bool:
+        """Draw what is new, and return whether pieces are."""
         solution, live = self.session.shown, self._frames
         if solution is None and not live:
             self._update_panel()
-            return
+            return False
         drape = self.session.step.drape if self.session.preview is None and not live else None
         given_up = self.session.step is not self._drape_of or self.session.error
         if self._kind == "drape" and drape is None and given_up and self.session.preview is None and not live:
@@ -128,7 +130,8 @@ class Page:
             self._panel.set_map("energy")
         kind = self._kind if self._kind != "drape" or drape is not None else "energy"
         state = (solution, kind, drape, *live.values())
-        if state != self._drawn:
+        is_new = state != self._drawn
+        if is_new:
             self._drawn = state
             self._draw_pieces(self._pieces(solution, live, kind, drape), kind, drape, at_rest=not live)
             if not live and solution is not None:
@@ -136,6 +139,7 @@ class Page:
         if self._told:
             self._told = False
             self._update_panel()
+        return is_new
 
     def _draw_pieces(self, pieces: Mapping[str, Shown], kind: str, drape: Drape | None, *, at_rest: bool) -> None:
         """Draw pieces; while they are being relaxed the scale and their places on the table stay."""

@@ -19,13 +19,14 @@ from warpflat.scene.load import Scene
 from warpflat.studio.maps import MAPS, Scale
 from warpflat.studio.session import Preview, Session
 
-__all__ = ["Actions", "Panel"]
+__all__ = ["Actions", "Panel", "preview_words"]
 
 _OWN = "(the scene's own)"
 _SHAPES = ("none", "darts", "princess", "auto")
 #: Measurements that are asked for, with their names on the page.
 _MEASURES = {"bust": "bust [cm]", "waist": "waist [cm]", "hip": "hip [cm]", "stature": "stature [cm]"}
 _NO_LINE = "(click a line)"
+_LEAST_OVERLAP = 1e-6  # [m2], below which it is not told
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,7 +257,7 @@ def _head(session: Session) -> str:
         lines.append(f"<span style='color:#0a58ca'>{escape(session.activity)} …</span>")
     if session.preview is not None:
         lines.append(
-            f"<span id='studio-preview' style='color:#0a58ca'>tried, not made yet: {_preview(session.preview)}</span>"
+            f"<span id='studio-preview' style='color:#0a58ca'>tried, not made yet: {preview_words(session.preview)}</span>"
         )
     if session.error:
         lines.append(f"<span role='alert' style='color:#b00020'>{escape(session.error)}</span>")
@@ -269,11 +270,13 @@ def _head(session: Session) -> str:
     return f"<div id='studio-head' style='padding:0.3em 0.9em;font-size:0.9em;overflow-wrap:anywhere'>{text}</div>"
 
 
-def _preview(preview: Preview) -> str:
+def preview_words(preview: Preview) -> str:
     """Return what a cut that is tried would do."""
     verb = "releases" if preview.released >= 0.0 else "costs"
     words = f"<b>{escape(str(preview.cut['name']))}</b> {verb} <b>{energy_words(abs(preview.released))}</b>"
     words += f" ({-100.0 * preview.share:+.1f} %)".replace("-", "−")
+    if preview.overlap > _LEAST_OVERLAP:
+        return f"{words}, but cloth lies over itself: <b>{1e4 * preview.overlap:.1f} cm²</b>"
     return words if preview.opening is None else f"{words}, opens <b>{1e3 * preview.opening:.1f} mm</b>"
 
 

@@ -67,6 +67,7 @@ class Preview:
         released: the strain energy that it releases [J].
         share: of all strain energy before.
         opening: how wide it opens at its widest [m]; None of a seam.
+        overlap: by how much pieces lie over themselves with it [m2].
     """
 
     cut: Mapping[str, Any]
@@ -74,6 +75,7 @@ class Preview:
     released: float
     share: float
     opening: float | None
+    overlap: float = 0.0
 
 
 class Session:
@@ -216,6 +218,7 @@ class Session:
                 released=released,
                 share=released / before.strain_energy if before.strain_energy else 0.0,
                 opening=max(wider, default=None),
+                overlap=sum(piece.overlap for piece in step.solution.pieces.values()),
             )
 
         self._run("trying the cut", job)

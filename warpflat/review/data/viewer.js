@@ -72,6 +72,30 @@
     return n;
   }
 
+  // A surface whose face looks away, as a back does, stands turned around beside its pattern; elsewhere it stays as it is.
+  const facing = film.pieces.map((piece) => piece.topologies[0]).reduce((sum, { index, surface: p }) => {
+    for (let i = 0; i < index.length; i += 3) {
+      const [a, b, c] = [3 * index[i], 3 * index[i + 1], 3 * index[i + 2]];
+      const [ux, uy, uz, vx, vy, vz] = [b, c].flatMap((end) => [0, 1, 2].map((k) => p[end + k] - p[a + k]));
+      const w = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+      sum.ahead += w[2];
+      sum.area += Math.hypot(...w);
+    }
+    return sum;
+  }, { ahead: 0, area: 0 });
+  if (facing.ahead < -0.12 * facing.area) {
+    const all = film.pieces.map((piece) => piece.topologies[0].surface);
+    const twice = [0, 2].map((k) => {  // the two ends of the box, added
+      let low = 1e9, high = -1e9;
+      for (const p of all) for (let i = k; i < p.length; i += 3) { low = Math.min(low, p[i]); high = Math.max(high, p[i]); }
+      return low + high;
+    });
+    for (const piece of film.pieces) for (const shape of piece.topologies) {
+      shape.turned = shape.surface.map((value, i) => (i % 3 === 1 ? value : twice[(i % 3) / 2] - value));
+      shape.turnedNormals = shape.normals.map((value, i) => (i % 3 === 1 ? value : -value));
+    }
+  }
+
   // --- draw
   const program = gl.createProgram();
   const shader = (kind, text) => {
@@ -193,7 +217,8 @@
     const { back } = axes();
     for (const piece of film.pieces) {
       const state = stateAt(piece, now);
-      if (camera.which !== "pattern") drawMesh(state.shape, state.shape.surface, state.shape.normals, state.colours, back);
+      const shape = state.shape, turned = camera.which === "all" && shape.turned;
+      if (camera.which !== "pattern") drawMesh(shape, turned || shape.surface, turned ? shape.turnedNormals : shape.normals, state.colours, back);
       if (camera.which !== "surface") drawMesh(state.shape, state.points, null, state.colours, back);
     }
     const k = Math.min(Math.round(now), last);
