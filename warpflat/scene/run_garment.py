@@ -248,10 +248,8 @@ def _run_plan(
             require_open_darts(scene, [garment])
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
-            pictures = [  # the quickest first
-                beside.enter_context(Beside(partial(write, plan, garment, out), "drawing the pictures"))
-                for write in (_write_wear, _write_pieces)
-            ]
+            drawn = partial(_write_pieces, plan, garment, out)
+            pictures = beside.enter_context(Beside(drawn, "drawing the pictures"))
             graded = {
                 size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
                 for size, (body, form) in others.items()
@@ -309,20 +307,19 @@ def _flatten_with_frames(
 
 
 def _write_pieces(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
-    """Write an OBJ per piece and the picture of the flattened garment; return their names."""
-    return garment.write_files(out, picture=plan.scene.settings.output.picture)
+    """Write an OBJ per piece, the picture of the flattened garment, and that of how it is worn; return their names.
 
-
-def _write_wear(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
-    """Draw how the garment is worn, if that was asked for or the cloth is stretched; return the name of the picture in a list."""
+    The latter is drawn if it was asked for or the cloth is stretched. One process draws both: the library for it takes long to load.
+    """
     settings, wearer = plan.scene.settings, garment.wearer
+    files = garment.write_files(out, picture=settings.output.picture)
     if not settings.output.picture or (settings.wear is None and (wearer is None or not wearer.is_stretched)):
-        return []
+        return files
     from warpflat.flattening.fit_picture import write_wear_sheet
 
     on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
     write_wear_sheet(out / "wear.png", list(garment.pieces.values()), title=garment.name, on_body=on_body)
-    return ["wear.png"]
+    return [*files, "wear.png"]
 
 
 def _own_size(plan: GarmentPlan) -> str:
@@ -357,7 +354,7 @@ def _finish(
     out: Path,
     *,
     draped: tuple[dict[str, Any], list[str]],
-    pictures: Iterable[Beside[list[str]]],
+    pictures: Beside[list[str]],
     pattern: Beside[WrittenPattern],
 ) -> SceneResult:
     """Write the last files of a garment when all others are there, and remove what earlier runs have left.
@@ -368,7 +365,7 @@ def _finish(
         graded: the garment in the other sizes of the pattern.
         out: an existing folder.
         draped: entries and files of the drape.
-        pictures, pattern: write the pieces with their pictures, in that order, and the pattern.
+        pictures, pattern: write the pieces with their pictures, and the pattern.
     """
     from warpflat.export.letters import note_on_names
 
@@ -377,9 +374,9 @@ def _finish(
     files, images = [*draped[1], "metrics.json"], packed_pictures(scene, out, draped[1])
     if FrameSchedule(settings.output).wanted:
         files.append("frames.usdc")
-    for drawn in (each.result() for each in pictures):
-        files = [*drawn, *files]
-        images |= packed_pictures(scene, out, drawn)  # while others are drawn
+    drawn = pictures.result()
+    files = [*drawn, *files]
+    images |= packed_pictures(scene, out, drawn)  # while the pattern is drafted
     written = pattern.result()
     measured |= {**_metrics_of_sizes(graded), **draped[0], **written.metrics}
     if settings.mannequin is not None:
