@@ -157,15 +157,16 @@ def run_garment(
     *,
     on_progress: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
+    built: tuple[Mannequin, FormResult] | None = None,
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     notes: tuple[str, ...] = ()
     while True:
         try:
-            plan = plan_garment(scene, device=device)
+            plan = plan_garment(scene, device=device, built=built)
             result = _run_plan(plan, out, on_progress=on_progress, device=device)
         except ClosedDarts as closed:
-            scene, left_out = closed.without, closed.notes
+            scene, left_out, built = closed.without, closed.notes, None
             notes += left_out
         else:
             return replace(result, notes=(*notes, *result.notes))
