@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
@@ -170,12 +171,13 @@ def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: t
     """Return which cells a polygon touches, by row and column from the upper left corner on."""
     import shapely
 
-    def boxes(row: IntArray, column: IntArray, size: int) -> Any:
+    def boxes(row: NDArray[np.integer], column: NDArray[np.integer], size: int) -> Any:
         left, top = corner[0] + size * cell[0] * column, corner[1] - size * cell[1] * row
         return shapely.box(left, top - size * cell[1], left + size * cell[0], top)
 
     # Most blocks of cells lie within the polygon or beside it.
-    blocks = boxes(*np.indices([-(-side // _BLOCK) for side in shape]), _BLOCK)
+    row, column = np.indices([-(-side // _BLOCK) for side in shape])
+    blocks = boxes(row, column, _BLOCK)
     touched = shapely.intersects(area, blocks)
     mixed = touched & ~shapely.contains_properly(area, blocks)
     cells, unknown = (
