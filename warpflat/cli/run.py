@@ -54,6 +54,11 @@ def run_and_report(
             built = stack.enter_context(Beside(partial(scene_form, scene), "building the mannequin")).result
         from warpflat.scene.run import run_scene
 
+        if built is not None and scene.settings.output.picture:
+            # While the mannequin is waited for: the processes that draw have it from this one.
+            import matplotlib.backends.backend_agg
+            import matplotlib.figure  # noqa: F401
+
         start_warp_silently()
         result = run_scene(scene, folder, on_progress=bar, device=device, built=built)
     return report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
