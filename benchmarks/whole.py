@@ -41,7 +41,7 @@ PARTS = {
     "reading": ("surface.io.read:read_surface", "scene.load:load_scene", "scene.load:make_scene"),
     "reading, repair": ("surface.repair.validate:make_surface",),
     "start of Warp": ("core.compile:start_warp", "cli.run:start_warp_silently"),
-    "mannequin and form": ("scene.run_garment:scene_form", "scene.form_shaping:settle_shape"),
+    "mannequin and form": ("scene.form:scene_form", "scene.form_shaping:settle_shape"),
     "checks before": ("scene.run_garment:plan_garment", "scene.run:_check_edges"),
     "datum": ("flattening.datum:resolve_datum",),
     "development": ("flattening.flatten_piece:develop_piece",),

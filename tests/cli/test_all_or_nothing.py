@@ -397,12 +397,13 @@ def test_a_folder_that_no_system_can_make_is_one_line(
 
 
 def test_a_temporary_file_that_cannot_be_written_is_not_blamed_on_standard_output(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ):
     def full() -> None:
         raise OSError(28, "No space left on device")
 
+    monkeypatch.chdir(tmp_path)
+    Path("cap.toml").write_text(SCENE)
     monkeypatch.setattr("warpflat.cli.run.start_warp_silently", full)
-    monkeypatch.setattr("warpflat.scene.load.load_scene", lambda _: None)
     assert main(["run", "cap.toml"]) == 2
     assert capfd.readouterr().err == "warpflat: cannot read or write a temporary file: no space left on device\n"

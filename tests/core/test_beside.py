@@ -14,6 +14,7 @@ from warpflat.core.activity import activity_listener
 from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.beside import Beside, work_beside
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import note_read
 
 
 @pytest.fixture(autouse=True)
@@ -111,3 +112,17 @@ def test_a_process_dies_with_its_parent(tmp_path: Path):
     while process.exists() and "Z" not in (process / "stat").read_text().split()[2] and time.monotonic() < deadline:
         time.sleep(0.01)
     assert time.monotonic() < deadline
+
+
+def test_what_another_process_reads_the_run_has_read(tmp_path: Path):
+    def run() -> None:
+        with work_beside(), output_folder(tmp_path / "out"), Beside(lambda: note_read(own)) as work:
+            work.result()
+            write(tmp_path / "out", "mine.obj")
+
+    own = tmp_path / "out" / "mine.obj"
+    own.parent.mkdir()
+    own.write_text("mine")
+    with pytest.raises(InputError, match="is read by this run"):
+        run()
+    assert own.read_text() == "mine"

@@ -15,12 +15,13 @@ from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.export.read_pattern_json import read_pattern_json
 from warpflat.garment.pattern_files import PatternOptions, garment_files
 from warpflat.scene.closed_darts import without_closed_darts
+from warpflat.scene.form import scene_form
 from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart, turn_dart
 from warpflat.scene.form_ledger import form_ledger, with_cut
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
-from warpflat.scene.run_garment import plan_garment, scene_form
+from warpflat.scene.run_garment import plan_garment
 
 BODICE = {"form": "bodice", "mannequin": {"size": "EU 38", "resolution_mm": 40}}
 FRONT = {"piece": "front", "line": "princess front left"}

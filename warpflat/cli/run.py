@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,13 +40,27 @@ def run_and_report(
     scene: Scene, out: Path | None, *, quiet: bool, verbose: bool, as_json: bool, device: str | None
 ) -> int:
     from warpflat.cli.progress_bar import ProgressBar
-    from warpflat.core.beside import work_beside
-    from warpflat.scene.run import run_scene
+    from warpflat.core.beside import Beside, work_beside
 
-    start_warp_silently()
     folder = out if out is not None else Path("out") / scene.name
-    with ProgressBar(scene.name, hidden=quiet or as_json) as bar, work_beside():
-        result = run_scene(scene, folder, on_progress=bar, device=device)
+    with ExitStack() as stack:
+        bar = stack.enter_context(ProgressBar(scene.name, hidden=quiet or as_json))
+        stack.enter_context(work_beside())
+        built = None
+        if scene.settings.mannequin is not None and scene.settings.auto_cut is None and scene.settings.shape != "auto":
+            from warpflat.scene.form import scene_form
+
+            # Before the solver is loaded, which takes as long.
+            built = stack.enter_context(Beside(partial(scene_form, scene), "building the mannequin")).result
+        from warpflat.scene.run import run_scene
+
+        if built is not None and scene.settings.output.picture:
+            # While the mannequin is waited for: the processes that draw have it from this one.
+            import matplotlib.backends.backend_agg
+            import matplotlib.figure  # noqa: F401
+
+        start_warp_silently()
+        result = run_scene(scene, folder, on_progress=bar, device=device, built=built)
     return report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
 
 

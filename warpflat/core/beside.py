@@ -13,10 +13,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from warpflat.core.activity import activity_listener, report_activity
 from warpflat.core.atomic_files import adopt_files, files_written
+from warpflat.core.input_files import listening_to_reads, note_read
 from warpflat.core.threads import thread_count
 
 __all__ = ["Beside", "work_beside"]
@@ -42,8 +44,8 @@ def work_beside() -> Iterator[None]:
 class Beside(Generic[Result]):
     """A function without arguments that runs in a process of its own while the caller goes on; used in a ``with`` block.
 
-    Its result must be picklable. Files that it writes into an output folder belong to the caller's run. At the end of the block the process
-    is ended if its result has not been taken.
+    Its result must be picklable. Files that it writes into an output folder belong to the caller's run, and so do those that it reads. At
+    the end of the block the process is ended if its result has not been taken.
 
     Attributes:
         process: the number of the other process; 0 if there was none.
@@ -100,8 +102,10 @@ class Beside(Generic[Result]):
         self._wait()
         if not parts:
             return self._function()
-        good, value, files = pickle.loads(b"".join(parts))
+        good, value, files, read = pickle.loads(b"".join(parts))
         adopt_files(files)
+        for path in read:
+            note_read(path)
         if not good:
             raise value
         return value
@@ -134,25 +138,25 @@ def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
         _die_with(parent)
-        before = files_written()
+        before, read = files_written(), list[Path]()
         try:
-            with activity_listener(lambda activity: None):
+            with activity_listener(lambda activity: None), listening_to_reads(read.append):
                 answer: tuple[bool, Any] = True, function()
         except Exception as error:
             answer = False, error
         new = [(folder, name) for folder, name in files_written() if (folder, name) not in before]
-        content = memoryview(_pickled(*answer, new))
+        content = memoryview(_pickled(*answer, new, read))
         while content:
             content = content[os.write(pipe, content) :]
     finally:
         os._exit(0)
 
 
-def _pickled(good: bool, value: Any, files: list[tuple[str, str]]) -> bytes:
+def _pickled(good: bool, value: Any, *files: Any) -> bytes:
     try:
-        content = pickle.dumps((good, value, files))
+        content = pickle.dumps((good, value, *files))
         pickle.loads(content)  # an exception may not be made again from its arguments
     except Exception as error:
         what = f"{type(value).__name__}: {value}" if not good else f"{type(error).__name__}: {error}"
-        content = pickle.dumps((False, RuntimeError(what), files))
+        content = pickle.dumps((False, RuntimeError(what), *files))
     return content

@@ -42,7 +42,7 @@ def union(parts: Sequence[Geometry]) -> Geometry:
     """Return the union of polygons on the grid, which closes slivers of rounding between touching parts."""
     import shapely
 
-    return polygons_only(shapely.union_all([shapely.set_precision(part, GRID) for part in parts], grid_size=GRID))
+    return polygons_only(shapely.union_all(shapely.set_precision(np.array(parts, dtype=object), GRID), grid_size=GRID))
 
 
 def difference(area: Geometry, other: Geometry) -> Geometry:

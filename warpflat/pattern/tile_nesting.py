@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
@@ -23,6 +24,8 @@ __all__ = ["CELL", "Mask", "Places", "TurnedShape", "nest_on_strip", "nest_on_ti
 
 #: Cells are about this wide [m], at most.
 CELL = 0.008
+# A shape becomes cells block by block of so many each way.
+_BLOCK = 6
 #: Orders of the pieces that are tried.
 ORDERS = 8
 #: What one more row or column of the whole sheet counts as, in tiles: a long strip is hard to glue and to lay out.
@@ -159,12 +162,31 @@ def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -
         low, high = np.array(grown.bounds[:2]), np.array(grown.bounds[2:])
         columns, rows = np.maximum(1, np.ceil((high - low) / cell - 1e-9)).astype(int)
         shapely.prepare(grown)
-        x = low[0] + cell[0] * np.arange(columns)
-        y = high[1] - cell[1] * np.arange(1, rows + 1)
-        boxes = shapely.box(x[None, :], y[:, None], x[None, :] + cell[0], y[:, None] + cell[1])
         extent = np.array(turned.bounds[2:]) - np.array(turned.bounds[:2])
-        found.append(Mask(cells=shapely.intersects(grown, boxes), quarters=quarters, extent=extent))
+        cells = _touched_cells(grown, np.array([low[0], high[1]]), cell, (int(rows), int(columns)))
+        found.append(Mask(cells=cells, quarters=quarters, extent=extent))
     return found
+
+
+def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: tuple[int, int]) -> BoolArray:
+    """Return which cells a polygon touches, by row and column from the upper left corner on."""
+    import shapely
+
+    def boxes(row: NDArray[np.integer], column: NDArray[np.integer], size: int) -> Any:
+        left, top = corner[0] + size * cell[0] * column, corner[1] - size * cell[1] * row
+        return shapely.box(left, top - size * cell[1], left + size * cell[0], top)
+
+    # Most blocks of cells lie within the polygon or beside it.
+    row, column = np.indices([-(-side // _BLOCK) for side in shape])
+    blocks = boxes(row, column, _BLOCK)
+    touched = shapely.intersects(area, blocks)
+    mixed = touched & ~shapely.contains_properly(area, blocks)
+    cells, unknown = (
+        each.repeat(_BLOCK, axis=0).repeat(_BLOCK, axis=1)[: shape[0], : shape[1]] for each in (touched, mixed)
+    )
+    row, column = np.nonzero(unknown)
+    cells[row, column] = shapely.intersects(area, boxes(row, column, 1))
+    return np.ascontiguousarray(cells)
 
 
 def _column_counts(

@@ -21,9 +21,10 @@ from warpflat.mannequin.forms import Form
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.part_pieces import princess_seams
+from warpflat.scene.form import scene_form, scene_recipe
 from warpflat.scene.form_cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.load import Scene
-from warpflat.scene.run_garment import GarmentPlan, plan_garment, scene_form, scene_recipe
+from warpflat.scene.run_garment import GarmentPlan, plan_garment
 
 __all__ = [
     "FormEntry",

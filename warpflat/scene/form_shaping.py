@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from warpflat.cutting.ledger import AutoCut, RankedBy
 from warpflat.flattening.result import Flattening
+from warpflat.scene.form import scene_recipe
 from warpflat.scene.form_cuts import place_of, scene_with
 from warpflat.scene.form_ledger import FormEntry, candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.scene.load import Scene
-from warpflat.scene.run_garment import scene_recipe
 
 __all__ = ["settle_shape"]
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from warpflat.garment.constraints import Constraint, Straight
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.finishing import FINISHES, Finishing
 from warpflat.garment.openings import CENTRES, Buttons, Opening
 from warpflat.garment.pockets import Pocket
-from warpflat.mannequin.forms import FormResult
 from warpflat.scene.making_up_tables import FinishingTable, OpeningTable, PocketTable
+
+if TYPE_CHECKING:
+    from warpflat.garment.constraints import Constraint
+    from warpflat.mannequin.forms import FormResult
 
 __all__ = ["scene_finishing", "scene_openings", "scene_pockets", "sewn_centres", "straight_stands"]
 
@@ -48,6 +51,8 @@ def _buttons(table: OpeningTable) -> Buttons:
 
 def straight_stands(form: FormResult, openings: Sequence[Opening]) -> list[Constraint]:
     """Return the constraints that lay the edges of button stands straight along the grain; a fold is so anyway."""
+    from warpflat.garment.constraints import Straight  # loads the solver
+
     return [
         Straight(piece=name, line=opening.line, along="warp")
         for opening in openings

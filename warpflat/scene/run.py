@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from warpflat.garment.pattern_files import PatternOptions
     from warpflat.garment.sew_pieces import SewnPieces
     from warpflat.garment.sew_surface import SewnSurface
+    from warpflat.mannequin.forms import FormResult
+    from warpflat.mannequin.mannequin import Mannequin
     from warpflat.scene.frames import Film, FrameRecorder
     from warpflat.scene.schema import SceneTable
 
@@ -50,6 +52,7 @@ def run_scene(
     on_progress: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
     cuts: CutSequence | None = None,
+    built: Callable[[], tuple[Mannequin, FormResult]] | None = None,
 ) -> SceneResult:
     """Flatten the scene's surface, or the pieces of its form, and write the result.
 
@@ -64,6 +67,7 @@ def run_scene(
         on_progress: called after each step.
         device: Warp device, before the scene's own.
         cuts: of a surface, to be made instead of the scene's own (see `warpflat.scene.cuts.cuts_of_entry`).
+        built: gives the scene's mannequin and form, where they are built already.
 
     Raises:
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
@@ -83,7 +87,9 @@ def run_scene(
                 from warpflat.scene.form_shaping import settle_shape
 
                 scene, notes = settle_shape(scene, device=device)
-            result = run_garment(scene, folder, on_progress=on_progress, device=device)
+                built = None
+            form = None if built is None else built()
+            result = run_garment(scene, folder, on_progress=on_progress, device=device, built=form)
             return replace(result, notes=(*notes, *result.notes))
         return _run_surface(scene, folder, on_progress=on_progress, device=device, cuts=cuts)
 

@@ -21,74 +21,25 @@ from warpflat.garment.drawn_curves import CURVES_MM
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.garment.openings import Opening, part_at_centres, place_opening
+from warpflat.garment.openings import Opening, place_opening
 from warpflat.garment.pattern_files import PatternOptions, WrittenPattern, check_names, garment_files
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import dart_along
-from warpflat.mannequin.ease import ease_from
-from warpflat.mannequin.forms import Form, FormResult, form_from_mapping, shipped_form
+from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.closed_darts import ClosedDarts, require_open_darts
 from warpflat.scene.drape import write_drape
-from warpflat.scene.form_cuts import cut_form, cut_of_dart
+from warpflat.scene.form import scene_form, scene_recipe
+from warpflat.scene.form_cuts import cut_of_dart
 from warpflat.scene.frames import MANNEQUIN, Film, FrameSchedule
-from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
+from warpflat.scene.load import Scene, errors_named, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
 from warpflat.scene.write import SceneResult, packed_film, packed_pictures, review_files
 
-__all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
-
-
-def scene_form(
-    scene: Scene, mannequin: Mannequin | None = None, *, before: FormResult | None = None
-) -> tuple[Mannequin, FormResult]:
-    """Build the pieces of the scene's form on its mannequin, or on another one; return both.
-
-    Args:
-        scene: with a form.
-        mannequin: another one than the scene's.
-        before: a form on this mannequin that may have much in common, to save time.
-
-    Raises:
-        InputError: the body, the form or a brick is wrong.
-    """
-    mannequin, form = scene_recipe(scene, mannequin)
-    with errors_named(f"{scene.where}: {'cuts' if scene.settings.cuts else 'form'}"):
-        return mannequin, mannequin.form(form, half=scene.settings.half, before=before)
-
-
-def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:
-    """Return the scene's mannequin, or the one that is given, and its form with its cuts, not yet built on it.
-
-    Raises:
-        InputError: the body, the form or a brick is wrong.
-    """
-    settings = scene.settings
-    assert settings.mannequin is not None  # the schema sees to it
-    if mannequin is None:
-        with errors_named(f"{scene.where}: mannequin"):
-            mannequin = mannequin_from_table(
-                settings.mannequin, path_of=lambda file: scene.folder / expand_variables(file)
-            )
-    with errors_named(f"{scene.where}: form"):
-        if isinstance(settings.form, str):
-            form = shipped_form(settings.form)
-        else:
-            form = form_from_mapping(scene.name, settings.form or {})
-    if settings.ease is not None:
-        form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
-    with errors_named(f"{scene.where}: form"):
-        if not settings.half:
-            form = part_at_centres(mannequin.layout, form, scene_openings(settings.openings))
-        shape = "darts" if settings.shape == "auto" else settings.shape
-        form = shaped_form(mannequin.layout, form, shape, mannequin.vertices)
-    # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
-    with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
-        return mannequin, cut_form(mannequin, form, settings.cuts)
+__all__ = ["GarmentPlan", "plan_garment", "run_garment"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,15 +157,16 @@ def run_garment(
     *,
     on_progress: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
+    built: tuple[Mannequin, FormResult] | None = None,
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     notes: tuple[str, ...] = ()
     while True:
         try:
-            plan = plan_garment(scene, device=device)
+            plan = plan_garment(scene, device=device, built=built)
             result = _run_plan(plan, out, on_progress=on_progress, device=device)
         except ClosedDarts as closed:
-            scene, left_out = closed.without, closed.notes
+            scene, left_out, built = closed.without, closed.notes, None
             notes += left_out
         else:
             return replace(result, notes=(*notes, *result.notes))
@@ -248,10 +200,8 @@ def _run_plan(
             require_open_darts(scene, [garment])
             report_activity("measuring how it fits")
             garment = replace(garment, pieces=_advised(plan, garment))
-            pictures = [  # the quickest first
-                beside.enter_context(Beside(partial(write, plan, garment, out), "drawing the pictures"))
-                for write in (_write_wear, _write_pieces)
-            ]
+            drawn = partial(_write_pieces, plan, garment, out)
+            pictures = beside.enter_context(Beside(drawn, "drawing the pictures"))
             graded = {
                 size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
                 for size, (body, form) in others.items()
@@ -309,20 +259,19 @@ def _flatten_with_frames(
 
 
 def _write_pieces(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
-    """Write an OBJ per piece and the picture of the flattened garment; return their names."""
-    return garment.write_files(out, picture=plan.scene.settings.output.picture)
+    """Write an OBJ per piece, the picture of the flattened garment, and that of how it is worn; return their names.
 
-
-def _write_wear(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
-    """Draw how the garment is worn, if that was asked for or the cloth is stretched; return the name of the picture in a list."""
+    The latter is drawn if it was asked for or the cloth is stretched. One process draws both: the library for it takes long to load.
+    """
     settings, wearer = plan.scene.settings, garment.wearer
+    files = garment.write_files(out, picture=settings.output.picture)
     if not settings.output.picture or (settings.wear is None and (wearer is None or not wearer.is_stretched)):
-        return []
+        return files
     from warpflat.flattening.fit_picture import write_wear_sheet
 
     on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
     write_wear_sheet(out / "wear.png", list(garment.pieces.values()), title=garment.name, on_body=on_body)
-    return ["wear.png"]
+    return [*files, "wear.png"]
 
 
 def _own_size(plan: GarmentPlan) -> str:
@@ -357,7 +306,7 @@ def _finish(
     out: Path,
     *,
     draped: tuple[dict[str, Any], list[str]],
-    pictures: Iterable[Beside[list[str]]],
+    pictures: Beside[list[str]],
     pattern: Beside[WrittenPattern],
 ) -> SceneResult:
     """Write the last files of a garment when all others are there, and remove what earlier runs have left.
@@ -368,7 +317,7 @@ def _finish(
         graded: the garment in the other sizes of the pattern.
         out: an existing folder.
         draped: entries and files of the drape.
-        pictures, pattern: write the pieces with their pictures, in that order, and the pattern.
+        pictures, pattern: write the pieces with their pictures, and the pattern.
     """
     from warpflat.export.letters import note_on_names
 
@@ -377,9 +326,9 @@ def _finish(
     files, images = [*draped[1], "metrics.json"], packed_pictures(scene, out, draped[1])
     if FrameSchedule(settings.output).wanted:
         files.append("frames.usdc")
-    for drawn in (each.result() for each in pictures):
-        files = [*drawn, *files]
-        images |= packed_pictures(scene, out, drawn)  # while others are drawn
+    drawn = pictures.result()
+    files = [*drawn, *files]
+    images |= packed_pictures(scene, out, drawn)  # while the pattern is drafted
     written = pattern.result()
     measured |= {**_metrics_of_sizes(graded), **draped[0], **written.metrics}
     if settings.mannequin is not None:

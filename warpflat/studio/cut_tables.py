@@ -15,9 +15,9 @@ from warpflat.flattening.result import Flattening
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import FormDart, dart_along, usual_darts
 from warpflat.mannequin.pieces import is_part_of
+from warpflat.scene.form import scene_recipe
 from warpflat.scene.form_cuts import cut_of_dart
 from warpflat.scene.load import Scene
-from warpflat.scene.run_garment import scene_recipe
 from warpflat.studio.pick import Hit
 from warpflat.studio.solve import Solution
 from warpflat.surface.connectivity import border_loops

@@ -19,10 +19,11 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.closed_darts import without_closed_darts
 from warpflat.scene.cuts import CutSequence
+from warpflat.scene.form import scene_form
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_relax_options
 from warpflat.scene.run import flatten_scene, scene_cuts
-from warpflat.scene.run_garment import GarmentPlan, plan_garment, scene_form
+from warpflat.scene.run_garment import GarmentPlan, plan_garment
 from warpflat.scene.surface import scene_surface
 from warpflat.surface.mesh import Surface
 

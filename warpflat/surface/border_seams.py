@@ -82,6 +82,8 @@ def surface_seams(surface: Surface, named: Sequence[NamedSeam]) -> tuple[Surface
         InputError: a line is unknown (names the nearest), closed, parted by a cut or not on the border, or the two do not
             fit: they share no curve in space and differ in length.
     """
+    if not named:
+        return ()
     loops = border_loops(surface.faces)
     along = {edge for loop in loops for edge in pairwise([*loop.tolist(), int(loop[0])])}
     found = []

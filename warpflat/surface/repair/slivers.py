@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.half_edges import half_edges
+from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.vectors import cross, norm, points_at
 
 __all__ = ["degenerate_faces", "merge_degenerate_faces"]
@@ -32,7 +32,7 @@ _TOO_MANY, _TOO_LARGE_A_SHARE = 200, 0.25
 _MOST_ROUNDS = 20
 
 
-def _vertex_scale(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def _vertex_scale(vertices: FloatArray, faces: IntArray | HalfEdges) -> FloatArray:
     """Return #V, the mean length [m] of the edges at each vertex."""
     edges = half_edges(faces).edges
     a, b = points_at(vertices, edges.T).transpose(1, 0, 2)
@@ -55,12 +55,13 @@ def _width(points: FloatArray) -> FloatArray:
     return np.minimum(np.minimum.reduce(sides), norm(cross(one, two)) / np.where(longest > 0, longest, 1.0))
 
 
-def degenerate_faces(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IntArray:
+def degenerate_faces(vertices: FloatArray, faces: IntArray | HalfEdges, tolerance: float = 1e-3) -> IntArray:
     """Return the faces whose least width is at most `tolerance` times the mean length of the edges at their corners.
 
     The width of a triangle is its smallest altitude; of a quad, its shortest edge or its area over its longer diagonal.
     """
     scale = _vertex_scale(vertices, faces)
+    faces = faces.faces if isinstance(faces, HalfEdges) else faces
     width = np.empty(len(faces))
     around = np.empty(len(faces))
     for sides, chosen in ((3, faces[:, 3] < 0), (4, faces[:, 3] >= 0)):
@@ -72,7 +73,7 @@ def degenerate_faces(vertices: FloatArray, faces: IntArray, tolerance: float = 1
 
 def merge_degenerate_faces(
     vertices: FloatArray,
-    faces: IntArray,
+    made: HalfEdges,
     lines: dict[str, list[int]],
     tolerance: float = 1e-3,
 ) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray, IntArray]:
@@ -80,7 +81,7 @@ def merge_degenerate_faces(
 
     Args:
         vertices: #V by 3, positions [m]; none is moved, some may no longer be used afterwards.
-        faces: #F by 4, manifold, consistently wound, one component.
+        made: the half-edges of the faces, #F by 4, manifold, consistently wound, one component.
         lines: feature lines, vertex indices along edges; one that ran along a merged edge follows it.
         tolerance: share of the surrounding edge length.
 
@@ -88,11 +89,12 @@ def merge_degenerate_faces(
         faces, #F' by 4; #F', the face of the argument that each comes from; the lines; the degenerate faces that were
         merged; and those that could not be.
     """
+    faces = made.faces
     of = np.arange(len(faces), dtype=np.int32)
     merged, left = of[:0], of[:0]
     # Merging changes the scale around: what had only small neighbours may now be degenerate beside larger ones.
     for _ in range(_MOST_ROUNDS):
-        found = degenerate_faces(vertices, faces, tolerance)
+        found = degenerate_faces(vertices, made if faces is made.faces else faces, tolerance)
         if len(found) == 0:
             break
         if len(found) > max(_TOO_MANY, _TOO_LARGE_A_SHARE * len(faces)):

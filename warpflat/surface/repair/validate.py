@@ -415,7 +415,7 @@ def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: Floa
             f"{format_count(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
         )
     before = len(mesh.vertices)
-    faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.faces, lines, tolerance)
+    faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.half_edges, lines, tolerance)
     if len(left):
         raise InputError(
             f"{format_count(len(left), 'degenerate face')} (narrower than {tolerance:g} of the edges around) cannot be "
