@@ -27,7 +27,7 @@ from warpflat.solver.relax import Watch
 from warpflat.solver.relaxation import Relaxation
 from warpflat.solver.remainder import Remainder, RemainderEstimate, looked_back
 from warpflat.surface.connectivity import border_of
-from warpflat.surface.laplacian import factor_pays, laplacian_of
+from warpflat.surface.laplacian import factor_pays, laplacian_solver
 
 __all__ = ["Descent", "Measure", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
 
@@ -89,7 +89,7 @@ class Metric:
     def __init__(self, network: SpringNetwork, alignments: Sequence[GrainAlignment]) -> None:
         fabric = network.fabric
         self._stiffness = max(fabric.stiffness_warp, fabric.stiffness_weft)
-        self._laplacian = laplacian_of(network.surface)
+        self._solve = laplacian_solver(network.surface)
         self._chords = np.array([[each.upper, each.lower, each.lower] for each in alignments]).reshape(-1, 3)
         self._across = np.array([[each.direction[1], -each.direction[0]] for each in alignments]).reshape(-1, 2)
         # The inverse's columns at vertices that have touched; most of the border never does.
@@ -101,7 +101,7 @@ class Metric:
         if new:
             unit = np.zeros((self._count, len(new)))
             unit[new, np.arange(len(new))] = 1.0 / self._stiffness
-            self._column |= zip(new, self._laplacian.solve(unit).T, strict=True)
+            self._column |= zip(new, self._solve(unit).T, strict=True)
         return np.stack([self._column[vertex] for vertex in vertices.tolist()])
 
     def solver(self, vertices: IntArray | None = None, lever: FloatArray | None = None) -> Solve:
@@ -117,7 +117,7 @@ class Metric:
         vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
         lever = chord if lever is None else np.concatenate([chord, lever])
         if len(vertices) == 0:
-            return lambda force: self._laplacian.solve(force) / self._stiffness
+            return lambda force: self._solve(force) / self._stiffness
         own, at = np.unique(vertices, return_inverse=True)
         rows = np.zeros((2, len(vertices), len(own)))
         number = np.repeat(np.arange(len(vertices)), 3)
@@ -131,7 +131,7 @@ class Metric:
         inner += sum(row @ table @ row.T for row in rows)
 
         def solve(force: FloatArray) -> FloatArray:
-            step = self._laplacian.solve(force) / self._stiffness
+            step = self._solve(force) / self._stiffness
             pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
             for axis in range(2):
                 step[:, axis] -= (rows[axis].T @ pull) @ columns
@@ -150,7 +150,7 @@ class _Memory:
 
     def __init__(self, numbers: int, most: int) -> None:
         # Rows are used in turn; the oldest is overwritten.
-        self._steps, self._changes = np.empty((2, most, numbers))
+        self._steps, self._changes = np.empty((2, most, numbers), dtype=np.float32)
         self._order: list[int] = []
         # Scalar product of the step in each row with the change in each.
         self._table = np.zeros((most, most))
