@@ -17,7 +17,7 @@ __all__ = ["factor_symmetric"]
 def factor_symmetric(matrix: Any, *, dtype: type[np.floating] = np.float64) -> Callable[[FloatArray], FloatArray]:
     """Factor a positive definite or quasi-definite matrix (#N by #N), and return the solution for right sides of #N or #N by #K.
 
-    In single precision (`dtype`) the factor takes half of the memory, and its solution is good to a few digits, as a preconditioner's may be.
+    In single precision (`dtype`) the factor takes half of the memory. Its solution is good to a few digits, enough for a preconditioner.
 
     Minimum degree on A + A^T fills the least. By default SuperLU joins the last ten columns of each branch of its elimination tree into one
     dense block, as it expects of another order of the columns; that makes a factor of slivers six times as slow, so each column is its own.

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import dot
@@ -149,8 +150,9 @@ class _Memory:
     """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4), all of them in one product (Byrd et al. 1994)."""
 
     def __init__(self, numbers: int, most: int) -> None:
-        # Rows are used in turn; the oldest is overwritten.
-        self._steps, self._changes = np.empty((2, most, numbers), dtype=np.float32)
+        # Rows are used in turn; the oldest is overwritten. Single precision is enough for directions.
+        rows: NDArray[np.float32] = np.empty((2, most, numbers), dtype=np.float32)
+        self._steps, self._changes = rows[0], rows[1]
         self._order: list[int] = []
         # Scalar product of the step in each row with the change in each.
         self._table = np.zeros((most, most))
@@ -184,15 +186,15 @@ class _Memory:
         steps, changes = self._steps[:used], self._changes[:used]
         # Each step times the changes that came with and after it.
         table = np.triu(self._table[np.ix_(order, order)])
-        share = np.empty(used)
+        share: FloatArray = np.empty(used)
         share[order] = np.linalg.solve(table, _products(steps, gradient)[order])
         z = solve(gradient - np.einsum("i,ij->j", share, changes).reshape(gradient.shape))
-        own = np.empty(used)
+        own: FloatArray = np.empty(used)
         own[order] = np.linalg.solve(table.T, np.diag(table) * share[order] - _products(changes, z)[order])
         return -z - np.einsum("i,ij->j", own, steps).reshape(z.shape)
 
 
-def _products(rows: FloatArray, vectors: FloatArray) -> FloatArray:
+def _products(rows: NDArray[np.float32], vectors: FloatArray) -> FloatArray:
     """Return the scalar products of rows (#N by #M) with vectors of #M numbers."""
     return np.asarray(np.einsum("ij,j->i", rows, vectors.ravel()))
 
