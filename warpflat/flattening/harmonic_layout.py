@@ -11,7 +11,7 @@ from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["harmonic_layout"]
+__all__ = ["harmonic_layout", "refuse_tubes"]
 
 
 def harmonic_layout(surface: Surface) -> FloatArray:
@@ -62,7 +62,11 @@ def harmonic_layout(surface: Surface) -> FloatArray:
 
 
 def refuse_tubes(surface: Surface) -> None:
-    """A flat ring turns once around at each of its borders, a closed tube at neither."""
+    """Refuse a closed tube: a flat ring turns once around at each of its borders, a tube at neither.
+
+    Raises:
+        InputError: the surface is one.
+    """
     for loop in border_loops(surface.faces, surface.vertices)[1:]:
         corner_angle = _border_angles(surface)[loop]
         turning = float((np.pi - corner_angle).sum())
