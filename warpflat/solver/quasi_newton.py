@@ -205,6 +205,7 @@ class Descent(Generic[P]):
     Attributes:
         point: the present one.
         history: the energies of all points so far [J].
+        fraction: how much of the last direction was taken, 1 for a whole step.
         tried: layouts that have been evaluated.
         release: the energy that the last step could have released, by the metric [J].
         is_stuck: whether no step makes the energy fall any more.
@@ -214,7 +215,7 @@ class Descent(Generic[P]):
         """Begin at a point; L-BFGS remembers the last `memory` corrections."""
         self._problem = problem
         self.point, self.history = start, [start.energy]
-        self._memory, self._fraction = _Memory(start.positions.size, memory), 1.0
+        self._memory, self.fraction = _Memory(start.positions.size, memory), 1.0
         self.tried, self.release, self.is_stuck = 1, np.inf, False
 
     @property
@@ -258,7 +259,7 @@ class Descent(Generic[P]):
                 self.is_stuck = True
                 return False
             self._memory.clear()
-            self._fraction = 1.0
+            self.fraction = 1.0
         self._memory.add(new.positions - self.point.positions, new.gradient - self.point.gradient)
         self.point = new
         self.history.append(new.energy)
@@ -274,12 +275,12 @@ class Descent(Generic[P]):
 
     def _search(self, direction: FloatArray, descent: float) -> P | None:
         """Halve a step until the energy falls enough. Where steps are short, the next one seldom is much longer."""
-        fraction = min(1.0, _LONGER * self._fraction)
+        fraction = min(1.0, _LONGER * self.fraction)
         while descent < 0.0 and fraction > _LEAST_FRACTION:
             new = self._problem.at(self.point.positions + fraction * direction)
             self.tried += 1
             if new.energy <= self.point.energy + _ARMIJO * fraction * descent:
-                self._fraction = fraction
+                self.fraction = fraction
                 return new
             fraction *= 0.5
         return None
@@ -369,7 +370,7 @@ def relax_quasi_newton(
         state.work_units = work_before + descent.work_units
         if moved and each_step is not None:
             each_step(state, state.status.total, state.status.worst_residual)
-        left = estimate.add(descent.point.energy, descent.point.positions)
+        left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         near = left.is_small(options) or descent.is_at_rest(options)
         done = not moved or state.work_units - work_before >= options.max_steps
         done |= least_gain is not None and descent.gain <= least_gain * descent.point.energy
