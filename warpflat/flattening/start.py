@@ -22,6 +22,7 @@ from warpflat.flattening.develop import (
 from warpflat.flattening.harmonic_layout import refuse_tubes
 from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.cells import make_cells
+from warpflat.surface.injective import is_injective
 from warpflat.surface.laplacian import factor_pays
 from warpflat.surface.mesh import Surface
 
@@ -33,7 +34,7 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
 
     Draped meshes are developed by geodesic distances, which crush some faces, and are far from rest. A few as-rigid iterations unfold
     these and are much nearer, for a factor that the relaxation needs as well. Where they leave folds, a conformal map often
-    has none. Grids whose profiles are laid out are near enough.
+    has none; it is taken if it does not lie over itself, either. Grids whose profiles are laid out are near enough.
 
     Raises:
         InputError: the surface is a closed tube.
@@ -50,7 +51,7 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
         return Development(positions=turn_upright(rigid, datum), method="geodesic", as_rigid=True, mended=True)
     refuse_tubes(surface)
     rigid = as_rigid_layout(surface, conformal_layout(surface))
-    if rigid is not None:
+    if rigid is not None and is_injective(surface, rigid):
         return Development(positions=turn_upright(rigid, datum), method="conformal", as_rigid=True, mended=True)
     development = develop(surface, datum)
     rigid = as_rigid_layout(surface, development.positions)
