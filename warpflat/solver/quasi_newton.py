@@ -43,6 +43,8 @@ _SMALLER = 0.3
 # The first step that is tried is longer than the last one taken by at most this factor.
 _LONGER = 4.0
 _LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
+# Rounding of the metric's solution, in single precision.
+_ROUNDING = 1e-6
 # Work units of an iteration: two evaluations of the forces and the solution; and of each layout that is tried.
 _WORK, _TRIAL_WORK = 3.0, 0.5
 
@@ -114,7 +116,10 @@ class Metric:
         """
         chord = np.zeros((len(self._chords), 3, 2))
         chord[:, 0], chord[:, 1] = self._across, -self._across
-        rigid = np.arange(len(chord))
+        rigid, contacts = (
+            np.arange(len(chord)),
+            np.arange(len(chord), len(chord) + (0 if lever is None else len(lever))),
+        )
         vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
         lever = chord if lever is None else np.concatenate([chord, lever])
         if len(vertices) == 0:
@@ -130,6 +135,8 @@ class Metric:
         inner = np.eye(len(vertices))
         inner[rigid, rigid] = 0.0
         inner += sum(row @ table @ row.T for row in rows)
+        # Contacts so stiff that 1 is lost beside them would leave it singular.
+        inner[contacts, contacts] *= 1.0 + _ROUNDING
 
         def solve(force: FloatArray) -> FloatArray:
             step = self._solve(force) / self._stiffness
