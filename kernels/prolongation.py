@@ -118,3 +118,59 @@ def inject(
     """Copy the fine positions of the coarse level's vertices [m]. kept: #coarse, the fine vertices."""
     i = natural(wp.tid() + first)
     coarse[i] = fine[natural(kept[i])]
+
+
+@wp.kernel
+def compose_rows(
+    gone: wp.array(dtype=wp.int32),
+    parent: wp.array(dtype=wp.vec3i),
+    weight: wp.array(dtype=wp.vec3d),
+    passes: int,
+    # outputs
+    row: wp.array(dtype=wp.int32),
+    offset: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=wp.float64),
+):
+    """Compose the weights of each vertex from those of the kept ones; for one thread.
+
+    Vertices that collapsed last come first, since parents stay longer.
+
+    gone, parent, weight: #V, as `coarsen.collapse` and `coarsen.locate` have them; passes: their number. row: #V, the row of each
+    vertex, those that are kept first, in their order. offset: #V+1, where rows begin; the last stays 0 if there was not
+    room for all. column, value: vertices kept, by their numbers, and their weights.
+    """
+    rows = int(0)
+    end = int(0)
+    for back in range(passes + 1):
+        number = wp.where(back == 0, 0, passes + 1 - back)
+        for v in range(gone.shape[0]):
+            if gone[v] == number:
+                if number == 0:
+                    column[end] = rows
+                    value[end] = wp.float64(1.0)
+                    end += 1
+                else:
+                    begin = int(end)
+                    for k in range(3):
+                        if weight[v][k] != wp.float64(0.0):
+                            of = row[parent[v][k]]
+                            e = natural(offset[of])
+                            e_end = offset[of + 1]
+                            while e < e_end:
+                                to = int(begin)
+                                while to < end and column[to] != column[e]:
+                                    to += 1
+                                if to == end:
+                                    if end == column.shape[0]:
+                                        return
+                                    column[end] = column[e]
+                                    value[end] = wp.float64(0.0)
+                                    end += 1
+                                value[to] = value[to] + weight[v][k] * value[e]
+                                e += 1
+                row[v] = rows
+                rows += 1
+                if rows < gone.shape[0]:
+                    offset[rows] = end
+    offset[gone.shape[0]] = end

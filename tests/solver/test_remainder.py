@@ -18,13 +18,20 @@ def test_a_geometric_descent_is_bounded_at_any_pace_and_ends_soon_after_little_i
     while not left.is_small(options):
         way = 0.02 * ratio**number
         # A shift as a whole is no way that is left.
-        left = estimate.add(1.0 + 100.0 * way**2, corner * [1.0 + way, 1.0] + [0.0, number])
+        left = estimate.add(1.0 + 100.0 * way**2, corner * [1.0 + way, 1.0] + [0.0, number], 1.0)
         assert np.isfinite(left.outline_mm) == (number >= 4)
         number += 1
     assert 1e3 * way <= left.outline_mm <= 0.2
     assert 100.0 * way**2 <= left.energy_share
     within = np.log(0.2 / 20.0) / np.log(ratio)
     assert number <= 1.3 * within + 4.0
+
+
+@pytest.mark.parametrize(("fraction", "known"), [(0.01, False), (0.3, True)])
+def test_steps_that_are_cut_short_tell_nothing_until_they_amount_to_a_whole_one(fraction: float, known: bool):
+    estimate, corner = RemainderEstimate(np.arange(3)), np.array([[1.0, 0.0], [0.0, 0.0], [-1.0, 0.0]])
+    left = [estimate.add(1.0, corner, fraction) for _ in range(8)]
+    assert np.isfinite(left[-1].outline_mm) == known
 
 
 def test_stricter_tolerances_are_met_whatever_is_estimated():

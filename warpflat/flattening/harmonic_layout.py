@@ -12,7 +12,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 from warpflat.surface.tubes import tube_borders
 
-__all__ = ["harmonic_layout"]
+__all__ = ["harmonic_layout", "refuse_tubes"]
 
 
 def harmonic_layout(surface: Surface) -> FloatArray:
@@ -63,7 +63,11 @@ def harmonic_layout(surface: Surface) -> FloatArray:
 
 
 def refuse_tubes(surface: Surface) -> None:
-    """Raise InputError for a closed tube."""
+    """Refuse a closed tube.
+
+    Raises:
+        InputError: the surface is one.
+    """
     for loop in tube_borders(surface):
         size = polyline_length(surface.vertices[loop], closed=True)
         raise InputError(

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.flattening.conformal_layout import conformal_layout
 from warpflat.flattening.develop import (
     Development,
     close_cracks,
@@ -18,8 +19,10 @@ from warpflat.flattening.develop import (
     profile_layout,
     turn_upright,
 )
+from warpflat.flattening.harmonic_layout import refuse_tubes
 from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.cells import make_cells
+from warpflat.surface.injective import is_injective
 from warpflat.surface.laplacian import factor_pays
 from warpflat.surface.mesh import Surface
 
@@ -30,7 +33,8 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
     """Return the start of a piece: its development, or what as-rigid iterations make of it where a factor is cheap.
 
     Draped meshes are developed by geodesic distances, which crush some faces, and are far from rest. A few as-rigid iterations unfold
-    these and are much nearer, for a factor that the relaxation needs as well. Grids whose profiles are laid out are near enough.
+    these and are much nearer, for a factor that the relaxation needs as well. Where they leave folds, a conformal map often
+    has none; it is taken if it does not lie over itself, either. Grids whose profiles are laid out are near enough.
 
     Raises:
         InputError: the surface is a closed tube.
@@ -45,6 +49,10 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
     rigid = None if first is None else as_rigid_layout(surface, first)
     if rigid is not None:
         return Development(positions=turn_upright(rigid, datum), method="geodesic", as_rigid=True, mended=True)
+    refuse_tubes(surface)
+    rigid = as_rigid_layout(surface, conformal_layout(surface))
+    if rigid is not None and is_injective(surface, rigid):
+        return Development(positions=turn_upright(rigid, datum), method="conformal", as_rigid=True, mended=True)
     development = develop(surface, datum)
     rigid = as_rigid_layout(surface, development.positions)
     if rigid is None:

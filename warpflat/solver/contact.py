@@ -252,7 +252,7 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
     most = min(_MOST_ITERATIONS, state.options.max_steps)
     while not at_rest and descent.iterations < most and descent.step():
-        left = estimate.add(descent.point.energy, descent.point.positions)
+        left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         at_rest = left.is_small(state.options) or descent.is_at_rest(state.options)
     residual = problem.residual(descent.point)
     end = descent.point.positions.copy()

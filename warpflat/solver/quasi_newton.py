@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import dot
@@ -27,7 +28,7 @@ from warpflat.solver.relax import Watch
 from warpflat.solver.relaxation import Relaxation
 from warpflat.solver.remainder import Remainder, RemainderEstimate, looked_back
 from warpflat.surface.connectivity import border_of
-from warpflat.surface.laplacian import factor_pays, laplacian_of
+from warpflat.surface.laplacian import factor_pays, laplacian_solver
 
 __all__ = ["Descent", "Measure", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
 
@@ -42,6 +43,8 @@ _SMALLER = 0.3
 # The first step that is tried is longer than the last one taken by at most this factor.
 _LONGER = 4.0
 _LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
+# Rounding of the metric's solution, in single precision.
+_ROUNDING = 1e-6
 # Work units of an iteration: two evaluations of the forces and the solution; and of each layout that is tried.
 _WORK, _TRIAL_WORK = 3.0, 0.5
 
@@ -89,7 +92,7 @@ class Metric:
     def __init__(self, network: SpringNetwork, alignments: Sequence[GrainAlignment]) -> None:
         fabric = network.fabric
         self._stiffness = max(fabric.stiffness_warp, fabric.stiffness_weft)
-        self._laplacian = laplacian_of(network.surface)
+        self._solve = laplacian_solver(network.surface)
         self._chords = np.array([[each.upper, each.lower, each.lower] for each in alignments]).reshape(-1, 3)
         self._across = np.array([[each.direction[1], -each.direction[0]] for each in alignments]).reshape(-1, 2)
         # The inverse's columns at vertices that have touched; most of the border never does.
@@ -101,7 +104,7 @@ class Metric:
         if new:
             unit = np.zeros((self._count, len(new)))
             unit[new, np.arange(len(new))] = 1.0 / self._stiffness
-            self._column |= zip(new, self._laplacian.solve(unit).T, strict=True)
+            self._column |= zip(new, self._solve(unit).T, strict=True)
         return np.stack([self._column[vertex] for vertex in vertices.tolist()])
 
     def solver(self, vertices: IntArray | None = None, lever: FloatArray | None = None) -> Solve:
@@ -113,11 +116,14 @@ class Metric:
         """
         chord = np.zeros((len(self._chords), 3, 2))
         chord[:, 0], chord[:, 1] = self._across, -self._across
-        rigid = np.arange(len(chord))
+        rigid, contacts = (
+            np.arange(len(chord)),
+            np.arange(len(chord), len(chord) + (0 if lever is None else len(lever))),
+        )
         vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
         lever = chord if lever is None else np.concatenate([chord, lever])
         if len(vertices) == 0:
-            return lambda force: self._laplacian.solve(force) / self._stiffness
+            return lambda force: self._solve(force) / self._stiffness
         own, at = np.unique(vertices, return_inverse=True)
         rows = np.zeros((2, len(vertices), len(own)))
         number = np.repeat(np.arange(len(vertices)), 3)
@@ -129,9 +135,11 @@ class Metric:
         inner = np.eye(len(vertices))
         inner[rigid, rigid] = 0.0
         inner += sum(row @ table @ row.T for row in rows)
+        # Contacts so stiff that 1 is lost beside them would leave it singular.
+        inner[contacts, contacts] *= 1.0 + _ROUNDING
 
         def solve(force: FloatArray) -> FloatArray:
-            step = self._laplacian.solve(force) / self._stiffness
+            step = self._solve(force) / self._stiffness
             pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
             for axis in range(2):
                 step[:, axis] -= (rows[axis].T @ pull) @ columns
@@ -149,8 +157,9 @@ class _Memory:
     """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4), all of them in one product (Byrd et al. 1994)."""
 
     def __init__(self, numbers: int, most: int) -> None:
-        # Rows are used in turn; the oldest is overwritten.
-        self._steps, self._changes = np.empty((2, most, numbers))
+        # Rows are used in turn; the oldest is overwritten. Single precision is enough for directions.
+        rows: NDArray[np.float32] = np.empty((2, most, numbers), dtype=np.float32)
+        self._steps, self._changes = rows[0], rows[1]
         self._order: list[int] = []
         # Scalar product of the step in each row with the change in each.
         self._table = np.zeros((most, most))
@@ -184,15 +193,15 @@ class _Memory:
         steps, changes = self._steps[:used], self._changes[:used]
         # Each step times the changes that came with and after it.
         table = np.triu(self._table[np.ix_(order, order)])
-        share = np.empty(used)
+        share: FloatArray = np.empty(used)
         share[order] = np.linalg.solve(table, _products(steps, gradient)[order])
         z = solve(gradient - np.einsum("i,ij->j", share, changes).reshape(gradient.shape))
-        own = np.empty(used)
+        own: FloatArray = np.empty(used)
         own[order] = np.linalg.solve(table.T, np.diag(table) * share[order] - _products(changes, z)[order])
         return -z - np.einsum("i,ij->j", own, steps).reshape(z.shape)
 
 
-def _products(rows: FloatArray, vectors: FloatArray) -> FloatArray:
+def _products(rows: NDArray[np.float32], vectors: FloatArray) -> FloatArray:
     """Return the scalar products of rows (#N by #M) with vectors of #M numbers."""
     return np.asarray(np.einsum("ij,j->i", rows, vectors.ravel()))
 
@@ -203,6 +212,7 @@ class Descent(Generic[P]):
     Attributes:
         point: the present one.
         history: the energies of all points so far [J].
+        fraction: how much of the last direction was taken, 1 for a whole step.
         tried: layouts that have been evaluated.
         release: the energy that the last step could have released, by the metric [J].
         is_stuck: whether no step makes the energy fall any more.
@@ -212,7 +222,7 @@ class Descent(Generic[P]):
         """Begin at a point; L-BFGS remembers the last `memory` corrections."""
         self._problem = problem
         self.point, self.history = start, [start.energy]
-        self._memory, self._fraction = _Memory(start.positions.size, memory), 1.0
+        self._memory, self.fraction = _Memory(start.positions.size, memory), 1.0
         self.tried, self.release, self.is_stuck = 1, np.inf, False
 
     @property
@@ -256,7 +266,7 @@ class Descent(Generic[P]):
                 self.is_stuck = True
                 return False
             self._memory.clear()
-            self._fraction = 1.0
+            self.fraction = 1.0
         self._memory.add(new.positions - self.point.positions, new.gradient - self.point.gradient)
         self.point = new
         self.history.append(new.energy)
@@ -272,12 +282,12 @@ class Descent(Generic[P]):
 
     def _search(self, direction: FloatArray, descent: float) -> P | None:
         """Halve a step until the energy falls enough. Where steps are short, the next one seldom is much longer."""
-        fraction = min(1.0, _LONGER * self._fraction)
+        fraction = min(1.0, _LONGER * self.fraction)
         while descent < 0.0 and fraction > _LEAST_FRACTION:
             new = self._problem.at(self.point.positions + fraction * direction)
             self.tried += 1
             if new.energy <= self.point.energy + _ARMIJO * fraction * descent:
-                self._fraction = fraction
+                self.fraction = fraction
                 return new
             fraction *= 0.5
         return None
@@ -367,7 +377,7 @@ def relax_quasi_newton(
         state.work_units = work_before + descent.work_units
         if moved and each_step is not None:
             each_step(state, state.status.total, state.status.worst_residual)
-        left = estimate.add(descent.point.energy, descent.point.positions)
+        left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         near = left.is_small(options) or descent.is_at_rest(options)
         done = not moved or state.work_units - work_before >= options.max_steps
         done |= least_gain is not None and descent.gain <= least_gain * descent.point.energy

@@ -66,27 +66,33 @@ class RemainderEstimate:
         """
         self._border = border
         self._iterations = 0
-        self._last: deque[tuple[float, FloatArray]] = deque()
+        self._last: deque[tuple[float, FloatArray, float]] = deque()
 
-    def add(self, energy: float, positions: FloatArray) -> Remainder:
-        """Add the layout of the next iteration and return what is left after it; infinite after few iterations.
+    def add(self, energy: float, positions: FloatArray, fraction: float) -> Remainder:
+        """Add the layout of the next iteration and return what is left after it.
+
+        It is infinite after few iterations, and where together they have not gone as far as one whole step: what moves little since a
+        face would be mirrored, or the border cross itself, is not at rest.
 
         Args:
             energy: of the layout [J].
             positions: #V by 2 [m], turned upright.
+            fraction: of the step that has led there.
         """
         self._iterations += 1
         outline = positions[self._border]
-        self._last.append((energy, outline))
+        self._last.append((energy, outline, fraction))
         count = looked_back(self._iterations)
         if len(self._last) <= count:
             return Remainder()
         while len(self._last) > count + 1:
             self._last.popleft()
+        if sum(fraction for *_, fraction in self._last) - self._last[0][2] < 1.0:
+            return Remainder()
         moved = outline - self._last[0][1]
         moved -= moved.mean(axis=0)
         distance = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
-        energies = [each for each, _ in self._last]
+        energies = [each for each, *_ in self._last]
         # The range: where directions have been measured anew the energy may also have risen.
         share = (max(energies) - min(energies)) / max(energy, 1e-300)
         return Remainder(

@@ -38,7 +38,7 @@ def as_rigid_layout(surface: Surface, positions: FloatArray) -> FloatArray | Non
     if is_unfolded(layouts[-1]) and is_injective(surface, layouts[-1]):
         return layouts[-1]
     found, apart = None, False
-    for layout in filter(is_unfolded, layouts[1:]):
+    for layout in filter(is_unfolded, layouts):
         lies_over_itself = not is_injective(surface, layout)
         if apart and lies_over_itself:
             break

@@ -31,7 +31,8 @@ from warpflat.core.compile import launch_quietly
 from warpflat.core.launch import record
 from warpflat.core.sums import range_offsets
 from warpflat.core.threads import thread_count
-from warpflat.kernels.coarsen import Ring, collapse, compose_rows, locate, order_rings, sort_corners
+from warpflat.kernels.coarsen import Ring, collapse, locate, order_rings, sort_corners
+from warpflat.kernels.prolongation import compose_rows
 from warpflat.model.springs import spring_geometry
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation
 from warpflat.solver.multigrid.grid_coarsening import (
