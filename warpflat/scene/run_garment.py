@@ -18,7 +18,7 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.drawn_curves import CURVES_MM
-from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
+from warpflat.garment.ease import SeamWish, cap_wishes, is_knit, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.openings import Opening, part_at_centres, place_opening
@@ -85,7 +85,8 @@ def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mann
         if not settings.half:
             form = part_at_centres(mannequin.layout, form, scene_openings(settings.openings))
         shape = "darts" if settings.shape == "auto" else settings.shape
-        form = shaped_form(mannequin.layout, form, shape, mannequin.vertices)
+        woven = not is_knit(scene_fabric(scene))
+        form = shaped_form(mannequin.layout, form, shape, mannequin.vertices, woven=woven)
     # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
     with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
         return mannequin, cut_form(mannequin, form, settings.cuts)
