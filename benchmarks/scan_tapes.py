@@ -1,7 +1,8 @@
 """Compare a scan's tapes with tapes laid by trimesh and SciPy: `WARPFLAT_DATA=DIR python benchmarks/scan_tapes.py`.
 
 The four bodies as they are, turned, scaled, with noise, with holes, and with arms and legs bent by a skeleton of this
-program's own. `--copies NAME ...` picks some, `--worst` prints what is off only.
+program's own. `--copies NAME ...` picks some, `--worst` prints what is off only. `--mixes SEED ...` takes bodies that are
+random mixes of the four, of other breadth, depth and height, instead: nothing was tuned on those of a new seed.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ from warpflat.surface.io.read import read_scan
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mannequin"))
 from body_copies import COPIES, as_given, copy_of_body
 from body_tapes import armpit_and_crotch, tapes
+from landmarks import Landmarks
 from limb_tapes import arm_tapes, foot_tape, head_tape, leg_tapes
 
 # ISO 20685 allows a scan's height and girth to differ from a tape's by so much [mm].
 HEIGHT, GIRTH = 4.0, 9.0
+BODIES = ("female", "male", "male_heavy", "child")
 
 
 def by_tape(points: np.ndarray, faces: np.ndarray, tips: dict[str, int]) -> dict[str, tuple[float, float]]:
@@ -34,14 +37,16 @@ def by_tape(points: np.ndarray, faces: np.ndarray, tips: dict[str, int]) -> dict
     `tips` are the vertices at the fingertips.
     """
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    marks = Landmarks(faces)
     on_floor = points - [0.0, points[:, 1].min(), 0.0]
     mesh = trimesh.Trimesh(on_floor, triangles, process=False)
-    found: dict[str, tuple[float, float]] = {"head": head_tape(mesh), **tapes(on_floor, faces)}
+    found: dict[str, tuple[float, float]] = {"head": head_tape(mesh), **tapes(on_floor, faces, marks.fold(on_floor))}
     armpit, crotch, _ = armpit_and_crotch(mesh)
     for side in ("left", "right"):
         left = side == "left"
-        found |= {f"{name} {side}": t for name, t in arm_tapes(mesh, armpit, tips[side]).items()}
-        found |= {f"{name} {side}": t for name, t in leg_tapes(mesh, crotch, left).items()}
+        bones, knee = marks.bones(on_floor, side), marks.knee(on_floor, side)
+        found |= {f"{name} {side}": t for name, t in arm_tapes(mesh, armpit, tips[side], bones).items()}
+        found |= {f"{name} {side}": t for name, t in leg_tapes(mesh, crotch, left, knee).items()}
         found[f"foot {side}"] = foot_tape(mesh, left)
     return found
 
@@ -49,11 +54,9 @@ def by_tape(points: np.ndarray, faces: np.ndarray, tips: dict[str, int]) -> dict
 class Body:
     """A body's mesh, and the independent tapes around it, laid once for all copies of one shape."""
 
-    def __init__(self, name: str) -> None:
-        vertices, faces = read_scan(Path(os.environ["WARPFLAT_DATA"]) / f"body_{name}.obj")
-        points = np.asarray(vertices, float)
+    def __init__(self, name: str, points: np.ndarray, faces: np.ndarray) -> None:
         self.name = name
-        self.points, self.faces = points - [0.0, points[:, 1].min(), 0.0], np.asarray(faces)
+        self.points, self.faces = points - [0.0, points[:, 1].min(), 0.0], faces
         triangles = np.concatenate([self.faces[:, :3], self.faces[self.faces[:, 3] >= 0][:, [0, 2, 3]]])
         self.marks = armpit_and_crotch(trimesh.Trimesh(self.points, triangles, process=False))
         self.tips = {"left": int(np.argmax(self.points[:, 0])), "right": int(np.argmin(self.points[:, 0]))}
@@ -70,6 +73,26 @@ class Body:
                 return laid
         self._laid.append((points, by_tape(points, self.faces, self.tips)))
         return self._laid[-1][1]
+
+
+def given_bodies(names: list[str]) -> list[Body]:
+    """Return bodies of the data folder."""
+    folder = Path(os.environ["WARPFLAT_DATA"])
+    read = [(name, *read_scan(folder / f"body_{name}.obj")) for name in names]
+    return [Body(name, np.asarray(points, float), np.asarray(faces)) for name, points, faces in read]
+
+
+def mixed_bodies(seeds: list[int]) -> list[Body]:
+    """Return bodies that are mixes of all four, some beyond one of them, of other breadth, height and depth."""
+    whole = given_bodies(list(BODIES))
+    out = []
+    for seed in seeds:
+        random = np.random.default_rng(1000 + seed)
+        shares = 1.4 * random.dirichlet(np.full(len(whole), 0.8)) - 0.1
+        scales = random.uniform((0.90, 0.92, 0.90), (1.12, 1.08, 1.12))
+        points = sum(share * body.points for share, body in zip(shares, whole, strict=True)) * scales
+        out.append(Body(f"mix {seed}", points, whole[0].faces))
+    return out
 
 
 def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int, int]:
@@ -109,14 +132,14 @@ def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int, int]:
 def main() -> None:
     """Print, for each body and copy, height and girth by tape and how far the package's differ [mm]."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--bodies", nargs="+", default=["female", "male", "male_heavy", "child"])
+    parser.add_argument("--bodies", nargs="+", default=list(BODIES))
+    parser.add_argument("--mixes", nargs="+", type=int, metavar="SEED", help="random mixes of the four bodies instead")
     parser.add_argument("--copies", nargs="+", default=list(COPIES), choices=COPIES)
     parser.add_argument("--worst", action="store_true", help="tapes that are off only")
     options = parser.parse_args()
     print("tape, height and girth by tape, and how far the package's height and girth differ [mm]")
     counts = {copy: np.zeros(3, dtype=int) for copy in options.copies}
-    for name in options.bodies:
-        body = Body(name)
+    for body in mixed_bodies(options.mixes) if options.mixes else given_bodies(options.bodies):
         for copy in options.copies:
             counts[copy] += report(body, copy, options.worst)
     print(

@@ -61,15 +61,17 @@ def armpit_and_crotch(mesh: trimesh.Trimesh) -> tuple[float, float, float]:
     return float(y[armpit] - floor), float(crotch - floor), 0.5 * float(width[armpit])
 
 
-def tapes(points: np.ndarray, faces: np.ndarray) -> dict[str, tuple[float, float]]:
+def tapes(points: np.ndarray, faces: np.ndarray, fold: float | None = None) -> dict[str, tuple[float, float]]:
     """Return height above the floor and girth [m] of hip, waist, underbust and bust at the standard's places (ISO 8559-1).
 
     Sections every 2 mm: hip where the trunk reaches furthest back, waist where it is narrowest, bust where it is fullest
-    below the armpits, underbust where two straight lines that fit the girth from waist to bust best meet.
+    below the armpits, underbust at the fold under it, or else where two straight lines that fit the girth from waist to bust
+    best meet.
 
     Args:
         points: #V by 3 [m], Y up, facing +Z, the midplane at x = 0.
         faces: #F by 4, -1 in the last column for a triangle.
+        fold: height of the fold under the bust [m], if it is known.
     """
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
     mesh = trimesh.Trimesh(points, triangles, process=False)
@@ -85,8 +87,9 @@ def tapes(points: np.ndarray, faces: np.ndarray) -> dict[str, tuple[float, float
     hip = int(np.argmin(np.where(y < 0.57 * stature, back, np.inf)))
     waist = int(np.argmin(np.where((y > 0.57 * stature) & (y < 0.68 * stature), girth, np.inf)))
     bust = int(waist + np.argmax(girth[waist : armpit + 1]))
-    fold = waist + _bend(y[waist : bust + 1], girth[waist : bust + 1])
-    rows = {"hip": hip, "waist": waist, "underbust": fold, "bust": bust}
+    bend = waist + _bend(y[waist : bust + 1], girth[waist : bust + 1])
+    under = bend if fold is None else int(np.argmin(np.abs(floor + y - fold)))
+    rows = {"hip": hip, "waist": waist, "underbust": under, "bust": bust}
     return {name: (float(y[i]), float(girth[i])) for name, i in rows.items()}
 
 

@@ -6,8 +6,6 @@ import numpy as np
 import trimesh
 from body_tapes import plane_parts, section_parts
 from scipy.ndimage import gaussian_filter1d
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import ConvexHull
 
 
@@ -28,27 +26,25 @@ def _near(parts: list[np.ndarray], at: np.ndarray) -> np.ndarray:
     return max(near, key=lambda p: np.linalg.norm(np.ptp(p, axis=0)))
 
 
-def _tape(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> tuple[float, float]:
+def tape_across(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> tuple[float, float]:
     """Return height and girth [m] of a tape across `normal` around the largest part of the section with its middle near."""
     part = _near(_parts(mesh, at, normal), at)
     return float(0.5 * (part[:, 1].min() + part[:, 1].max())), _girth(part, normal)
 
 
-def leg_tapes(mesh: trimesh.Trimesh, crotch: float, left: bool) -> dict[str, tuple[float, float]]:
-    """Return level tapes around one leg of a body on the floor y = 0: thigh, knee, calf, ankle.
+def leg_tapes(mesh: trimesh.Trimesh, crotch: float, left: bool, knee_height: float) -> dict[str, tuple[float, float]]:
+    """Return level tapes around one leg of a body on the floor y = 0: thigh, knee at its known height [m], calf, ankle.
 
-    Calf fullest, ankle narrowest, thigh 0.03 of the stature below the crotch, knee at the crease behind it.
+    Calf fullest, ankle narrowest, thigh 0.03 of the stature below the crotch.
     """
     stature = mesh.vertices[:, 1].max()
     y = np.arange(0.04 * stature, crotch, 0.002)
     sides = [max(section_parts(mesh, at)[:2], key=lambda p: p[:, 0].mean() * (1.0 if left else -1.0)) for at in y]
     girth = gaussian_filter1d([ConvexHull(s).area for s in sides], 3.0)
-    back = gaussian_filter1d([s[:, 1].min() for s in sides], 3.0)
     share = y / crotch
-    calf = int(np.argmax(np.where((share > 0.3) & (share < 0.6), girth, 0.0)))
+    calf = int(np.argmax(np.where((share > 0.3) & (y < 0.85 * knee_height), girth, 0.0)))
     ankle = int(np.argmin(np.where(share < 0.3, girth, np.inf)))
-    line = np.interp(y, [y[calf], 0.86 * crotch], np.interp([y[calf], 0.86 * crotch], y, back))
-    knee = int(np.argmax(np.where((y > y[calf]) & (share < 0.86), back - line, -np.inf)))
+    knee = int(np.argmin(np.abs(y - knee_height)))
     thigh = int(np.argmin(np.abs(y - crotch + 0.03 * stature)))
     places = {"thigh": thigh, "knee": knee, "calf": calf, "ankle": ankle}
     return {name: (float(y[i]), float(ConvexHull(sides[i]).area)) for name, i in places.items()}
@@ -83,57 +79,37 @@ def head_tape(mesh: trimesh.Trimesh) -> tuple[float, float]:
     return float(y[int(np.argmax(girth))]), float(max(girth))
 
 
-def arm_tapes(mesh: trimesh.Trimesh, armpit: float, tip: int) -> dict[str, tuple[float, float]]:
-    """Return tapes around the arm of the fingertip `tip`: biceps and wrist across their bones, elbow across both, hand across its palm.
+def arm_tapes(
+    mesh: trimesh.Trimesh, armpit: float, tip: int, bones: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> dict[str, tuple[float, float]]:
+    """Return tapes around an arm: biceps and wrist across their bones, elbow across both, hand across its palm.
 
-    The arm's middle line runs through the middles of bands of equal way over the surface from the fingertip. Its bones are
-    the two straight lines that fit it best. Biceps: fullest from 0.02 of the stature beyond the armpit. Wrist: narrowest.
-    Hand: halfway from where the thumb parts from the palm to where the fingers part.
+    Biceps: fullest from 0.02 of the stature beyond the armpit. Wrist: narrowest. Hand: halfway from where the thumb parts
+    from the palm to where the fingers part.
+
+    Args:
+        mesh: the body, its floor at y = 0.
+        armpit: its height [m].
+        tip: the vertex at the fingertip.
+        bones: the middles of wrist and elbow [m] and the unit direction of the upper arm from there.
     """
     side = float(np.sign(mesh.vertices[tip, 0]))
     v, stature = mesh.vertices, mesh.vertices[:, 1].max()
-    edges = mesh.edges_unique
-    graph = coo_matrix((mesh.edges_unique_length, edges.T), (len(v),) * 2)
-    way = dijkstra(graph, directed=False, indices=tip)
-    bands = np.arange(0.16, 0.34, 0.004) * stature
-    middle = []
-    for at in bands:
-        near = v[np.abs(way - at) < 0.006 * stature]
-        middle.append(0.5 * (near.min(axis=0) + near.max(axis=0)))
-    line = np.array(middle)
-    for _ in range(2):
-        # Across the line instead of along equal ways over the surface, which lie askew where an arm is bent.
-        towards = np.gradient(gaussian_filter1d(line, 3.0, axis=0, mode="nearest"), axis=0)
-        for i, (at, normal) in enumerate(zip(line.copy(), towards, strict=True)):
-            # Beside a lowered arm the plane cuts the trunk, whose middle lies farther off.
-            parts = [
-                p for p in _parts(mesh, at, normal)
-                if np.ptp(p, axis=0).max() < 0.13 * stature
-                and np.linalg.norm(0.5 * (p.min(axis=0) + p.max(axis=0)) - at) < 0.03 * stature
-            ]  # fmt: skip
-            if parts:
-                part = _near(parts, at)
-                line[i] = 0.5 * (part.min(axis=0) + part.max(axis=0))
-    misses = []
-    for joint in bands[8:-8]:
-        bones = np.column_stack([np.ones_like(bands), bands - joint, np.maximum(bands - joint, 0.0)])
-        fit = np.linalg.lstsq(bones, line, rcond=None)[0]
-        misses.append((float(np.linalg.norm(bones @ fit - line)), fit))
-    _, (elbow, lower, turn) = min(misses, key=lambda m: m[0])
-    upper = lower + turn
-    lower, upper = lower / np.linalg.norm(lower), upper / np.linalg.norm(upper)
-    found = {"elbow": _tape(mesh, elbow, (lower + upper) / np.linalg.norm(lower + upper))}
+    at_wrist, elbow, upper = bones
+    forearm_length = float(np.linalg.norm(elbow - at_wrist))
+    lower = (elbow - at_wrist) / forearm_length
+    found = {"elbow": tape_across(mesh, elbow, (lower + upper) / np.linalg.norm(lower + upper))}
     trunk = max((p for p in _parts(mesh, np.array([0, armpit - 0.002, 0]), np.array([0, 1.0, 0]))
                  if p[:, 0].min() < 0 < p[:, 0].max()), key=lambda p: np.ptp(p[:, 0]))  # fmt: skip
     pit = trunk[int(np.argmax(side * trunk[:, 0]))]
     reach = float((pit - elbow) @ upper) - 0.02 * stature
     found["biceps"] = max(
-        (_tape(mesh, elbow + s * upper, upper) for s in np.arange(0.02, reach, 0.002)), key=lambda t: t[1]
+        (tape_across(mesh, elbow + s * upper, upper) for s in np.arange(0.02, reach, 0.002)), key=lambda t: t[1]
     )
-    forearm = [elbow - s * lower for s in np.arange(0.07, 0.16, 0.0012) * stature]
-    girths = [_tape(mesh, at, lower)[1] for at in forearm]
+    forearm = [elbow - s * lower for s in np.arange(0.5, 1.08, 0.005) * forearm_length]
+    girths = [tape_across(mesh, at, lower)[1] for at in forearm]
     wrist = forearm[int(np.argmin(girths))]
-    found["wrist"] = _tape(mesh, wrist, lower)
+    found["wrist"] = tape_across(mesh, wrist, lower)
     palm = v[tip] - wrist
     length = np.linalg.norm(palm)
     axis = palm / length

@@ -10,6 +10,8 @@ import pytest
 import trimesh
 from body_copies import copy_of_body
 from body_tapes import armpit_and_crotch
+from landmarks import Landmarks
+from limb_tapes import tape_across
 
 from warpflat.core.errors import InputError
 from warpflat.mannequin.mannequin import Mannequin
@@ -52,13 +54,36 @@ def test_a_body_without_feet_says_so() -> None:
 def test_the_fullest_place_of_an_evenly_full_arm_is_a_guess() -> None:
     points, faces = _body("male_heavy")
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    marks = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
+    marks, landmarks = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False)), Landmarks(faces)
     for copy, is_guess in (("arms down", True), ("as it is", False)):
-        body = Mannequin.from_scan(*copy_of_body(points, faces, copy, *marks), resolution_mm=25.0)
+        posed, _ = copy_of_body(points, faces, copy, *marks)
+        body, mesh = (
+            Mannequin.from_scan(posed, faces, resolution_mm=25.0),
+            trimesh.Trimesh(posed, triangles, process=False),
+        )
         assert [body.measures[f"biceps {s}"].guess is not None for s in ("left", "right")] == [is_guess] * 2
-        # Its elbow bends in a bow: two fair fits lie 4 mm and more apart.
-        assert all(body.measures[f"elbow {s}"].guess for s in ("left", "right"))
+        # Its elbow bends in a bow: two fair fits lie some 4 mm apart.
+        for side in ("left", "right"):
+            ours = body.measures[f"elbow {side}"]
+            wrist, elbow, upper = landmarks.bones(posed, side)
+            lower = (elbow - wrist) / np.linalg.norm(elbow - wrist)
+            height, girth = tape_across(mesh, elbow, (lower + upper) / np.linalg.norm(lower + upper))
+            assert ours.guess or (abs(ours.height - height) < 0.004 and abs(ours.girth - girth) < 0.009), (copy, side)
+            assert copy == "arms down" or ours.guess
     assert not any("elbow" in name and m.guess for name, m in Mannequin.from_scan(*_body("female")).measures.items())
+
+
+@needs_bodies
+def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
+    """On bodies with one mesh a landmark's vertices on one are the landmark's on all, mixes among them."""
+    (one, faces), (other, _) = _body("child"), _body("male_heavy")
+    points = 0.5 * (one + other)
+    body, marks = Mannequin.from_scan(points, faces, resolution_mm=25.0), Landmarks(faces)
+    assert body.measures["underbust"].guess is None
+    assert abs(body.measures["underbust"].height - marks.fold(points)) < 0.004
+    # Fat moves the crease behind the knee down.
+    assert abs(body.measures["knee left"].height - marks.knee(points, "left")) > 0.008
+    assert body.measures["knee left"].guess is not None
 
 
 def test_trunk_of_two_equal_parts_has_a_direction() -> None:

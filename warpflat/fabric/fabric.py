@@ -40,6 +40,10 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 }
 
 
+# Cloth that may be strained by more than this is a knit.
+_WOVEN_STRAIN = 0.1
+
+
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
     """The origin of one value of a fabric.
@@ -148,6 +152,11 @@ class Fabric:
     def softness(self) -> float:
         """K/G, the tensile stiffness along the stiffer threads over the shear stiffness."""
         return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
+
+    @property
+    def is_knit(self) -> bool:
+        """True if it stretches as knits do, by its strain limit."""
+        return self.strain_limit > _WOVEN_STRAIN
 
     @property
     def is_isotropic(self) -> bool:

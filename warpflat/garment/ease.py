@@ -29,8 +29,6 @@ CAP_PART = (0.2, 0.8)
 # What a woven cap has more than its armhole unless something else is asked: 16 mm on a child, 25 on EU 38, 30 on a heavy
 # man, of the 15 to 40 mm that pattern books give (Aldrich; Armstrong). A knit's cap has as much as its armhole.
 _WOVEN_CAP = 0.055
-# Cloth that may be strained by more than this is a knit.
-_WOVEN_STRAIN = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,18 +117,13 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
 
 def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamWish] = ()) -> list[SeamWish]:
     """Return wishes for the sleeves' caps that none of `wishes` is about, as the cloth needs them: none for a knit."""
-    if is_knit(fabric):
+    if fabric.is_knit:
         return []
     plan = plan_form(form)
     also = {seam.name: plan.of_form[i][0].name for i, seam in enumerate(form.seams)}
     asked = {also.get(wish.name, wish.name) for wish in wishes}
     caps = [seam.name for seam in plan.seams if _is_cap(form, seam) and seam.name not in asked]
     return [SeamWish(name=name, factor=1.0 + _WOVEN_CAP, upper=True) for name in caps]
-
-
-def is_knit(fabric: Fabric) -> bool:
-    """Return whether a fabric stretches as knits do, by its strain limit."""
-    return fabric.strain_limit > _WOVEN_STRAIN
 
 
 def _is_cap(form: FormResult, seam: Seam) -> bool:

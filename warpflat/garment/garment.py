@@ -21,7 +21,7 @@ from warpflat.flattening.result import Flattening, run_metrics, write_files
 from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
-from warpflat.garment.ease import SeamRatios, SeamWish, is_knit, seam_ratios
+from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
@@ -311,7 +311,7 @@ def flatten_form(
     def drawn(own: Garment, under: _SewAgain) -> Garment:
         return under.with_curves(own, 1e-3 * curves_mm) if curves_mm else own
 
-    knit = is_knit(next(iter(pieces.values())).fabric)
+    knit = next(iter(pieces.values())).fabric.is_knit
     # A knit gives: its girths matter where they are to be smaller than the body.
     if min(form.ease.values(), default=0.0) >= 0.0 if knit else not form.ease:
         return drawn(garment, again)

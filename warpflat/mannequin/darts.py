@@ -15,7 +15,14 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.layout import Layout
 
-__all__ = ["FormDart", "PlacedDart", "dart_along", "place_darts", "standard_darts", "usual_darts"]
+__all__ = [
+    "FormDart",
+    "PlacedDart",
+    "dart_along",
+    "place_darts",
+    "standard_darts",
+    "usual_darts",
+]
 
 #: Where darts end unless they say otherwise [mm]: before the bust point along the bust line; below the bust's level in the
 #: front; below it in the back, where it stands for the shoulder blades' level; below the waist in skirts. Aldrich, Metric
@@ -23,10 +30,6 @@ __all__ = ["FormDart", "PlacedDart", "dart_along", "place_darts", "standard_dart
 _TIPS = {"bust": 25.0, "front": 20.0, "back": 20.0, "front skirt": 100.0, "back skirt": 130.0, "back shoulder": 75.0}
 #: A skirt's second dart lies half-way from the first to the side and is this share as long.
 _SECOND = 0.9
-#: An arm whose elbow bends by more [degrees] shapes its sleeve; those of the tables bend by 5 to 7.
-_BENT = 12.0
-#: Where on the girth of the elbow its dart ends, from the underarm over the front: before the point of the elbow, at 0.75.
-_ELBOW_TIP = 0.77
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,24 +148,16 @@ def place_darts(
     return tuple(found)
 
 
-def standard_darts(
-    layout: Layout, bricks: Mapping[str, Sequence[str]], vertices: FloatArray | None = None
-) -> tuple[FormDart, ...]:
+def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple[FormDart, ...]:
     """Return the darts of a pattern book's block that fit the pieces (Aldrich, Metric Pattern Cutting for Women's Wear).
 
-    Bust and waist darts in the front bodice, a waist dart in the back; in the skirt one a side in front, two in the back; in a
-    sleeve past the elbow of an arm that is bent one from the back of the underarm seam.
+    Bust and waist darts in the front bodice, a waist dart in the back; in the skirt one a side in front, two in the back.
 
     Args:
         layout: the grid.
         bricks: by piece, both sides of the body.
-        vertices: the body's, #V by 3 [m]; without them no elbow is bent.
     """
     found: list[FormDart] = []
-    if vertices is not None and _elbow_bend(layout, vertices) > _BENT:
-        around = {"biceps-elbow/arm-left-back", "elbow-forearm/arm-left-back"}
-        sleeves = [piece for piece, own in bricks.items() if around <= set(own)]
-        found += [FormDart(name="elbow dart", piece=s, line="elbow left", part=(1.0, _ELBOW_TIP)) for s in sleeves]
     for piece, own in bricks.items():
         cloth = _cloth(layout, own)
         if _bust_mouth(layout, cloth, "bust") is not None:
@@ -176,14 +171,6 @@ def standard_darts(
             if at_waist and int(run[-1]) in at_waist and face == "back":
                 found.append(replace(dart, name="second waist dart", towards="side left", like=dart.name))
     return tuple(found)
-
-
-def _elbow_bend(layout: Layout, vertices: FloatArray) -> float:
-    """Return the angle [degrees] between upper arm and forearm of the left arm; 0 is straight."""
-    rows = [layout.arms["left"][layout.arm_row[level]] for level in ("biceps", "elbow", "wrist")]
-    upper, lower = np.diff([vertices[row].mean(axis=0) for row in rows], axis=0)
-    cosine = upper @ lower / (np.linalg.norm(upper) * np.linalg.norm(lower))
-    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
 def _cloth(layout: Layout, bricks: Sequence[str], opened: Sequence[str] = ()) -> _Cloth:

@@ -235,7 +235,8 @@ class Mannequin:
         """Return the pieces of a form on this body, and their seams.
 
         Args:
-            form: a shipped form's name (see :func:`warpflat.mannequin.forms.form_names`) or one of your own.
+            form: a shipped form's name (see :func:`warpflat.mannequin.forms.form_names`) or one of your own. The shipped forms'
+                long sleeves have a dart at an elbow that is bent.
             half: symmetric pieces as their left half, on the fold.
             before: a form on this body that may have much in common with it, to save time.
 
@@ -243,8 +244,9 @@ class Mannequin:
             InputError: for an unknown form, brick, line or profile in it.
         """
         from warpflat.mannequin.forms import realise, shipped_form
+        from warpflat.mannequin.shapes import shaped_form
 
-        recipe = shipped_form(form) if isinstance(form, str) else form
+        recipe = shaped_form(self.layout, shipped_form(form), "none", self.vertices) if isinstance(form, str) else form
         return realise(self.layout, self.vertices, recipe, half=half, before=before)
 
     def metrics(self) -> dict[str, Any]:

@@ -27,14 +27,6 @@ def check_girths(trunk: TrunkSections, levels: Mapping[str, float]) -> None:
     Raises:
         InputError: for two levels whose girths no body has together, or a girth that leaps between hip and bust.
     """
-    girths = {level: float(np.interp(levels[level], trunk.y, trunk.girth)) for level in _LEVELS}
-    for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
-        if {top, bottom} <= set(girths) and not low <= girths[top] / girths[bottom] <= high:
-            raise InputError(
-                f"scan: {top} {girths[top]:.2f} m at {levels[top]:.2f} m above the floor does not go with {bottom} "
-                f"{girths[bottom]:.2f} m at {levels[bottom]:.2f} m: {low * girths[bottom]:.2f} to {high * girths[bottom]:.2f} m is "
-                "possible; repair the mesh or give landmarks"
-            )
     rows = np.flatnonzero((trunk.y > levels["hip"]) & (trunk.y < levels["bust"]))
     change = np.abs(np.diff(trunk.girth[rows])) / trunk.girth[rows[:-1]]
     worst = int(np.argmax(change))
@@ -44,3 +36,11 @@ def check_girths(trunk: TrunkSections, levels: Mapping[str, float]) -> None:
             f"scan: the trunk's girth leaps from {trunk.girth[a]:.2f} to {trunk.girth[b]:.2f} m between {trunk.y[a]:.3f} and "
             f"{trunk.y[b]:.3f} m above the floor; repair the mesh there, such as arms grown to the trunk or a hole"
         )
+    girths = {level: float(np.interp(levels[level], trunk.y, trunk.girth)) for level in _LEVELS}
+    for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
+        if {top, bottom} <= set(girths) and not low <= girths[top] / girths[bottom] <= high:
+            raise InputError(
+                f"scan: {top} {girths[top]:.2f} m at {levels[top]:.2f} m above the floor does not go with {bottom} "
+                f"{girths[bottom]:.2f} m at {levels[bottom]:.2f} m: {low * girths[bottom]:.2f} to {high * girths[bottom]:.2f} m is "
+                "possible; repair the mesh or give landmarks"
+            )

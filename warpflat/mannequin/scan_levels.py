@@ -24,6 +24,12 @@ _ABOVE_CROTCH = 0.58
 _NECK = 0.91
 # How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
 _BELOW_ARMPIT = 0.006
+# Where outlines of the front run, as shares of the stature off the midplane; bust points lie a fifth of the bust apart.
+_OUTLINES, _BUST_POINT = np.linspace(0.03, 0.08, 6), 0.1
+# The outline is smoothed by so many rows. A fold bends it by so much over a way of one stature, a flat chest by half of it.
+_FOLD_SIGMA, _FOLD = 2.0, 14.0
+# Share of the way from waist to armpits where the fold lies on the mean of bodies that show one.
+_UNDERBUST = 0.51
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,6 +46,7 @@ class TrunkSections:
         front, back: #S, extent forward and backward [m].
         front_centre, back_centre: #S, z of the surface near the midplane [m].
         apex: #S, distance of the foremost points from the midplane [m].
+        outlines: #S by 6, z of the front at six distances from the midplane, the mean of left and right [m].
         hulls: for each section its hull, counter-clockwise seen from below, #P by 2 (x, z) [m].
         parts: for each section the points of the trunk, or those of both legs apart, each #P by 2 (x, z) [m].
         holed: #S, whether the section rests on closed or open holes.
@@ -59,6 +66,7 @@ class TrunkSections:
     front_centre: FloatArray
     back_centre: FloatArray
     apex: FloatArray
+    outlines: FloatArray
     hulls: tuple[FloatArray, ...]
     parts: tuple[tuple[FloatArray, ...], ...]
     holed: BoolArray
@@ -98,6 +106,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
             float(flat[centre, 1].max()) if centre.any() else z_front,
             float(flat[centre, 1].min()) if centre.any() else z_back,
             float(np.abs(flat[flat[:, 1] > z_front - 0.004 * stature][:, 0]).mean()),
+            *_outlines(flat, _OUTLINES * stature),
         ])  # fmt: skip
         hulls.append(flat[hull.vertices])
     table = np.array(rows).T
@@ -107,9 +116,17 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     }
     return TrunkSections(
         stature=stature, y=heights, girth=table[0], length=table[1], area=table[2], left=table[3], right=table[4],
-        front=table[5], back=table[6], front_centre=table[7], back_centre=table[8], apex=table[9], hulls=tuple(hulls),
-        parts=tuple(parts), holed=np.array(holed), crotch=crotch, armpits=armpits,
+        front=table[5], back=table[6], front_centre=table[7], back_centre=table[8], apex=table[9], outlines=table[10:].T,
+        hulls=tuple(hulls), parts=tuple(parts), holed=np.array(holed), crotch=crotch, armpits=armpits,
     )  # fmt: skip
+
+
+def _outlines(flat: FloatArray, x: FloatArray) -> FloatArray:
+    """Return z [m] of the front of a section's points (x, z) at `x`, the mean of left and right."""
+    front = flat[flat[:, 1] > 0.5 * (flat[:, 1].min() + flat[:, 1].max())]
+    front = front[np.argsort(front[:, 0])]
+    left, right = (np.interp(side * x, front[:, 0], front[:, 1]) for side in (1.0, -1.0))
+    return np.asarray(0.5 * (left + right))
 
 
 def leg_sections(slicer: Slicer, y: float, stature: float) -> list[Slice]:
@@ -211,7 +228,9 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     belly = float(t.y[front][np.argmax(smooth(t.front, 3)[front])])
     levels["abdomen"] = float(np.clip(belly, levels["waist"] - 0.62 * (levels["waist"] - levels["hip"]),
                                       levels["waist"] - 0.38 * (levels["waist"] - levels["hip"])))  # fmt: skip
-    levels["underbust"] = given.get("underbust") or _underbust(t, levels["waist"], levels["bust"], notes)
+    levels["underbust"] = given.get("underbust") or _underbust(
+        t, levels["waist"], levels["bust"], levels["armpit"], notes
+    )
     levels["thigh"] = min(0.44 * h, t.crotch - 0.01 * h, levels["hip"] - 0.05 * h)
     levels["knee"], levels["ankle"] = 0.28 * h, 0.06 * h
     levels["leg_thigh"], levels["leg_knee"] = t.crotch - 0.03 * h, levels["knee"]
@@ -282,32 +301,25 @@ def _bust(t: TrunkSections, waist: float, armpit: float, notes: list[str]) -> fl
     return high
 
 
-def _underbust(t: TrunkSections, waist: float, bust: float, notes: list[str]) -> float:
-    """Return the height of the fold under the bust: where the girth falls furthest below an even taper to the waist."""
-    y = np.arange(waist, bust, 0.0005)
-    girth = np.interp(y, t.y, t.girth)
-    even = np.linspace(girth[0], girth[-1], len(y))
-    row = int(np.argmax(even - girth))
-    least, most = waist + 0.3 * (bust - waist), bust - 0.01 * t.stature
-    if least < y[row] < most and even[row] - girth[row] > 0.03 * girth[-1]:
-        return float(y[row])
-    # Of a chest that grows fuller up to the armpits the bust lies lower than its fullest girth.
-    chest = np.flatnonzero((t.y > waist) & (t.y <= min(a[0] for a in t.armpits.values())))
-    y = np.arange(waist, max(bust, float(t.y[chest[np.argmax(t.girth[chest])]])), 0.002)
-    guess = float(np.clip(_bend(y, np.interp(y, t.y, t.girth)), waist + 0.25 * (bust - waist), most))
-    notes.append(
-        f"underbust = {guess:.3f} m is a guess: no fold shows under the bust; it is where the girth bends most"
-    )
+def _underbust(t: TrunkSections, waist: float, bust: float, armpit: float, notes: list[str]) -> float:
+    """Return the height of the fold under the bust: where the outline over the bust point bends forward most."""
+    apart = _BUST_POINT * float(np.interp(bust, t.y, t.girth)) / t.stature
+    outline = smooth(np.array([np.interp(apart, _OUTLINES, row) for row in t.outlines]), _FOLD_SIGMA)
+    bend = np.gradient(np.gradient(outline, t.y), t.y) * t.stature
+    least, most = waist + 0.25 * (armpit - waist), min(bust - 0.01 * t.stature, armpit - 0.03 * t.stature)
+    rows = np.flatnonzero((t.y > least) & (t.y < most))
+    row = int(rows[np.argmax(bend[rows])]) if len(rows) else 0
+    if not len(rows) or not rows[0] < row < rows[-1]:
+        guess, why = (
+            min(waist + _UNDERBUST * (armpit - waist), most),
+            f"it is {_UNDERBUST:g} of the way from waist to armpits",
+        )
+    elif bend[row] > _FOLD:
+        return summit(t.y, bend, row)
+    else:
+        guess, why = summit(t.y, bend, row), "it is where the front bends most"
+    notes.append(f"underbust = {guess:.3f} m is a guess: no fold shows under the bust; {why}")
     return guess
-
-
-def _bend(y: FloatArray, values: FloatArray) -> float:
-    """Return where the two joined straight lines bend that fit `values` best."""
-    misses = []
-    for at in y[2:-2]:
-        lines = np.column_stack([np.ones_like(y), y - at, np.maximum(y - at, 0.0)])
-        misses.append(float(np.linalg.norm(lines @ np.linalg.lstsq(lines, values, rcond=None)[0] - values)))
-    return float(y[2 + int(np.argmin(misses))])
 
 
 def _hip(t: TrunkSections, waist: float, notes: list[str]) -> float:

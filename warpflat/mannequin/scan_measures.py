@@ -31,6 +31,9 @@ _BELLY = 0.98
 _FINGERS_PART = 0.92
 # Shares of the crotch's height between which an ankle and a calf lie.
 _ANKLE, _CALF = (0.10, 0.30), (0.32, 0.60)
+# The knee lies so far above the leg's narrowest place over the calf; its crease is trusted so near to there, both as
+# shares of the crotch's height. The fat of a knee moves the crease down by up to 0.05.
+_OVER_NARROW, _KNEE_SURE = 0.075, 0.012
 # On a noisy scan a cubic finds the calf over so much of the crotch's height up and down.
 _WIDE = 0.12
 # Girths [m] per metre of stature that bodies have, from infants to the heaviest.
@@ -78,7 +81,8 @@ def leg_levels(legs: LegSections) -> tuple[dict[str, float], dict[str, str]]:
 
 def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict[str, str]]:
     y, guesses = legs.y, {}
-    girth = smooth(legs.girths[side], 3.0)
+    # Smoothed little, or the calf, which is rounder above than below, would be moved.
+    girth = smooth(legs.girths[side], 3.0 if legs.noise else 1.0)
     back = smooth(np.array([h[:, 1].min() for h in legs.hulls[side]]), 3.0)
 
     def extreme(name: str, values: FloatArray, between: tuple[float, float], share: float) -> float:
@@ -97,6 +101,10 @@ def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict
     low, high = calf, 0.86 * legs.crotch
     line = np.interp(y, [low, high], np.interp([low, high], y, back))
     knee = extreme("knee", line - back, (low + 0.25 * (high - low), high - 0.25 * (high - low)), 0.63)
+    below = np.flatnonzero((y > low + 0.1 * (high - low)) & (y < high))
+    narrow = float(y[below[np.argmin(girth[below])]]) if len(below) else 0.0
+    if abs(narrow + _OVER_NARROW * legs.crotch - knee) > _KNEE_SURE * legs.crotch:
+        guesses.setdefault("knee", "the crease behind it and the narrowest place below it do not agree")
     return {"knee": knee, "calf": calf, "ankle": ankle}, guesses
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 from warpflat.core.arrays import FloatArray
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import standard_darts
+from warpflat.mannequin.elbow_darts import elbow_darts
 from warpflat.mannequin.forms import Form, PieceRecipe
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.layout import Layout
@@ -19,21 +20,35 @@ _SMALL_OF_BACK = ("waist", "hip")
 
 
 def shaped_form(
-    layout: Layout, form: Form, shape: Literal["none", "darts", "princess"], vertices: FloatArray | None = None
+    layout: Layout,
+    form: Form,
+    shape: Literal["none", "darts", "princess"],
+    vertices: FloatArray | None = None,
+    *,
+    woven: bool = True,
 ) -> Form:
     """Return a form whose pieces are shaped: by the darts of a pattern book's block, or by princess seams.
 
     With a bust dart the cloth hangs straight from the bust to the waist, and with skirt darts it bridges the small of the back.
-    The body's `vertices`, #V by 3 [m], say whether its elbows are bent.
+    A woven sleeve around a bent elbow has a dart there, whatever the shape.
+
+    Args:
+        layout: the grid.
+        form: the form.
+        shape: ``none``, ``darts`` or ``princess``.
+        vertices: the body's, #V by 3 [m], which say whether its elbows are bent; without them none is.
+        woven: whether the cloth is woven; a knit gives at the elbow.
 
     Raises:
         InputError: an unknown brick.
     """
     bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
+    if woven and vertices is not None:
+        form = replace(form, darts=(*form.darts, *elbow_darts(layout, bricks, vertices)))
     if shape == "none":
         return form
     if shape == "darts":
-        darts = standard_darts(layout, bricks, vertices)
+        darts = standard_darts(layout, bricks)
         # Legs are straight where the cloth hangs straight over the hollows of the body.
         ruled = [_UNDER_BUST] if any(dart.line == "bust" for dart in darts) else []
         bridged = [_SMALL_OF_BACK] if any(dart.line == "princess back left" for dart in darts) else []

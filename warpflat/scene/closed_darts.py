@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from warpflat.garment.darts import closed_darts
 from warpflat.garment.garment import Garment
+from warpflat.mannequin.elbow_darts import ELBOW
 from warpflat.scene.form_cuts import place_of, scene_with
 from warpflat.scene.load import Scene
 
@@ -39,7 +40,10 @@ def without_closed_darts(scene: Scene, garments: Iterable[Garment]) -> tuple[Sce
     for garment in garments:
         flat = {name: piece.positions for name, piece in garment.pieces.items()}
         closed += [d for d in closed_darts(garment.form, flat) if d.place not in own and d not in closed]
-    if not closed or scene.settings.shape != "darts":
+    if scene.settings.shape != "darts":
+        # A woven sleeve around a bent elbow has its dart in every shape.
+        closed = [dart for dart in closed if ELBOW in dart.place]
+    if not closed:
         return scene, ()
     cuts = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
     for dart in closed:

@@ -11,7 +11,7 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.form_cuts import cut_form
-from warpflat.scene.load import Scene, errors_named, expand_variables
+from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.scene.openings import scene_openings
 
 __all__ = ["scene_form", "scene_recipe"]
@@ -59,7 +59,8 @@ def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mann
         if not settings.half:
             form = part_at_centres(mannequin.layout, form, scene_openings(settings.openings))
         shape = "darts" if settings.shape == "auto" else settings.shape
-        form = shaped_form(mannequin.layout, form, shape, mannequin.vertices)
+        woven = not scene_fabric(scene).is_knit
+        form = shaped_form(mannequin.layout, form, shape, mannequin.vertices, woven=woven)
     # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
     with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
         return mannequin, cut_form(mannequin, form, settings.cuts)
