@@ -106,6 +106,18 @@ def test_a_garment_is_flattened_and_its_seams_match(tmp_path: Path):
     assert all(seam.matches for seam in pattern.seams)
 
 
+def test_pieces_whose_borders_do_not_meet_are_not_sewn(tmp_path: Path):
+    parts = _barrel()
+    parts["back"].vertices[:, 2] -= 0.02
+    _write_obj(tmp_path / "barrel.obj", parts)
+    data = {"surface": {"file": str(tmp_path / "barrel.obj"), "units": "m", "component": "all"}, **QUIET}
+    made = make_scene(data, name="barrel", folder=tmp_path, where="barrel.toml")
+    result = run_scene(made, tmp_path / "out")
+    assert set(result.metrics["pieces"]) == {"front", "back"}
+    assert "seams" not in result.metrics
+    assert any("no borders meet in space" in note for note in result.notes)
+
+
 def test_what_belongs_to_one_piece_is_refused(tmp_path: Path):
     surface = {"file": "barrel.obj", "units": "m", "component": "all"}
     with pytest.raises(InputError, match='datum belongs to one piece; with component = "all" leave it out'):

@@ -143,6 +143,8 @@ def _run_surface(
             else:
                 pieces, sewn = _flatten_pieces(scene, surfaces, film, callback=each_step, device=device)
                 whole = pieces
+                if sewn is None and len(pieces) > 1:
+                    notes.append("no borders meet in space, vertex by vertex: the pieces are not sewn to each other")
             notes += [message for piece in whole for message in piece.messages]
             fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
             pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
