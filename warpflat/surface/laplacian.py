@@ -20,7 +20,7 @@ from warpflat.surface.mesh import Surface, once_per_surface
 __all__ = ["Laplacian", "factor_pays", "laplacian_of", "laplacian_solver", "stiffness_matrix"]
 
 # The most vertices of a surface that is factored. A factor takes 0.3 to 0.6 KB a vertex, and its entries grow faster than the mesh.
-_MOST_VERTICES = 60_000
+_MOST_VERTICES = 100_000
 # The same for meshes of quads alone: on larger ones multigrid cycles are as fast, and on grids faster.
 _MOST_OF_QUADS = 4_000
 
