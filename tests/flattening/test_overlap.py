@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from warpflat.cli.main import main
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.cut_plan import CutPlan
+from warpflat.flattening import keep_apart
 from warpflat.flattening.edit import change_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.surface_to_pattern import pattern_of_surface
+from warpflat.solver import contact
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.injective import is_injective
 from warpflat.surface.io.read import read_surface
@@ -106,6 +108,16 @@ def check_parted(parted: Flattening) -> None:
     assert measures["converged"]
     price = parted.stages[2].model_energy_j - parted.stages[1].model_energy_j
     assert measures["contact_energy_j"] == price > 0.0
+
+
+def test_contact_on_a_fine_mesh_ends_with_a_note_after_a_bounded_time(monkeypatch: pytest.MonkeyPatch):
+    surface = curled_strip()
+    monkeypatch.setattr(keep_apart, "_MOST_SWIRLED", 100)
+    monkeypatch.setattr(contact, "_MOST_WORK", 5 * len(surface.vertices))
+    left = flatten(surface, device=DEVICE)
+    assert [stage.name for stage in left.stages] == ["develop", "relax"]
+    assert [note for note in left.notes if "could not part it in 5 iterations" in note and "mesh coarser" in note]
+    assert left.measures["overlap_m2"] > 0.0
 
 
 @pytest.mark.parametrize(

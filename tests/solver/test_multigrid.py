@@ -29,6 +29,7 @@ from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface import laplacian, mesh
 from warpflat.surface.cut.cut_mesh import cut_along
+from warpflat.surface.injective import is_injective
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -368,3 +369,13 @@ def test_caches_dropped_from_large_pieces_are_made_again_as_they_were(kind: str,
     again = springs_of(surface, flat.fabric, flat.positions)
     np.testing.assert_array_equal(again.stiffness, springs_of(kept.surface, kept.fabric, kept.positions).stiffness)
     assert flat.measures["length_error"] == kept.measures["length_error"]
+
+
+def test_cycles_on_a_fine_mesh_end_with_a_note_after_a_bounded_time(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(laplacian, "_MOST_VERTICES", 100)
+    monkeypatch.setattr("warpflat.solver.multigrid.solve._PATIENCE", 5.0)
+    monkeypatch.setattr("warpflat.solver.multigrid.solve._MOST_WORK", 1.0)
+    flat = flatten(cracked(40, triangles=True), fabric="isotropic", device=DEVICE)
+    assert not flat.converged
+    assert sum("work units of cycles: a coarser mesh, or a cut, may help" in note for note in flat.notes) == 1
+    assert is_injective(flat.network.surface, flat.positions)

@@ -20,7 +20,8 @@ __all__ = ["keep_apart"]
 # Where contact costs much, relaxation also starts from its layout swirled by these angles about the middle [rad]. A spiral of 2.5 turns
 # needs the wide ones; by the narrow ones the sides of a slit slide along each other.
 _SWIRLS = (-3.0, -1.5, -0.1, 0.1, 1.5, 3.0)
-# Pieces of more vertices are not: that takes six times as long as contact alone.
+# Pieces of more vertices are not: that takes six times as long as contact alone. Nor does contact start again where it has not come to
+# rest.
 _MOST_SWIRLED = 10_000
 
 
@@ -63,6 +64,11 @@ def keep_apart(
             share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
             task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
             return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
+        if outcome is not None and len(surface.vertices) > _MOST_SWIRLED:
+            task.notes.append(
+                f"{words}, and contact could not part it in {outcome.steps:,} iterations: cut it apart there, or make the mesh coarser"
+            )
+            return free, (relaxed,)
     task.notes.append(f"{words}, and contact could not part it: cut it apart there")
     return free, (relaxed,)
 

@@ -39,8 +39,9 @@ _CRACK_GAP = 0.02
 _BARRIER_STIFFNESS = 1.0
 # Near edges are looked for anew once the border has moved by so many gaps.
 _MARGIN = 4.0
-# At most so many iterations.
+# At most so many iterations, and fewer where they times the vertices are more than this: some 40 s.
 _MOST_ITERATIONS = 2_000
+_MOST_WORK = 100_000_000
 # Sides of closed cracks are drawn apart by this share of the way to the middle of the faces around each vertex; less where that folds.
 _OPENINGS = (1e-2, 1e-3, 1e-4)
 
@@ -250,7 +251,7 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
         return None
     descent, at_rest = Descent(problem, point), False
     estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
-    most = min(_MOST_ITERATIONS, state.options.max_steps)
+    most = min(_MOST_ITERATIONS, _MOST_WORK // len(start), state.options.max_steps)
     while not at_rest and descent.iterations < most and descent.step():
         left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         at_rest = left.is_small(state.options) or descent.is_at_rest(state.options)

@@ -21,6 +21,7 @@ unit. On triangles a piece is also at rest when by estimate little is left (`war
 
 Where cycles make too little progress on triangle meshes, another method finishes: Gauss-Newton steps in soft cloth
 (`warpflat.solver.gauss_newton`), plain steps with a membrane.
+Otherwise cycles end, with a note, after as much work as a user may wait for.
 
 Pieces side by side (`warpflat.model.join`) have levels of their own, which are joined level by level; a piece without a
 coarser mesh stays as it is on the levels below. Step fractions and convergence are decided piece by piece.
@@ -60,6 +61,9 @@ _FEW_VERTICES = 1_200
 _PATIENCE = 600.0
 _VERY_SOFT = 200.0
 _PATIENCE_WITH_MEMBRANE = 300.0
+# Work units times vertices after which cycles end where no other method goes on; clean meshes are at rest after a twentieth.
+_MOST_WORK = 5e8
+_TOO_FINE = "a coarser mesh, or a cut, may help"
 _NO_LEVEL = "every coarser mesh has mirrored faces at the first layout, or none is worth having"
 _SLOW_CYCLES = "coarser meshes bring a membrane that is not isotropic to rest too slowly"
 # Limit on how often levels are made anew, after the piece has moved far from the layout at which they were made.
@@ -145,14 +149,14 @@ def multigrid_pays(network: SpringNetwork) -> bool:
 
 
 def _patience(network: SpringNetwork) -> float:
-    """Return the work units of cycles after which another method goes on."""
-    if network.surface.is_quad.any():
+    """Return the work units of cycles after which another method goes on, or they end."""
+    if network.surface.is_quad.any() or network.seams is not None:
         return math.inf
-    if network.model == "membrane":
-        return math.inf if network.fabric.is_isotropic else _PATIENCE_WITH_MEMBRANE
-    if not gauss_newton_pays(network):
-        return math.inf
-    return 0.0 if network.fabric.softness >= _VERY_SOFT else _PATIENCE
+    if network.model == "membrane" and not network.fabric.is_isotropic:
+        return _PATIENCE_WITH_MEMBRANE
+    if gauss_newton_pays(network):
+        return 0.0 if network.fabric.softness >= _VERY_SOFT else _PATIENCE
+    return max(_PATIENCE, _MOST_WORK / network.vertex_count)
 
 
 def relax_multilevel(
@@ -215,23 +219,14 @@ def _cycle_until_rest(
     """Cycle pieces until all are finished, or another method has gone on; the result is copied into their state.
 
     Returns:
-        A note if plain steps have gone on.
+        A note if plain steps have gone on, or cycles have ended too early.
     """
     notes: tuple[str, ...] = ()
     whole, options, patience = pieces.state, pieces.state.options, _patience(pieces.state.network)
     while not pieces.finished.all() and pieces.state.work_units - work_before < options.max_steps:
         spent = pieces.state.work_units - work_before
         if spent >= patience:
-            for piece in pieces.progress:
-                piece.left = Remainder()
-            if whole.network.model == "membrane":
-                relax(pieces.state, watch=watch, each_step=each_step)
-                notes = (f"plain steps went on after {spent:.0f} work units: {_SLOW_CYCLES}",)
-            else:
-                max_work = options.max_steps - spent
-                relax_gauss_newton(
-                    pieces.state, max_work=max_work, least_gain=least_gain, watch=watch, each_step=each_step
-                )
+            notes = _finish(pieces, spent, least_gain=least_gain, watch=watch, each_step=each_step)
             break
         unfinished = pieces.without_finished()
         if unfinished is not None:
@@ -242,3 +237,20 @@ def _cycle_until_rest(
         pieces.notify(each_step)
     pieces.state.copy_into(whole)
     return notes
+
+
+def _finish(
+    pieces: _CycledPieces, spent: float, *, least_gain: float | None, watch: Watch | None, each_step: Watch | None
+) -> tuple[str, ...]:
+    """Go on by another method with pieces whose cycles have spent so many work units; return a note, as `_cycle_until_rest`."""
+    state = pieces.state
+    for piece in pieces.progress:
+        piece.left = Remainder()
+    if state.network.model == "membrane" and not state.network.fabric.is_isotropic:
+        relax(state, watch=watch, each_step=each_step)
+        return (f"plain steps went on after {spent:.0f} work units: {_SLOW_CYCLES}",)
+    if gauss_newton_pays(state.network):
+        max_work = state.options.max_steps - spent
+        relax_gauss_newton(state, max_work=max_work, least_gain=least_gain, watch=watch, each_step=each_step)
+        return ()
+    return (f"not at rest after {spent:.0f} work units of cycles: {_TOO_FINE}",)
