@@ -19,10 +19,10 @@ from warpflat.surface.mesh import Surface, once_per_surface
 
 __all__ = ["Laplacian", "factor_pays", "laplacian_of", "laplacian_solver", "stiffness_matrix"]
 
-# The most vertices of a surface that is factored. A factor takes 0.3 to 0.7 KB a vertex, and its entries grow faster than the mesh: at
-# 400,000 vertices of an isotropic bodice multigrid cycles are a quarter faster, at 200,000 as fast; in stiff cloth, and on ragged pieces,
-# they are slower from the start and may end higher. Contact keeps up to some hundred columns of the inverse.
-_MOST_VERTICES = 150_000
+# The most vertices of a surface that is factored. A factor takes 0.3 to 0.7 KB a vertex. L-BFGS over it is as fast as multigrid cycles in
+# isotropic cloth up to 200,000 vertices, and in stiff cloth and on ragged pieces much faster; but beyond this the estimate of what is left
+# leaves more than it says on split grids.
+_MOST_VERTICES = 100_000
 # The same for meshes of quads alone: on larger ones multigrid cycles are as fast, and on grids faster.
 _MOST_OF_QUADS = 4_000
 
