@@ -101,6 +101,7 @@ def find_ways(
     ends: wp.array(dtype=wp.vec2i),
     seen: wp.array(dtype=wp.vec3d),
     reach: int,
+    at_once: int,
     tolerance: wp.float64,
     # outputs
     distance: wp.array(dtype=wp.float64),
@@ -117,7 +118,7 @@ def find_ways(
     A vertex whose path is now shorter lets those of its neighbours wait whose paths may then become shorter, too.
 
     Vertices are numbered about as far as they are. One that lies at most `reach` numbers back looks again at once, any
-    other in the next launch.
+    other in the next launch; after `at_once` ways have become shorter, all do.
 
     offset: #V+1, where each vertex's entries in `ends` and `seen` begin, which are those of `see_sides`. tolerance:
     [m], less is not shorter. distance: #V [m], upper bounds before and after, 0 or more; lowered. waiting: #V, 1 where
@@ -163,7 +164,7 @@ def find_ways(
                         if waiting[near] == 0 and may_lead(seen[r], i, best, distance[ends[r][1 - i]], distance[near]):
                             waiting[near] = 1
                             crowd[near / CROWD] = crowd[near / CROWD] + 1
-                            if near >= v - reach:
+                            if near >= v - reach and shortened[0] < at_once:
                                 follow = wp.min(follow, near)
         v = follow
 

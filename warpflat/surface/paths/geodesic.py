@@ -153,8 +153,9 @@ def _ahead(surface: Surface, path: list[int]) -> list[int]:
 
 # Rounds over all vertices; a mesh of needles may take that many, any other a few.
 _MOST_ROUNDS = 200
-# Share of all vertices, back in their order, within which a shorter distance is passed on at once.
-_REACH = 0.1
+# Share of all vertices, back in their order, within which a shorter distance is passed on at once, and for so many times all vertices:
+# where faces are slender that would go on and on, and sweeps take a tenth of it.
+_REACH, _AT_ONCE = 0.1, 2.0
 # Changes below this share of the largest distance, or of the largest value propagated, are rounding.
 _ROUNDING = 1e-14
 
@@ -184,12 +185,13 @@ class _GeodesicField:
         waiting, shortened = 1 + self._on_line, np.empty(1, dtype=np.int32)
         crowd = np.add.reduceat(1 - self._on_line, self._here[::CROWD], dtype=np.int32)
         self._paths = self._here.copy(), self._here.copy(), np.zeros(len(order)), np.zeros(len(order))
-        for _ in range(_MOST_ROUNDS):
+        for sweep in range(_MOST_ROUNDS):
             shortened[0] = 0
+            at_once = int(_AT_ONCE * len(order)) if sweep == 0 else 0
             launch_quietly(
                 find_ways,
                 dim=1,
-                inputs=[offset, ends, seen, int(_REACH * len(order)), tolerance],
+                inputs=[offset, ends, seen, int(_REACH * len(order)), at_once, tolerance],
                 outputs=[distance, waiting, crowd, *self._paths, shortened],
                 device="cpu",
             )
