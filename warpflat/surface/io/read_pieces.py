@@ -16,7 +16,7 @@ from warpflat.core.text import format_count
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import ClosedSurfaceError, count_parts, make_surface
+from warpflat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
 
 __all__ = ["read_pieces"]
 
@@ -48,17 +48,16 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
         own = vertices[first : first + int(polygons.max()) + 1]
         source = str(file) if len(objects) == 1 else f"{file}: {title}"
         try:
-            parts = count_parts(own, polygons, weld=False)
+            part = parts_of_faces(own, polygons, weld=False)
             # Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
-            soup = 2 * parts > len(polygons)
+            soup = 2 * int(part.max() + 1) > len(polygons)
             if soup:
-                parts = count_parts(own, polygons, weld=True)
+                part = parts_of_faces(own, polygons, weld=True)
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
-        for number in range(parts):
-            part = f"{title}_{number + 1}" if parts > 1 else title
+        for number in range(int(part.max()) + 1):
             try:
-                surface = make_surface(own, polygons, name=part, component=number, weld=soup, source=source)
+                surface = make_surface(own, polygons[part == number], name=title, weld=soup, source=source)
             except ClosedSurfaceError:
                 closed += 1
                 continue
@@ -66,8 +65,7 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
                 small += 1
                 continue
             check_size(surface, file, scale)
-            own_notes = tuple(note for note in surface.notes if not note.startswith("component "))
-            found.append(replace(surface, notes=own_notes, sources=tuple(dict.fromkeys(sources))))
+            found.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
     if not found:
         raise InputError(f"{file}: every part is closed (it has no border) or a crumb; give the layer of cloth alone")
     notes = list(raw.notes)
@@ -81,12 +79,12 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
 
 def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:
     """Yield the objects of a file: name, first vertex, and the faces in its own numbering; one of all faces if they share vertices."""
-    used = raw.polygons.max(axis=1)
+    highest = raw.polygons.max(axis=1)
     lowest = np.where(raw.polygons >= 0, raw.polygons, len(raw.vertices)).min(axis=1)
     starts = {first: name for first, name in raw.groups if first < len(raw.vertices)}
     first = np.array([0, *(start for start in starts if start > 0)], dtype=np.int64)
     of = np.searchsorted(first, lowest, side="right") - 1
-    if (np.searchsorted(first, used, side="right") - 1 != of).any():
+    if (np.searchsorted(first, highest, side="right") - 1 != of).any():
         yield stem, 0, raw.polygons
         return
     for number, start in enumerate(first.tolist()):

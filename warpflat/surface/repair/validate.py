@@ -32,7 +32,7 @@ from warpflat.surface.repair.polygons import (
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
 
-__all__ = ["ClosedSurfaceError", "check_positions", "count_parts", "make_surface"]
+__all__ = ["ClosedSurfaceError", "check_positions", "make_surface", "parts_of_faces"]
 
 # Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
 _SMALLEST, _LARGEST = 1e-20, 1e20
@@ -134,8 +134,8 @@ def make_surface(
         raise type(error)(f"{source or name}: {error}") from error
 
 
-def count_parts(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool) -> int:
-    """Return the number of connected parts, of which `component` of :func:`make_surface` takes one.
+def parts_of_faces(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool) -> IntArray:
+    """Return the connected part of each polygon (#F), from 0 in their order; -1 for those that repair drops.
 
     Args:
         vertices, polygons: as :func:`make_surface`.
@@ -146,7 +146,9 @@ def count_parts(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool) -> int:
     """
     mesh = _checked_faces(check_positions(vertices), polygons)
     _weld(mesh, weld, split_corners=False, chosen=True)
-    return int(mesh.part.max()) + 1
+    part = np.full(len(np.asarray(polygons)), -1, dtype=np.int32)
+    part[mesh.origin] = mesh.part
+    return part
 
 
 def _checked_surface(
