@@ -15,14 +15,7 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.layout import Layout
 
-__all__ = [
-    "FormDart",
-    "PlacedDart",
-    "dart_along",
-    "place_darts",
-    "standard_darts",
-    "usual_darts",
-]
+__all__ = ["FormDart", "PlacedDart", "dart_along", "place_darts", "standard_darts", "usual_darts"]
 
 #: Where darts end unless they say otherwise [mm]: before the bust point along the bust line; below the bust's level in the
 #: front; below it in the back, where it stands for the shoulder blades' level; below the waist in skirts. Aldrich, Metric
