@@ -30,7 +30,9 @@ __all__ = [
     "files_written",
     "hidden_file",
     "is_input",
+    "keep_note",
     "latest_file",
+    "notes_kept",
     "output_folder",
     "prepare_folder",
     "remove_file",
@@ -123,6 +125,7 @@ class _Run:
         new: the folder in it for what is written.
         names: of the files written, in that order.
         removed: names of files of earlier runs that go with the change.
+        notes: on files that were left out, each once.
     """
 
     def __init__(self, folder: Path, hidden: Path) -> None:
@@ -131,6 +134,7 @@ class _Run:
         self.new = hidden / NEW
         self.names: dict[str, None] = {}
         self.removed: dict[str, None] = {}
+        self.notes: dict[str, None] = {}
         self._expected: set[str] = set()
         self._sources: set[Path] = set()
 
@@ -290,6 +294,18 @@ def adopt_files(files: Iterable[tuple[str, str]]) -> None:
     for folder, name in files:
         if run := _run_into(Path(folder)):
             run.names[name] = None
+
+
+def keep_note(path: Path, note: str) -> None:
+    """Keep a note on a file that the run into its folder has left out, if there is such a run."""
+    if run := _run_into(path.parent):
+        run.notes[note] = None
+
+
+def notes_kept(folder: Path) -> tuple[str, ...]:
+    """Return the notes on files that the run into a folder has left out."""
+    run = _run_into(folder)
+    return () if run is None else tuple(run.notes)
 
 
 def is_input(path: Path) -> bool:

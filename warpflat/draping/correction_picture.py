@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export.geometry import outline_edges
 from warpflat.export.letters import all_letters
@@ -33,7 +33,6 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     old, new, moved = correction.before.cloth, correction.after.cloth, correction.moved()
     edges = outline_edges(old.flat_faces)
@@ -53,7 +52,7 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
     for name, rows in old.piece_vertices.items():
         points = old.flat[rows] + shift[rows]
         across, up = points.mean(axis=0).tolist()
-        axis.text(across, up, name, ha="center", fontsize=10, parse_math=False)
+        axis.text(across, up, name, ha="center", fontsize=10)
         _label(axis, points, moved[name])
     axis.set_aspect("equal")
     first, last = correction.rounds[0], correction.rounds[-1]
@@ -61,7 +60,6 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
         f"Outlines before (grey) and after (red); changes outwards in mm. Misfit {1e3 * first.misfit:.2f} mm before, "
         f"{1e3 * last.misfit:.2f} mm after",
         fontsize=11,
-        parse_math=False,
     )
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
