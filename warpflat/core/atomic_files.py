@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
-from warpflat.core.errors import InputError, expect
+from warpflat.core.errors import CannotWriteError, InputError, expect
 from warpflat.core.file_names import check_file_name
 from warpflat.core.hidden_files import ASIDE, FRESH, NEW, clear_hidden, hidden_name, is_unfinished, remove_unfinished
 from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_replace
@@ -73,7 +73,7 @@ def require_writable(final: str | os.PathLike[str]) -> None:
     run = _run_into(final.parent)
     try:
         if final.is_dir():
-            raise InputError(f"cannot write {final}: it is a folder; give the name of a file")
+            raise CannotWriteError(f"cannot write {final}: it is a folder; give the name of a file")
         if run is not None:
             run.refuse_inputs([final.name])
             return
@@ -367,7 +367,9 @@ def _reason(error: OSError) -> str:
 
 def _cannot_write(final: Path, error: OSError) -> InputError:
     if is_open_elsewhere(error):
-        return InputError(
+        return CannotWriteError(
             f"cannot write {final}: it is open in another program or write-protected; close it, and run again"
         )
-    return InputError(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")
+    # Libraries raise errors of this kind for faults of their own, too; those of the system have a number.
+    kind = InputError if error.errno is None else CannotWriteError
+    return kind(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")

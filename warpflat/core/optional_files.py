@@ -1,8 +1,8 @@
 """Pictures, films and pages: a run can do without them, so none of them costs the pattern.
 
 Whatever goes wrong while such a file is made becomes a note: one sentence on the console and under `notes` in `metrics.json`. The run
-goes on, and its exit code stays. What the user must mend is told before: a place that cannot be written, or a file of the user's there.
-An interruption ends the run as ever, and so does a want of memory.
+goes on, and its exit code stays. What the user must see to ends it as ever: a place that cannot be written, or a file of the user's
+there. So do an interruption and a want of memory.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from warpflat.core.atomic_files import keep_note, require_writable
-from warpflat.core.errors import InputError
+from warpflat.core.errors import CannotWriteError, InputError
 from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.text import one_line
 
@@ -39,14 +39,14 @@ def optional_file(path: str | os.PathLike[str], files: list[str], *, part: str =
         part: what is made, if it is only a part of the file, such as "the guide".
 
     Raises:
-        InputError: the folder cannot be written, or `path` is a folder, or a file that the run has read.
+        InputError: the folder cannot be written, the disk is full, or `path` is a folder, or a file that the run has read.
     """
     path = Path(path)
     require_writable(path)
     try:
         yield path
     except Exception as error:
-        if SIGNALS or is_out_of_memory(error):
+        if SIGNALS or isinstance(error, CannotWriteError) or is_out_of_memory(error):
             raise
         why = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
         leave_out(path, one_line(f"{part or path.name} was left out{f' of {path.name}' if part else ''}: {why}"))

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import CannotWriteError
 from warpflat.export.geometry import Polylines
 
 __all__ = ["FilmStage", "Frame", "Key", "KeyFile"]
@@ -117,7 +117,7 @@ class KeyFile:
                     self._end, left = self._end + written, left[written:]
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            raise InputError(f"cannot write {self.film}: {reason}") from error
+            raise CannotWriteError(f"cannot write {self.film}: {reason}") from error
         return key
 
     def positions(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:
