@@ -15,6 +15,7 @@ from warpflat.export.colours import energy_colours, energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
+from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import DrawnView, make_facets, surface_view
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     _draw_paths(pen, drawn, surface.vertices, entries, view)
     _draw_table(pen, entries, height - 1.0)
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": "warpflat"})
+        save_png(temporary, figure, {"Software": "warpflat"})
 
 
 def _draw_paths(pen: Pen, drawn: DrawnView, vertices: FloatArray, entries: Sequence[LedgerEntry], view: Any) -> None:

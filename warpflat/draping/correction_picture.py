@@ -17,8 +17,8 @@ from warpflat.export.picture_png import save_png
 
 __all__ = ["write_correction_picture"]
 
-# Room between pieces [m], inches per metre, and colours before and after.
-_GAP, _SCALE, _BEFORE, _AFTER = 0.06, 8.0, "#8a8a8a", "#c8452c"
+# Room between pieces [m], inches per metre, the largest page [in], and colours before and after.
+_GAP, _SCALE, _LARGEST, _BEFORE, _AFTER = 0.06, 8.0, 60.0, "#8a8a8a", "#c8452c"
 # Changes of the outline that are written beside it: the largest ones of a piece, so far apart [m].
 _LABELS, _APART, _LEAST = 6, 0.08, 1e-3
 
@@ -42,7 +42,8 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
         shift[rows] = [x - low[0], -low[1]]
         x += float(high[0] - low[0]) + _GAP
     tall = float((old.flat + shift)[:, 1].max())
-    size = (max(_SCALE * x, 6.0), _SCALE * tall + 1.0)
+    scale = min(_SCALE, _LARGEST / max(x, tall))
+    size = (max(scale * x, 6.0), scale * tall + 1.0)
     figure = Figure(figsize=size, dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.01, 0.01, 0.98, 0.9 * (1.0 - 0.4 / size[1])))
