@@ -134,7 +134,7 @@ def check_page(figure: Any, *, words: bool = True) -> None:
             assert outside < 2, (text.get_text(), box, width, height)
 
 
-@examples(12)
+@examples(6)
 @given(
     drawn=st.lists(pieces(), min_size=1, max_size=3) | st.lists(pieces(), min_size=1, max_size=30),
     scale=st.sampled_from([None, None, 1.0]),

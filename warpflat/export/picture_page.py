@@ -257,10 +257,11 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     if cell.shows_body:
         for drawn, shape, words in zip(shown, cell.silhouettes, ("on the body", "pattern"), strict=True):
             _heading(pen, room, drawn, words, drawn.box[3] - heading_room(shape, size) + 0.24)
-    floor = top - cell.height + 0.02
+    floor, start = top - cell.height + 0.02, cell.left
     if cell.alone or size != page_scale:
         end = draw_scale_bar(pen, cell.left, floor, size)
         room.take_box(cell.left, floor, end, floor + 0.08)
+        start = end + 0.15
     datum = cell.pattern.lines.get(cell.datum, [None])[0] if cell.datum is not None else None
     has_grain = datum is None or _grain(pen, room, shown[-1], datum, cell.grain_angle)
     unnamed: dict[str, None] = {}
@@ -271,8 +272,27 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     if not has_grain and datum is not None and not _grain(pen, room, shown[-1], datum, cell.grain_angle, pages[-1]):
         unnamed["grain"] = None
     if unnamed:
-        text = pen.shorten(f"not labelled for want of room: {', '.join(unnamed)}", 7, cell.width - 0.1)
-        pen.write(cell.left, floor + 0.04, text, 7, color=GREY)
+        _write_unnamed(pen, room, list(unnamed), start, cell.left + cell.width, floor)
+
+
+def _write_unnamed(pen: Pen, room: LabelRoom, names: Sequence[str], left: float, right: float, floor: float) -> None:
+    """Write at the foot of a cell which names had no room, between names that stand there [in]; their number where there is little room."""
+    all_names = ", ".join(names)
+    texts = [
+        f"not labelled for want of room: {all_names}",
+        pen.shorten(f"not labelled: {all_names}", 7, right - left - 0.1),
+        f"not labelled: {len(names)}",
+    ]
+    for text in texts:
+        width, height = pen.measure(text, 7)
+        spots = [
+            Spot(x=x + 0.5 * width, y=floor + 0.04, angle=0.0)
+            for x in np.arange(left, right - width - 0.1 + 1e-6, 0.1).tolist()
+        ]
+        page = (left - 0.1, floor - 0.1, right + 0.1, floor + 0.3)
+        if spot := room.place(spots, width, height, page):
+            pen.write(spot.x, spot.y, text, 7, color=GREY, ha="center")
+            return
 
 
 def _pages(cell: Cell, shown: Sequence[DrawnView], top: float) -> list[tuple[float, float, float, float]]:
