@@ -11,6 +11,7 @@ from warpflat.batch.index import BatchIndex
 from warpflat.batch.plan import Task
 from warpflat.batch.task import Row, forget_starts, read_row, run_task
 from warpflat.core.atomic_files import atomic_path, prepare_folder
+from warpflat.core.optional_files import optional_file
 
 __all__ = ["run_batch"]
 
@@ -80,8 +81,10 @@ def _write_bodies(index: BatchIndex, out: Path) -> None:
 
     with atomic_path(out / "bodies.csv") as temporary:
         temporary.write_text(bodies_table(patterns), encoding="utf-8", newline="")
-    write_body_picture(out / "bodies.png", patterns)
-    index.write(bodies=True)
+    drawn = list[str]()
+    with optional_file(out / "bodies.png", drawn) as path:
+        write_body_picture(path, patterns)
+    index.write(bodies=bool(drawn))
 
 
 def _results(

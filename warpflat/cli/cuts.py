@@ -100,6 +100,7 @@ def _compare(
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.json_file import write_json
+    from warpflat.core.optional_files import optional_file
     from warpflat.core.toml_file import tables_as_toml
     from warpflat.cutting.ledger_picture import write_ledger_picture
     from warpflat.scene.cuts import cuts_of_entry
@@ -122,7 +123,8 @@ def _compare(
             return own, folder, result
         ledger = scene_ledger(loaded, by=by, device=device)
         write_json(folder / "ledger.json", ledger.as_dict())
-        write_ledger_picture(folder / "ledger.png", ledger)
+        with optional_file(folder / "ledger.png", []) as path:
+            write_ledger_picture(path, ledger)
         if apply is not None:
             result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=cuts_of_entry(ledger, apply))
         return ledger, folder, result
@@ -135,7 +137,8 @@ def _print_ledger(ledger: Ledger | FormLedger, folder: Path) -> None:
     for note in ledger.notes:
         click.echo(f"warpflat: note: {note}", err=True)
     if isinstance(ledger, Ledger):
-        click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
+        drawn = ", ledger.png" if (folder / "ledger.png").exists() else ""
+        click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json{drawn}")
     else:
         click.echo(f"{form_ledger_table(ledger)}\n{folder}: ledger.json, cuts.toml")
 

@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+from warpflat.core.optional_files import SIGNALS
+
 __all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "signal_message", "stop_on_signals"]
 
 HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
@@ -65,7 +67,8 @@ def stop_on_signals() -> Iterator[None]:
     """
     before = {number: signal.getsignal(number) for number in _ours()}
     imports = _imports(sys._getframe())
-    came, waiting = list[int](), list[Any]()
+    came, waiting = SIGNALS, list[Any]()
+    came.clear()
 
     def stop(number: int, frame: FrameType | None) -> None:
         if _imports(frame) > imports:

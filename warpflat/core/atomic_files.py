@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
-from warpflat.core.errors import InputError, expect
+from warpflat.core.errors import CannotWriteError, InputError, expect
 from warpflat.core.file_names import check_file_name
 from warpflat.core.hidden_files import ASIDE, FRESH, NEW, clear_hidden, hidden_name, is_unfinished, remove_unfinished
 from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_replace
@@ -30,7 +30,9 @@ __all__ = [
     "files_written",
     "hidden_file",
     "is_input",
+    "keep_note",
     "latest_file",
+    "notes_kept",
     "output_folder",
     "prepare_folder",
     "remove_file",
@@ -71,7 +73,7 @@ def require_writable(final: str | os.PathLike[str]) -> None:
     run = _run_into(final.parent)
     try:
         if final.is_dir():
-            raise InputError(f"cannot write {final}: it is a folder; give the name of a file")
+            raise CannotWriteError(f"cannot write {final}: it is a folder; give the name of a file")
         if run is not None:
             run.refuse_inputs([final.name])
             return
@@ -123,6 +125,7 @@ class _Run:
         new: the folder in it for what is written.
         names: of the files written, in that order.
         removed: names of files of earlier runs that go with the change.
+        notes: on files that were left out, each once.
     """
 
     def __init__(self, folder: Path, hidden: Path) -> None:
@@ -131,6 +134,7 @@ class _Run:
         self.new = hidden / NEW
         self.names: dict[str, None] = {}
         self.removed: dict[str, None] = {}
+        self.notes: dict[str, None] = {}
         self._expected: set[str] = set()
         self._sources: set[Path] = set()
 
@@ -292,6 +296,18 @@ def adopt_files(files: Iterable[tuple[str, str]]) -> None:
             run.names[name] = None
 
 
+def keep_note(path: Path, note: str) -> None:
+    """Keep a note on a file that the run into its folder has left out, if there is such a run."""
+    if run := _run_into(path.parent):
+        run.notes[note] = None
+
+
+def notes_kept(folder: Path) -> tuple[str, ...]:
+    """Return the notes on files that the run into a folder has left out."""
+    run = _run_into(folder)
+    return () if run is None else tuple(run.notes)
+
+
 def is_input(path: Path) -> bool:
     """Return whether a file was read by the run that is writing into its folder."""
     run = _run_into(path.parent)
@@ -351,7 +367,9 @@ def _reason(error: OSError) -> str:
 
 def _cannot_write(final: Path, error: OSError) -> InputError:
     if is_open_elsewhere(error):
-        return InputError(
+        return CannotWriteError(
             f"cannot write {final}: it is open in another program or write-protected; close it, and run again"
         )
-    return InputError(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")
+    # Libraries raise errors of this kind for faults of their own, too; those of the system have a number.
+    kind = InputError if error.errno is None else CannotWriteError
+    return kind(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.atomic_files import is_input, latest_file, remove_file
+from warpflat.core.atomic_files import is_input, latest_file, notes_kept, remove_file
 from warpflat.core.errors import InputError
 from warpflat.core.json_file import write_json
 
@@ -28,13 +28,13 @@ _NAMELESS = (
 
 
 def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
-    """Write `metrics.json` and keep the manifest of the one before.
+    """Write `metrics.json` with notes on files that were left out, and keep the manifest of the one before.
 
     Raises:
         InputError: it cannot be written.
     """
     record = _record(_read(folder))
-    write_json(folder / "metrics.json", {**metrics, **({"files": record} if record else {})})
+    write_json(folder / "metrics.json", {**_noted(folder, metrics), **({"files": record} if record else {})})
 
 
 def remove_stale(
@@ -53,7 +53,7 @@ def remove_stale(
         files: that it has written, by name.
 
     Returns:
-        What `metrics.json` holds, and what was removed or left, one sentence each.
+        What `metrics.json` holds, and what was left out, removed or left, one sentence each.
 
     Raises:
         InputError: `metrics.json` cannot be written.
@@ -77,9 +77,15 @@ def remove_stale(
             del earlier[run][file]
     if removed:
         notes.insert(0, f"removed what an earlier run had left and this one did not make: {', '.join(removed)}")
-    complete = {**metrics, "files": {run: known for run, known in earlier.items() if known}}
+    complete = {**_noted(folder, metrics), "files": {run: known for run, known in earlier.items() if known}}
     write_json(folder / "metrics.json", complete)
-    return complete, tuple(notes)
+    return complete, (*notes_kept(folder), *notes)
+
+
+def _noted(folder: Path, metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """Return metrics with the notes on files that were left out."""
+    notes = list(notes_kept(folder))
+    return {**metrics, **({"notes": notes} if notes else {})}
 
 
 def record_file(folder: Path, name: str, file: str) -> None:

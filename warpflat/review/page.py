@@ -125,7 +125,11 @@ def _page(
     film, packed = "", None
     if "frames.usdc" in files:
         packed = packed_film()
-        film = _film_section(packed) if packed else "<p>The film is too large for a page; see frames.usdc.</p>"
+        film = (
+            _film_section(packed)
+            if packed
+            else "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
+        )
     notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
     sections = [
         ("", summary_cards(metrics)),

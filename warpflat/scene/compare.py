@@ -122,6 +122,7 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
     """
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.json_file import write_json
+    from warpflat.core.optional_files import optional_file
     from warpflat.draping.compare_picture import write_compared_drapes
     from warpflat.scene.compare_picture import write_overlay_picture, write_overlay_svg
 
@@ -129,12 +130,15 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
         file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources
     ]
     with output_folder(folder, COMPARED_FILES, sources=sources) as to:
+        files = ["compare.json", "compare.svg"]
         write_overlay_svg(to / "compare.svg", comparison)
-        write_overlay_picture(to / "compare.png", comparison)
+        with optional_file(to / "compare.png", files) as path:
+            write_overlay_picture(path, comparison)
         if comparison.drapes:
-            write_compared_drapes(to / "compare-drape.png", comparison.drapes)
+            with optional_file(to / "compare-drape.png", files) as path:
+                write_compared_drapes(path, comparison.drapes)
         write_json(to / "compare.json", comparison.as_dict())
-    return list(COMPARED_FILES if comparison.drapes else COMPARED_FILES[:3])
+    return [file for file in COMPARED_FILES if file in files]
 
 
 def comparison_table(comparison: Comparison) -> str:

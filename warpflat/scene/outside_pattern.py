@@ -294,7 +294,7 @@ def drape_outside(
             draped, more = drape_pattern(
                 pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
             )
-        files = [*write_drape_files(draped, folder, frames=True), "frames.usdc", "metrics.json"]
+        files = [*write_drape_files(draped, folder, frames=True), "metrics.json"]
         body = {} if job.body is None else {"mannequin": job.body.metrics()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": draped.measures()})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files)

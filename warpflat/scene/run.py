@@ -124,9 +124,8 @@ def _run_surface(
     _check_edges(scene, sequences, drawing)
     surfaces = [sequence.surface for sequence in sequences]
     notes = [note for sequence in sequences for note in sequence.notes]
-    wanted = FrameSchedule(settings.output).wanted
     vertices = sum(len(surface.vertices) for surface in surfaces)
-    require_memory_for_run(vertices, frames=wanted)
+    require_memory_for_run(vertices, frames=FrameSchedule(settings.output).wanted)
     with ExitStack() as beside:
         with Film(folder, settings.output, surfaces) as film:
 
@@ -162,8 +161,7 @@ def _run_surface(
             pattern=pattern,
             fit=fit,
             more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
-            files=drape_files,
-            frames=wanted,
+            files=dict.fromkeys([*drape_files, *film.files]),
             notes=notes,
         )
 
