@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import logging
+import os
 import re
 import secrets
 import socket
@@ -25,7 +26,7 @@ from warpflat.core.text import quote_value
 __all__ = ["Door"]
 
 # What a browser names in Host, and in Origin after "http://": a name or an address, and the port unless that is 80.
-_AUTHORITY = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([\w.-]+))(?::(\d{1,5}))?", re.ASCII)
+_AUTHORITY = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([\w.-]+))(?::([1-9]\d{0,4}))?", re.ASCII)
 # The page's messages take some hundred bytes.
 _LONGEST_MESSAGE = 2**16
 # How a connection ends whose client does not keep to the protocol: wrong frames, no UTF-8, too long.
@@ -61,7 +62,8 @@ class Door:
             family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
             self._socket = socket.create_server(address, family=family)
         except (OSError, ValueError) as error:
-            reason = ((error.strerror if isinstance(error, OSError) else "") or str(error)).lower()
+            # What Python adds to the words of the system names the address once more.
+            reason = (os.strerror(error.errno) if (getattr(error, "errno", None) or 0) > 0 else str(getattr(error, "strerror", error))).lower()
             raise InputError(f"cannot serve on {host}:{port}: {reason}; give another --port, or --host") from None
         self._port: int = self._socket.getsockname()[1]
         bound = ip_address(self._socket.getsockname()[0].partition("%")[0])
