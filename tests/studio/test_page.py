@@ -15,7 +15,6 @@ import pytest
 from PIL import Image
 
 from warpflat.cli.main import main
-from warpflat.core.errors import InputError
 from warpflat.scene.load import load_scene, make_scene
 
 viser = pytest.importorskip("viser", reason="the extra `studio` (viser) is not installed")

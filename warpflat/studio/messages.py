@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -23,7 +24,8 @@ from warpflat.core.text import quote_value
 __all__ = ["read_message"]
 
 # No number that a page says is larger, and none is nan.
-_Number = Annotated[float, Meta(ge=-1e9, le=1e9)]
+_MOST = 1e6
+_Number = Annotated[float, Meta(ge=-_MOST, le=_MOST)]
 _Vector = tuple[_Number, _Number, _Number]
 _Pixels = Annotated[int, Meta(ge=1, le=100_000)]
 _Word = Annotated[str, Meta(max_length=100)]
@@ -76,8 +78,8 @@ def read_message(message: str | bytes, parts: Mapping[str, Any]) -> bytes:
         said = _DECODER.decode(message.encode() if isinstance(message, str) else message)
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise InputError(str(error)) from None
-    if isinstance(said, _Camera) and sum(x * x for x in said.wxyz) < 1e-6:
-        raise InputError("the camera has no direction: its quaternion is 0")
+    if isinstance(said, _Camera) and min(math.hypot(*said.wxyz), math.dist(said.position, said.look_at)) < 1e-6:
+        raise InputError("the camera looks nowhere")
     if isinstance(said, _Change):
         part = parts.get(said.uuid)
         if part is None:
@@ -110,5 +112,5 @@ def _is_between(value: object, low: float | None, high: float | None) -> bool:
     return (
         isinstance(value, int | float)
         and not isinstance(value, bool)
-        and (-1e9 if low is None else low) <= value <= (1e9 if high is None else high)
+        and (-_MOST if low is None else low) <= value <= (_MOST if high is None else high)
     )

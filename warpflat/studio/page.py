@@ -262,7 +262,9 @@ class Page:
 
     def _try_part(self, part: tuple[float, float]) -> None:
         picked, solution = self._picked, self.session.solution
-        if picked is not None and solution is not None:
+        if picked is None or solution is None:
+            self.session.tell("pick a line first; the part is one of a line")
+        else:
             self._try(lambda: cut_along(solution, *picked, part))
 
     def _try(self, table: Callable[[], dict[str, Any]]) -> None:
