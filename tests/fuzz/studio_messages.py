@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from concurrent.futures import Future
+from contextlib import suppress
 from ipaddress import ip_address
 from pathlib import Path
 from random import Random
@@ -53,7 +54,8 @@ HOSTS = ("evil.com:@port@", "evil.com", "127.0.0.1", "127.0.0.1:1", "localhost.e
          "evil.com@127.0.0.1:@port@", "LOCALHOST:@port@", "localhost.:@port@", "0:@port@", "2130706433:@port@", "[::1]:@port@",
          "[::ffff:127.0.0.1]:@port@", "", "evil.com:@port@\r\nHost: 127.0.0.1:@port@", "[::1", "127.0.0.1:@port@/", "\xff")  # fmt: skip
 ORIGINS = ("http://evil.com:@port@", "https://127.0.0.1:@port@", "null", "", "file://", "http://127.0.0.1:@port@.evil.com",
-           "http://127.0.0.1:9999", "http://localhost:@port@, http://evil.com", "chrome-extension://a", "http://[", "127.0.0.1:@port@")  # fmt: skip
+           "http://127.0.0.1:9999", "http://localhost:@port@, http://evil.com",
+           "chrome-extension://a", "http://[", "127.0.0.1:@port@")  # fmt: skip
 UPGRADE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
 SCENE = {
     "surface": {"shape": "dome", "resolution": 5},
@@ -120,7 +122,8 @@ def run_attack(file: Path) -> int:
     """
     global _studio
     if _studio is None:
-        _studio = Studio(Path(tempfile.mkdtemp(prefix="warpflat-studio-")))
+        # Beside the folders of the case, which is removed with the process.
+        _studio = Studio(Path(tempfile.mkdtemp(prefix="studio-", dir=file.resolve().parents[2])))
     acts = json.loads(file.read_text(encoding="utf-8"))
     refused = 0
     for act in acts:
@@ -136,6 +139,7 @@ class Studio:
 
     Attributes:
         told: every line that the page was told, in order.
+        names: by which a request may call it.
     """
 
     def __init__(self, folder: Path, host: str = "127.0.0.1") -> None:
@@ -166,6 +170,7 @@ class Studio:
             return self._acts[-1]
 
         self.page.server._thread_executor.submit = listed
+        self.names = {"localhost", "127.0.0.1", "::1"}
         self.host, self.port = host, self.page.server.get_port()
         self.token = self.page.url.rstrip("/").rpartition("/")[2]
         self._wait(lambda: self.page.is_idle and self.page.session.solution is not None)
@@ -334,10 +339,9 @@ class Studio:
         name, _, port = authority.rpartition(":")
         if port != str(self.port):
             return False
-        try:
-            return str(ip_address(name.strip("[]"))) in ("127.0.0.1", "::1")
-        except ValueError:
-            return name.lower() == "localhost"
+        with suppress(ValueError):
+            name = str(ip_address(name.strip("[]")))
+        return name.lower() in self.names
 
 
 _studio: Studio | None = None

@@ -60,6 +60,9 @@ def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
         with chromium(str(BROWSER), tmp_path / "profile", 900, 600) as browser:
             browser.send("Page.navigate", url=page.url)
             browser.wait(f"{head}?.includes('at rest') && {head}")
+            browser.run("document.body.innerText = 'before'")
+            browser.send("Page.reload")
+            browser.wait(f"{head}?.includes('at rest') && {head}")
             whole = page.session.solution
             assert whole is not None
             client = wait_for(lambda: next(iter(page.server.get_clients().values()), None))

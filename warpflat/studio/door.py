@@ -62,12 +62,9 @@ class Door:
             family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
             self._socket = socket.create_server(address, family=family)
         except (OSError, ValueError) as error:
-            # What Python adds to the words of the system names the address once more.
-            reason = (
-                os.strerror(error.errno)
-                if (getattr(error, "errno", None) or 0) > 0
-                else str(getattr(error, "strerror", error))
-            ).lower()
+            # What Python adds to the system's words names the address once more.
+            number = error.errno or 0 if isinstance(error, OSError) else 0
+            reason = (os.strerror(number) if number > 0 else getattr(error, "strerror", str(error))).lower()
             raise InputError(f"cannot serve on {host}:{port}: {reason}; give another --port, or --host") from None
         self._port: int = self._socket.getsockname()[1]
         bound = ip_address(self._socket.getsockname()[0].partition("%")[0])
@@ -157,10 +154,10 @@ class Door:
             return connection.respond(HTTPStatus.FORBIDDEN, "this is not a name of the studio\n")
         if any(not origin.startswith("http://") or not self._is_own(origin[7:], names) for origin in origins):
             return connection.respond(HTTPStatus.FORBIDDEN, "the studio talks to its own page only\n")
-        token, _, path = request.path.partition("?")[0][1:].partition("/")
-        if not hmac.compare_digest(token.encode("utf-8", "surrogateescape"), self._token.encode()):
+        root, token, path = (request.path.partition("?")[0] + "//").split("/", 2)
+        if root or not hmac.compare_digest(token.encode("utf-8", "surrogateescape"), self._token.encode()):
             return connection.respond(HTTPStatus.FORBIDDEN, "open the address that warpflat studio has printed\n")
-        request.path = f"/{path}"
+        request.path = f"/{path.rstrip('/')}"
         asked = request.headers.get_all("Sec-WebSocket-Protocol")
         if "Upgrade" in request.headers and asked != [f"viser-v{viser.__version__}"]:
             return connection.respond(HTTPStatus.BAD_REQUEST, f"the page speaks viser-v{viser.__version__}\n")
