@@ -62,6 +62,7 @@ def _save(case: Case, number: int) -> Path:
         "metrics": "metrics.json",
         "scan": "scan.obj",
         "arguments": "arguments.json",
+        "studio": "studio.json",
     }.get(case.kind, f"{case.kind}.toml" if name.endswith(".toml") else case.kind)
     file = FOUND / f"{number}.{ending}"
     file.write_bytes(content)

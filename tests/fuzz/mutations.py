@@ -10,12 +10,13 @@ import json
 import re
 import struct
 import sys
+from importlib.util import find_spec
 from random import Random
 from typing import Any
 
 import click
 
-from . import seeds
+from . import seeds, studio_messages
 from .promise import Case
 
 if sys.version_info >= (3, 11):
@@ -284,6 +285,8 @@ def odd_arguments(random: Random) -> list[str]:
 
 def random_case(kind: str, random: Random) -> Case:
     """A damaged seed of a kind, and the command that reads it."""
+    if kind == "studio":
+        return studio_messages.random_attack(random)
     if kind == "arguments":
         content = json.dumps(odd_arguments(random)).encode()
     elif kind == "scene":
@@ -310,3 +313,5 @@ SHARES = {
     "metrics": 4, "scan": 1, "arguments": 12,
 }  # fmt: skip
 """How many of a hundred cases, or so, are of which kind: few where one takes seconds."""
+if find_spec("viser") is not None:  # the extra `studio`
+    SHARES["studio"] = 10
