@@ -26,7 +26,7 @@ from warpflat.surface.repair.polygons import (
     distinct_corners,
     list_some,
     pad_polygons,
-    split_non_convex_quads,
+    split_quads,
     split_polygons,
 )
 from warpflat.surface.repair.slivers import merge_degenerate_faces
@@ -411,11 +411,9 @@ def _check_border(he: HalfEdges) -> None:
 
 def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: FloatArray, tolerance: float) -> Surface:
     """Merge slivers, drop the vertices that this leaves over, and put the surface together."""
-    mesh.faces, mesh.origin, cut = split_non_convex_quads(mesh.vertices, mesh.faces, mesh.origin, tolerance)
-    if len(cut):
-        mesh.notes.append(
-            f"{format_count(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
-        )
+    mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, tolerance)
+    for what, which in cut.items():
+        mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")
     before = len(mesh.vertices)
     faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.half_edges, lines, tolerance)
     if len(left):
