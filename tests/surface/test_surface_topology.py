@@ -161,7 +161,7 @@ def test_diagonals_may_be_kept_apart_from_each_other_and_from_sides():
     chain = np.array([[0, 1, 2, 3], [0, 2, 7, -1], [1, 4, 3, 5], [4, 6, 5, 8]])
     for faces in (doublet, fan, chain):
         for turn in (False, True):
-            triangles, of = triangulate(faces, other_diagonal=turn, distinct=True)
+            triangles, _ = triangulate(faces, other_diagonal=turn, distinct=True)
             plain, _ = triangulate(faces, other_diagonal=turn)
             assert len(triangles) == len(plain)
             edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)

@@ -19,8 +19,8 @@ __all__ = [
     "list_some",
     "pad_corners",
     "pad_polygons",
-    "split_quads",
     "split_polygons",
+    "split_quads",
 ]
 
 # Entries of the table of faces, faces times the largest count of corners: a gigabyte.
@@ -222,7 +222,7 @@ def split_quads(
 
 
 def _flatter_diagonals(p: FloatArray, tolerance: float) -> IndexArray:
-    """Return #Q, the diagonal (0 for corners 0-2, 1 for 1-3) at which the halves of a quad lie flatter, and have an area.
+    """Return #Q, the diagonal (0 for corners 0-2, 1 for 1-3) at which the halves of a quad lie flatter; of two alike the shorter.
 
     Args:
         p: #Q by 4 by 3, their corners [m].
@@ -236,7 +236,10 @@ def _flatter_diagonals(p: FloatArray, tolerance: float) -> IndexArray:
     bent = np.stack([np.einsum("qi,qi->q", unit[:, k], unit[:, k + 2]) for k in (1, 0)], axis=1)
     thin = np.stack([np.minimum(size[:, k], size[:, k + 2]) for k in (1, 0)], axis=1)
     mean = np.linalg.norm(side, axis=2).mean(axis=1, keepdims=True)
-    return np.asarray(np.argmax(np.where(thin > tolerance * mean**2, bent, -2.0), axis=1))
+    flatness = np.where(thin > tolerance * mean**2, bent.round(6), -2.0)
+    first, second = (np.linalg.norm(p[:, k + 2] - p[:, k], axis=1) for k in (0, 1))
+    better, equal = flatness[:, 1] > flatness[:, 0], flatness[:, 1] == flatness[:, 0]
+    return (better | (equal & (second < first))).astype(np.intp)
 
 
 def find_crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:

@@ -26,8 +26,8 @@ from warpflat.surface.repair.polygons import (
     distinct_corners,
     list_some,
     pad_polygons,
-    split_quads,
     split_polygons,
+    split_quads,
 )
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
