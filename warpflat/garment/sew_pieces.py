@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -83,12 +83,16 @@ def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:
     return [replace(surface, lines=named[surface.name]) for surface in surfaces]
 
 
-def meeting_borders(surfaces: Mapping[str, Surface]) -> list[SeamPair]:
+def meeting_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple[int, int]] = ()) -> list[SeamPair]:
     """Return the stretches of border that lie at one place in space, edge by edge: seams between pieces, and darts.
 
     Three borders that meet along one edge are no seam there.
+
+    Args:
+        surfaces: by name.
+        without: edges that are left out, by their vertices, the lower first.
     """
-    edges = _BorderEdges(surfaces)
+    edges = _BorderEdges(surfaces, without)
     pairs: list[SeamPair] = []
     taken: set[str] = set()
     for first, second in edges.stretches():
@@ -107,7 +111,7 @@ def meeting_borders(surfaces: Mapping[str, Surface]) -> list[SeamPair]:
 class _BorderEdges:
     """The border edges of several surfaces, along their loops, each with the one that lies at its place."""
 
-    def __init__(self, surfaces: Mapping[str, Surface]) -> None:
+    def __init__(self, surfaces: Mapping[str, Surface], without: Collection[tuple[int, int]]) -> None:
         from scipy.spatial import cKDTree
 
         self.names, self.tail, self.head = list[str](), list[int](), list[int]()
@@ -127,7 +131,8 @@ class _BorderEdges:
         self._ends = [(place[edge], place[self.next[edge]]) for edge in range(len(self.tail))]
         here: dict[tuple[int, ...], list[int]] = {}
         for edge, ends in enumerate(self._ends):
-            if ends[0] != ends[1]:
+            own = sorted((self.tail[edge], self.head[edge]))
+            if ends[0] != ends[1] and (own[0], own[1]) not in without:
                 here.setdefault(tuple(sorted(ends)), []).append(edge)
         self._partner = {a: b for both in here.values() if len(both) == 2 for a, b in (both, both[::-1])}
 

@@ -21,6 +21,7 @@ from warpflat.core.text import format_count
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.mesh_lines import checked_line, renumber_lines
 from warpflat.surface.repair.polygons import (
     distinct_corners,
@@ -167,6 +168,7 @@ def _checked_surface(
     paths = {key: checked_line(key, line, len(positions)) for key, line in lines.items()}
     place = _weld(mesh, weld, split_corners, component is not None)
     _drop_double_faces(mesh)
+    _drop_double_layers(mesh)
     _choose_component(mesh, component)
     _refuse_crowded_edges(mesh)
     faces, turned = orient(mesh.half_edges)
@@ -294,6 +296,25 @@ def _drop_double_faces(mesh: _Mesh) -> None:
         f"{format_count(len(doubled), 'face')} dropped that had the vertices of another: {list_some(doubled)}"
     )
     mesh.keep(keep)
+
+
+def _drop_double_layers(mesh: _Mesh) -> None:
+    """Drop parts that lie on another part everywhere, with vertices of their own."""
+    count = int(mesh.part.max()) + 1
+    if count == 1:
+        return
+    layers = []
+    for number in range(count):
+        faces = mesh.faces[mesh.part == number]
+        used, place = np.unique(faces, return_inverse=True)
+        rows = place.reshape(faces.shape).astype(np.int32) - (used[0] < 0)
+        layers.append(Layer(mesh.vertices[used[used >= 0]], rows))
+    doubled = list(doubled_layers(layers))
+    if doubled:
+        mesh.notes += [
+            f"{layers[number].describe()} dropped: a second layer that lies on another part" for number in doubled
+        ]
+        mesh.keep(~np.isin(mesh.part, doubled))
 
 
 def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -> None:
