@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
-
-import numpy as np
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
@@ -119,11 +118,12 @@ def sew_surface(
 
 
 def _opening(surface: Surface, pair: SeamPair) -> str | None:
-    """Return the name of the opening that a stretch of border belongs to, without ".left" and ".right"."""
-    for side in pair.vertices:
-        for name, line in surface.lines.items():
-            if np.isin(side, line).all() and name.endswith((".left", ".right")):
-                return name.removesuffix(".left").removesuffix(".right")
+    """Return the name of the line along which a stretch of border was cut open."""
+    first = {frozenset(side[:2].tolist()) for side in pair.vertices}
+    for name, line in surface.lines.items():
+        side = re.fullmatch(r"(.+)\.(left|right)(\.\d+)?'*", name)
+        if side is not None and not first.isdisjoint(map(frozenset, pairwise(line.tolist()))):
+            return side[1]
     return None
 
 
