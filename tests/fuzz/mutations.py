@@ -17,6 +17,7 @@ from typing import Any
 import click
 
 from . import seeds, studio_messages
+from .geometry import GEOMETRY_SHARES, geometry_case
 from .promise import Case
 
 if sys.version_info >= (3, 11):
@@ -287,6 +288,8 @@ def random_case(kind: str, random: Random) -> Case:
     """A damaged seed of a kind, and the command that reads it."""
     if kind == "studio":
         return studio_messages.random_attack(random)
+    if kind in GEOMETRY_SHARES:
+        return geometry_case(kind, random)
     if kind == "arguments":
         content = json.dumps(odd_arguments(random)).encode()
     elif kind == "scene":
@@ -310,7 +313,7 @@ def random_case(kind: str, random: Random) -> Case:
 
 SHARES = {
     "obj": 9, "ply": 10, "stl": 6, "off": 7, "glb": 6, "gltf": 6, "usda": 6, "usdc": 7, "usdz": 3, "scene": 12, "fabric": 9, "pattern": 11,
-    "metrics": 4, "scan": 1, "arguments": 12,
+    "metrics": 4, "scan": 1, "arguments": 12, **GEOMETRY_SHARES,
 }  # fmt: skip
 """How many of a hundred cases, or so, are of which kind: few where one takes seconds."""
 if find_spec("viser") is not None:  # the extra `studio`

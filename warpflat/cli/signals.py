@@ -15,7 +15,16 @@ from typing import Any
 
 from warpflat.core.optional_files import SIGNALS
 
-__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "signal_message", "stop_on_signals"]
+__all__ = [
+    "HUNG_UP",
+    "INTERRUPTED",
+    "TERMINATED",
+    "Stopped",
+    "end_at_once",
+    "ignore_at_exit",
+    "signal_message",
+    "stop_on_signals",
+]
 
 HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
 _WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
@@ -57,6 +66,17 @@ def end_at_once(code: int | None = None) -> None:
 
     for number in _ours():
         signal.signal(number, end)
+
+
+def ignore_at_exit() -> None:
+    """Let the very end of the process, after all exit functions, pass over signals: Python then gives them back their default action."""
+    import atexit
+
+    def ignore() -> None:
+        for number in _ours():
+            signal.signal(number, signal.SIG_IGN)
+
+    atexit.register(ignore)
 
 
 @contextmanager

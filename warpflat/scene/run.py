@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
     from warpflat.scene.frames import Film, FrameRecorder
     from warpflat.scene.schema import SceneTable
+    from warpflat.surface.border_seams import NamedSeam
 
 # From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
 _MANY = 500_000
@@ -144,6 +146,7 @@ def _run_surface(
                 whole = pieces
                 if sewn is None and len(pieces) > 1:
                     notes.append("no borders meet in space, vertex by vertex: the pieces are not sewn to each other")
+            notes = [*_unsewn(whole, seams), *notes]
             notes += [message for piece in whole for message in piece.messages]
             fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
             pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
@@ -293,6 +296,18 @@ def _flatten_pieces(
     for piece in sewn.pieces:
         film.recorders[piece.surface.name].record_result(piece)
     return sewn.pieces, sewn
+
+
+def _unsewn(pieces: Sequence[Flattening], seams: Sequence[NamedSeam]) -> list[str]:
+    """Return notes on borders that run along each other and are not sewn; at most three, and how many more there are."""
+    from warpflat.garment.sew_pieces import unsewn_borders
+
+    surfaces = {piece.surface.name: piece.network.surface for piece in pieces}
+    named = [surface.lines[side] for surface in surfaces.values() for seam in seams for side in seam.sides]
+    without = {(min(edge), max(edge)) for line in named for edge in pairwise(line.tolist())}
+    found = unsewn_borders(surfaces, without=without)
+    more = [f"{len(found) - 3} more stretches of border run along others and are not sewn"] if len(found) > 3 else []
+    return [*found[:3], *more]
 
 
 def _check_edges(scene: Scene, sequences: Sequence[CutSequence], drawing: PatternOptions) -> None:
