@@ -41,17 +41,18 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
     Raises:
         InputError: if a file cannot be written, or the body was read from one that would be replaced.
     """
-    with output_folder(folder, MANNEQUIN_FILES.values(), sources=mannequin.sources) as place:
+    names = {kind: name for kind, name in MANNEQUIN_FILES.items() if mannequin.scan is not None or kind != "distances"}
+    with output_folder(folder, names.values(), sources=mannequin.sources, guard=True) as place:
         require_own_metrics(place)
-        files = {kind: place / name for kind, name in MANNEQUIN_FILES.items()}
-        if mannequin.scan is None:
-            del files["distances"]
+        files = {kind: place / name for kind, name in names.items()}
         write_mannequin_usd(mannequin, files["usd"])
         write_mannequin_obj(mannequin, files["obj"])
         write_mannequin_picture(mannequin, files["picture"])
         if mannequin.scan is not None:
             write_distance_picture(mannequin, files["distances"])
-        write_metrics(place, {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
+        written = [path.name for path in files.values()]
+        metrics = {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()}
+        write_metrics(place, metrics, name="mannequin", files=written)
     return files
 
 

@@ -48,7 +48,8 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
         raise InputError(f"{folder}: has no frames.usdc of this run; run the scene with frames above 0")
     pieces = open_film(folder / "frames.usdc")
     written = []
-    with output_folder(folder, [file for file, asked in (("film.webp", film), ("contact_sheet.png", sheet)) if asked]):
+    names = [file for file, asked in (("film.webp", film), ("contact_sheet.png", sheet)) if asked]
+    with output_folder(folder, names, guard=True):
         if film:
             images = _images(pieces, _evenly(pieces[0].times, _FRAMES), _LONG_SIDE)
             _save(folder / "film.webp", images, loop=0, duration=_durations(pieces[0].times, len(images)), quality=80)

@@ -61,7 +61,7 @@ def review_folder(folder: str | Path) -> Path:
 
     folder = Path(folder)
     metrics, files, name = read_run(folder)
-    with output_folder(folder, ["review.html"]):
+    with output_folder(folder, ["review.html"], guard=True):
         write_review(folder, metrics, files, name=name)
         record_file(folder, name, "review.html")
     return folder / "review.html"

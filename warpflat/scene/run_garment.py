@@ -335,7 +335,8 @@ def _finish(
         measured["mannequin"] = {**measured["mannequin"], "table": settings.mannequin.model_dump(exclude_defaults=True)}
     files += written.files
     files += [*review_files(scene, measured, out, tuple(files), film, images)]
-    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
+    drape = settings.drape is not None
+    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files, drape=drape)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *written.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
