@@ -284,6 +284,10 @@ def odd_arguments(random: Random) -> list[str]:
 
 def random_case(kind: str, random: Random) -> Case:
     """A damaged seed of a kind, and the command that reads it."""
+    if kind in ("batch", "result", "folder"):
+        from .folders import random_folder
+
+        return random_folder(kind, random)
     if kind == "arguments":
         content = json.dumps(odd_arguments(random)).encode()
     elif kind == "scene":
@@ -307,6 +311,6 @@ def random_case(kind: str, random: Random) -> Case:
 
 SHARES = {
     "obj": 9, "ply": 10, "stl": 6, "off": 7, "glb": 6, "gltf": 6, "usda": 6, "usdc": 7, "usdz": 3, "scene": 12, "fabric": 9, "pattern": 11,
-    "metrics": 4, "scan": 1, "arguments": 12,
+    "metrics": 4, "scan": 1, "arguments": 12, "batch": 6, "result": 4, "folder": 6,
 }  # fmt: skip
 """How many of a hundred cases, or so, are of which kind: few where one takes seconds."""

@@ -15,7 +15,7 @@ from typing import Any
 from warpflat.core.atomic_files import is_input, latest_file, note_amended, remove_file
 from warpflat.core.errors import InputError
 from warpflat.core.json_file import plain_json, write_json
-from warpflat.core.own_files import file_digest, has_seal, read_result, recorded_files, seal_of
+from warpflat.core.own_files import NotOursError, file_digest, has_seal, read_result, recorded_files, seal_of
 
 __all__ = ["record_file", "remove_stale", "require_own_metrics", "write_metrics", "write_report", "write_sealed"]
 
@@ -178,7 +178,7 @@ def _read(folder: Path) -> dict[str, Any]:
     except InputError:
         data = None
     if not isinstance(data, dict) or "warpflat" not in data:
-        raise InputError(
+        raise NotOursError(
             f"{file}: is not of warpflat, and a run would replace it; move it away, or choose another folder"
         )
     return data
