@@ -104,8 +104,8 @@ def _run(task: Task, out: Path) -> Row:
             run_scene(task.make_scene(), folder)
             own = {"scene": task.data, "seconds": time.perf_counter() - begin, "memory_mb": _peak_memory()}
             write_sealed(folder / "task.json", {**_names(task), **own})
-    except NotOursError:
-        raise
+    except NotOursError as error:
+        raise NotOursError(f"{error}; the task is tried again once all of {folder} is moved away") from error
     except InputError as error:
         _write_error(task, out, ERROR, str(error))
     except Exception as error:  # a fault of the program in one task does not end the others
@@ -185,6 +185,8 @@ def error_file(task: Task, out: Path) -> Path:
 def read_row(task: Task, out: Path) -> Row | None:
     """Return the row of a task that is done, or None; a result that cannot be read counts as none."""
     folder = out / task.key
+    if folder.is_symlink():
+        return None
     with suppress(Exception):  # others may have changed it in any way
         metrics, own = read_result(folder / "metrics.json"), read_result(folder / "task.json")
         return _row_of_run(task, metrics, own, frozenset(os.listdir(folder)))

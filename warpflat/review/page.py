@@ -66,7 +66,7 @@ def reading_members(folder: Path) -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:
-        if is_out_of_memory(error) or isinstance(error, OSError):
+        if is_out_of_memory(error) or getattr(error, "errno", None) is not None:  # Pillow's own errors have no number
             raise
         words = f"{type(error).__name__} {error}".strip()
         raise InputError(f"{folder}: a file of the run is damaged ({words[:200]}); run the scene again") from error
