@@ -151,3 +151,38 @@ def test_a_link_in_the_way_stays(capfd: pytest.CaptureFixture[str]):
     os.symlink("../photo.png", "out/picture.png")
     assert "out/picture.png: is not of warpflat" in refused(COMMANDS["run"][0], capfd)
     assert os.path.islink("out/picture.png")
+
+
+GARMENT = """form = "skirt"
+[mannequin]
+size = "EU 38"
+resolution_mm = 40
+[wear]
+stretch_warp = 0.01
+[pattern]
+sizes = ["EU 38", "EU 40"]
+formats = ["dxf", "svg", "pdf", "json"]
+[output]
+frames = 4
+[cloth]
+width_mm = 1500
+[marker]
+seconds = 1
+"""
+
+
+def test_every_file_of_a_garment_is_known_to_the_next_run():
+    Path("skirt.toml").write_text(GARMENT)
+    for command in (
+        ("run", "skirt.toml", "--out", "out", "-q"),
+        ("cuts", "skirt.toml", "--apply", "1", "--out", "out", "-q"),
+    ):
+        for _ in range(2):
+            assert main(list(command)) in (0, 1)
+    listed = {
+        file
+        for report in ("metrics.json", "ledger.json")
+        for files in json.loads(Path("out", report).read_text())["files"].values()
+        for file in files
+    }
+    assert {path.name for path in Path("out").iterdir()} == {*listed, "metrics.json", "ledger.json"}
