@@ -164,9 +164,10 @@ sizes = ["EU 38", "EU 40"]
 formats = ["dxf", "svg", "pdf", "json"]
 [output]
 frames = 4
-[cloth]
-width_mm = 1500
+
+
 [marker]
+width = 1.5
 seconds = 1
 """
 
