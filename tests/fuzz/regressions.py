@@ -8,6 +8,7 @@ NAME.metrics.json                                                    in the fold
 NAME.scan.obj                                                        made a mannequin
 NAME.arguments.json                                                  a list of strings: the command line
 NAME.studio.json                                                     done to the studio, as studio_messages says
+NAME.folder.json                                                     files, links and command line (see `folders.py`)
 
 NAME says what the file has, such as `one_vertex_far_away`. A file must keep the promise, and may be refused or not;
 NAME.refused.obj must be refused, NAME.accepted.obj must not. `NAME.obj.gz` is unpacked first.
@@ -19,6 +20,7 @@ import gzip
 from importlib.util import find_spec
 from pathlib import Path
 
+from .folders import unpacked
 from .promise import Case
 from .seeds import MESHES, case_of_file
 from .studio_messages import attack_case
@@ -42,6 +44,8 @@ def cases_of(file: Path) -> list[Case]:
     content, name = file.read_bytes(), file.name
     if name.endswith(".gz"):
         content, name = gzip.decompress(content), name.removesuffix(".gz")
+    if name.endswith(".folder.json"):
+        return [unpacked(content)]
     kind = next((kind for ending, kind in _TWO_ENDINGS.items() if name.endswith(ending)), name.rpartition(".")[2])
     if kind not in (*MESHES, "usd", *_TWO_ENDINGS.values()):
         raise ValueError(f"{file}: the name tells no kind; see {__name__}")

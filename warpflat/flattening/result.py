@@ -261,10 +261,10 @@ class Flattening:
         from warpflat.core.manifest import require_own_metrics, write_metrics
 
         others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
-        with output_folder(folder, others, sources=self.surface.sources) as to:
+        with output_folder(folder, others, sources=self.surface.sources, guard=True) as to:
             require_own_metrics(to)
             files = write_files([self], to, picture=picture, frames=frames)
-            write_metrics(to, self.metrics())
+            write_metrics(to, self.metrics(), name=self.surface.name, files=files)
         return [*files, "metrics.json"]
 
     def write_obj(self, folder: Path) -> str:

@@ -42,11 +42,10 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
     Raises:
         InputError: if a file cannot be written, or the body was read from one that would be replaced.
     """
-    with output_folder(folder, MANNEQUIN_FILES.values(), sources=mannequin.sources) as place:
+    names = {kind: name for kind, name in MANNEQUIN_FILES.items() if mannequin.scan is not None or kind != "distances"}
+    with output_folder(folder, names.values(), sources=mannequin.sources, guard=True) as place:
         require_own_metrics(place)
-        files = {kind: place / name for kind, name in MANNEQUIN_FILES.items()}
-        if mannequin.scan is None:
-            del files["distances"]
+        files = {kind: place / name for kind, name in names.items()}
         write_mannequin_usd(mannequin, files["usd"])
         write_mannequin_obj(mannequin, files["obj"])
         drawn = list[str]()
@@ -55,8 +54,11 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
         if mannequin.scan is not None:
             with optional_file(files["distances"], drawn) as path:
                 write_distance_picture(mannequin, path)
-        write_metrics(place, {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
-    return {kind: path for kind, path in files.items() if path.suffix != ".png" or path.name in drawn}
+        files = {kind: path for kind, path in files.items() if path.suffix != ".png" or path.name in drawn}
+        written = [path.name for path in files.values()]
+        metrics = {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()}
+        write_metrics(place, metrics, name="mannequin", files=written)
+    return files
 
 
 def write_mannequin_obj(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:

@@ -79,7 +79,7 @@ def run_scene(
     from warpflat.core.manifest import require_own_metrics
 
     sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
-    with output_folder(out, files_of_run(scene), sources=sources) as folder:
+    with output_folder(out, files_of_run(scene), sources=sources, guard=True) as folder:
         require_own_metrics(folder)
         if scene.settings.mannequin is not None:
             from warpflat.scene.run_garment import run_garment

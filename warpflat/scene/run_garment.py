@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
+from warpflat.core.atomic_files import files_written
 from warpflat.core.beside import Beside
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
@@ -347,7 +348,10 @@ def _finish(
         measured["mannequin"] = {**measured["mannequin"], "table": settings.mannequin.model_dump(exclude_defaults=True)}
     files += written.files
     files += [*review_files(scene, measured, out, tuple(files), film, images)]
-    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
+    drape = settings.drape is not None
+    # The body belongs to the film.
+    known = [*files, *([MANNEQUIN] if any(name == MANNEQUIN for _, name in files_written()) else [])]
+    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=known, drape=drape)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *written.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=tuple(files), notes=notes)

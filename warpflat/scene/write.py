@@ -119,7 +119,8 @@ def write_surface(
     drawn = pattern.result()
     measured = {**run_metrics(entries, pieces[0].network.device, more), **drawn.metrics}
     files += [*drawn.files, *review_files(scene, measured, folder, (*files, *drawn.files), film, images)]
-    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files)
+    drape = settings.drape is not None
+    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files, drape=drape)
     name_notes = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
     notes = (*notes, *drawn.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
