@@ -15,6 +15,10 @@ wp.set_module_options({"enable_backward": False})
 # Which faces are evaluated: those in which something acted at the last evaluation of all, or all of them.
 ACTING = wp.constant(0)
 ALL = wp.constant(1)
+# What is wanted of a face: its energy; that and its forces; or what a step takes: forces, bounds on the stiffness, viscosity.
+ENERGY = wp.constant(0)
+FORCES = wp.constant(1)
+STEP = wp.constant(2)
 
 
 @wp.struct
@@ -177,20 +181,14 @@ def turned_left(v: wp.vec2d):
 
 
 @wp.func
-def clear_forces(out: CellForces, slot: int):
-    """Set the forces at the four corners of a face to zero; slot: the first of them."""
+def clear_corners(out: CellForces, slot: int, wanted: int, viscous: bool):
+    """Set what is wanted at the four corners of a face to zero; slot: the first of them."""
     for corner in range(4):
         out.force[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-
-
-@wp.func
-def clear_corners(out: CellForces, slot: int, viscous: bool):
-    """Set what is gathered at the four corners of a face to zero; slot: the first of them."""
-    clear_forces(out, slot)
-    for corner in range(4):
-        out.stiffness[slot + corner] = wp.float64(0.0)
-        if viscous:
-            out.viscosity[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+        if wanted == STEP:
+            out.stiffness[slot + corner] = wp.float64(0.0)
+            if viscous:
+                out.viscosity[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
 
 
 @wp.func
@@ -204,9 +202,8 @@ def add_forces(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d):
 
 
 @wp.func
-def add_to_corners(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d, bounds: wp.vec3d):
-    """Add a cell's forces, as `add_forces` takes them, and its bounds to the corners `at` of its face."""
-    add_forces(out, slot, at, pull)
+def add_stiffness(out: CellForces, slot: int, at: wp.vec3i, bounds: wp.vec3d):
+    """Add a cell's bounds to the corners `at` of its face."""
     out.stiffness[slot + at[0]] += bounds[0]
     out.stiffness[slot + at[1]] += bounds[1]
     out.stiffness[slot + at[2]] += bounds[2]
