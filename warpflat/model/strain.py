@@ -7,13 +7,15 @@ flat than on the body is in tension when worn.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
-from warpflat.fabric.fabric import grain_axes
+from warpflat.fabric.fabric import Fabric, grain_axes
+from warpflat.kernels.membrane_cell import Cloth
 from warpflat.kernels.strain import average_over_faces, compute_worn_strain
 from warpflat.model.membrane import Model, make_cloth
 from warpflat.model.network import SpringNetwork
@@ -91,9 +93,14 @@ def worn_cell_strain(network: SpringNetwork, positions: FloatArray, law: Model) 
     device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     cells = _worn_arrays(network.cell_count, device)
-    cloth = make_cloth(network.fabric, grain_axes(network.grain_angle), device, linear=law == "springs")
+    cloth = _cloth(network.fabric, network.grain_angle, device.alias, law)
     launch_each(compute_worn_strain, network.face_count, [at, network.cells, cloth], cells, device=device)
     return cells
+
+
+@lru_cache
+def _cloth(fabric: Fabric, grain_angle: float, device: str, law: Model) -> Cloth:
+    return make_cloth(fabric, grain_axes(grain_angle), wp.get_device(device), linear=law == "springs")
 
 
 def _worn_arrays(count: int, device: wp.Device) -> list[wp.array]:
