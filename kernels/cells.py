@@ -35,8 +35,7 @@ class Cells:
     onset: #F, worn stretch along warp and weft at which the guard begins to act.
     shear: #F, a direction in the plane times the fourth root of the shear stiffness that the springs of a long quad
         lack there [N/m]; zero for any other face.
-    hourglass: #F, weights of a quad's corners in its hourglass mode (`stiffness.weigh_hourglass`) [(N/m)^1/2];
-        zero for most.
+    hourglass: #F, weights of a quad's corners in its hourglass mode [(N/m)^1/2]; zero for most.
     """
 
     face: wp.array(dtype=wp.vec4i)
