@@ -15,6 +15,10 @@ wp.set_module_options({"enable_backward": False})
 # Which faces are evaluated: those in which something acted at the last evaluation of all, or all of them.
 ACTING = wp.constant(0)
 ALL = wp.constant(1)
+# What is wanted of a face: its energy; that and its forces; or what a step takes: forces, bounds on the stiffness, viscosity.
+ENERGY = wp.constant(0)
+FORCES = wp.constant(1)
+STEP = wp.constant(2)
 
 
 @wp.struct
@@ -31,8 +35,7 @@ class Cells:
     onset: #F, worn stretch along warp and weft at which the guard begins to act.
     shear: #F, a direction in the plane times the fourth root of the shear stiffness that the springs of a long quad
         lack there [N/m]; zero for any other face.
-    hourglass: #F, weights of a quad's corners in its hourglass mode (`stiffness.weigh_hourglass`) [(N/m)^1/2];
-        zero for most.
+    hourglass: #F, weights of a quad's corners in its hourglass mode [(N/m)^1/2]; zero for most.
     """
 
     face: wp.array(dtype=wp.vec4i)
@@ -177,20 +180,14 @@ def turned_left(v: wp.vec2d):
 
 
 @wp.func
-def clear_forces(out: CellForces, slot: int):
-    """Set the forces at the four corners of a face to zero; slot: the first of them."""
+def clear_corners(out: CellForces, slot: int, wanted: int, viscous: bool):
+    """Set what is wanted at the four corners of a face to zero; slot: the first of them."""
     for corner in range(4):
         out.force[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-
-
-@wp.func
-def clear_corners(out: CellForces, slot: int, viscous: bool):
-    """Set what is gathered at the four corners of a face to zero; slot: the first of them."""
-    clear_forces(out, slot)
-    for corner in range(4):
-        out.stiffness[slot + corner] = wp.float64(0.0)
-        if viscous:
-            out.viscosity[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+        if wanted == STEP:
+            out.stiffness[slot + corner] = wp.float64(0.0)
+            if viscous:
+                out.viscosity[slot + corner] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
 
 
 @wp.func
@@ -204,9 +201,8 @@ def add_forces(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d):
 
 
 @wp.func
-def add_to_corners(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d, bounds: wp.vec3d):
-    """Add a cell's forces, as `add_forces` takes them, and its bounds to the corners `at` of its face."""
-    add_forces(out, slot, at, pull)
+def add_stiffness(out: CellForces, slot: int, at: wp.vec3i, bounds: wp.vec3d):
+    """Add a cell's bounds to the corners `at` of its face."""
     out.stiffness[slot + at[0]] += bounds[0]
     out.stiffness[slot + at[1]] += bounds[1]
     out.stiffness[slot + at[2]] += bounds[2]

@@ -11,7 +11,7 @@ force is bounded.
 import warp as wp
 
 from .indices import natural
-from .membrane_cell import Cloth, sheared_threads, stretched_sheet
+from .membrane_cell import Cloth, ClothLaw, cloth_law
 
 wp.set_module_options({"enable_backward": False})
 
@@ -67,6 +67,33 @@ class Bending:
     stiffness: wp.array(dtype=wp.float64)
 
 
+@wp.struct
+class DrapedCell:
+    """A cell in space. warp, weft: its threads, worn; length_warp, length_weft: their lengths. law: of the cloth there."""
+
+    warp: wp.vec3d
+    weft: wp.vec3d
+    length_warp: wp.float64
+    length_weft: wp.float64
+    law: ClothLaw
+
+
+@wp.func
+def draped_cell(position: wp.array(dtype=wp.vec3d), corner: wp.vec3i, gradient: wp.vec4d, cloth: Cloth):
+    """Return the cell with these corners; gradient: as of `evaluate_cloth`."""
+    origin = position[natural(corner[0])]
+    d1 = position[natural(corner[1])] - origin
+    d2 = position[natural(corner[2])] - origin
+    cell = DrapedCell()
+    cell.warp = d1 * gradient[0] + d2 * gradient[2]
+    cell.weft = d1 * gradient[1] + d2 * gradient[3]
+    cell.length_warp = wp.max(wp.length(cell.warp), TINY)
+    cell.length_weft = wp.max(wp.length(cell.weft), TINY)
+    e = wp.vec2d(cell.length_warp - wp.float64(1.0), cell.length_weft - wp.float64(1.0))
+    cell.law = cloth_law(e, wp.dot(cell.warp, cell.weft), cloth)
+    return cell
+
+
 @wp.kernel
 def evaluate_cloth(
     position: wp.array(dtype=wp.vec3d),
@@ -85,22 +112,12 @@ def evaluate_cloth(
     area: #C, flat [m2]. force: 3 #C [N]. energy: #C [J].
     """
     c = natural(wp.tid() + first)
-    at = corner[c]
     g = gradient[c]
-    origin = position[natural(at[0])]
-    d1 = position[natural(at[1])] - origin
-    d2 = position[natural(at[2])] - origin
-    warp = d1 * g[0] + d2 * g[2]
-    weft = d1 * g[1] + d2 * g[3]
-    length_warp = wp.max(wp.length(warp), TINY)
-    length_weft = wp.max(wp.length(weft), TINY)
-    e = wp.vec2d(length_warp - wp.float64(1.0), length_weft - wp.float64(1.0))
-    law = stretched_sheet(e, cloth)
-    shear = sheared_threads(wp.dot(warp, weft), cloth)
-    tau = shear[0]
-    energy[c] = (law[2] + shear[1]) * area[c]
-    pull_warp = (warp * (law[0] / length_warp) + weft * tau) * area[c]
-    pull_weft = (weft * (law[1] / length_weft) + warp * tau) * area[c]
+    cell = draped_cell(position, corner[c], g, cloth)
+    law = cell.law
+    energy[c] = law.energy * area[c]
+    pull_warp = (cell.warp * (law.sigma[0] / cell.length_warp) + cell.weft * law.tau) * area[c]
+    pull_weft = (cell.weft * (law.sigma[1] / cell.length_weft) + cell.warp * law.tau) * area[c]
     f1 = -(pull_warp * g[0] + pull_weft * g[1])
     f2 = -(pull_warp * g[2] + pull_weft * g[3])
     force[natural(3 * c)] = -(f1 + f2)

@@ -2,32 +2,14 @@
 
 import warp as wp
 
-from .drape import TINY, Contact, Motion
+from .drape import TINY, Contact, Motion, draped_cell
 from .indices import natural
-from .membrane_cell import Cloth, beyond_hooke, sheared_threads, stretched_sheet
+from .membrane_cell import Cloth
 
 wp.set_module_options({"enable_backward": False})
 
 # What holds a vertex that may not move [N/m].
 HELD = wp.constant(wp.float64(1.0e6))
-
-
-@wp.func
-def sheet_slopes(e: wp.vec2d, cloth: Cloth):
-    """Return the second derivatives of W by e_warp, by e_weft, and by both [N/m]."""
-    zero = wp.float64(0.0)
-    one = wp.float64(1.0)
-    a = cloth.c_warp
-    b = cloth.c_weft
-    both = cloth.c_cross
-    if cloth.c_warp * e[0] + cloth.c_cross * e[1] < zero or cloth.c_weft * e[1] + cloth.c_cross * e[0] < zero:
-        f = cloth.compression
-        a = f * a + (one - f) * wp.where(e[0] > zero, cloth.k_warp, zero)
-        b = f * b + (one - f) * wp.where(e[1] > zero, cloth.k_weft, zero)
-        both = f * both
-    a += beyond_hooke(e[0], cloth.k_warp, cloth.strain_warp, cloth.tension_warp)[2]
-    b += beyond_hooke(e[1], cloth.k_weft, cloth.strain_weft, cloth.tension_weft)[2]
-    return wp.vec3d(a, b, both)
 
 
 @wp.func
@@ -59,44 +41,32 @@ def stiffen_cloth(
     position, corner, gradient, area: as of `evaluate_cloth`. stiffness: 9 #C, of corners 00, 01, 02, 10, ... [N/m].
     """
     c = natural(wp.tid() + first)
-    at = corner[c]
     g = gradient[c]
     zero = wp.float64(0.0)
-    one = wp.float64(1.0)
     half = wp.float64(0.5)
-    origin = position[natural(at[0])]
-    d1 = position[natural(at[1])] - origin
-    d2 = position[natural(at[2])] - origin
-    warp = d1 * g[0] + d2 * g[2]
-    weft = d1 * g[1] + d2 * g[3]
-    length_warp = wp.max(wp.length(warp), TINY)
-    length_weft = wp.max(wp.length(weft), TINY)
-    e = wp.vec2d(length_warp - one, length_weft - one)
-    law = stretched_sheet(e, cloth)
-    shear = sheared_threads(wp.dot(warp, weft), cloth)
-    slope = sheet_slopes(e, cloth)
+    cell = draped_cell(position, corner[c], g, cloth)
+    law = cell.law
+    shear = cloth.shear + law.locked
     # The part of the stress [[a, tau], [tau, b]] that pulls.
-    a = law[0] / length_warp
-    b = law[1] / length_weft
+    a = law.sigma[0] / cell.length_warp
+    b = law.sigma[1] / cell.length_weft
     middle = half * (a + b)
-    radius = wp.max(wp.sqrt(half * half * (a - b) * (a - b) + shear[0] * shear[0]), TINY)
+    radius = wp.max(wp.sqrt(half * half * (a - b) * (a - b) + law.tau * law.tau), TINY)
     high = wp.abs(middle + radius)
     low = wp.abs(middle - radius)
     across = half * (high - low) / radius
     mean = half * (high + low)
     a_pull = mean + across * half * (a - b)
     b_pull = mean - across * half * (a - b)
-    tau_pull = across * shear[0]
-    u = warp / length_warp
-    v = weft / length_weft
+    tau_pull = across * law.tau
+    u = cell.warp / cell.length_warp
+    v = cell.weft / cell.length_weft
     unit = wp.identity(n=3, dtype=wp.float64)
-    of_warp = (
-        wp.outer(u, u) * wp.max(slope[0] - a_pull, zero) + unit * (a_pull + pull) + wp.outer(weft, weft) * shear[2]
-    )
-    of_weft = (
-        wp.outer(v, v) * wp.max(slope[1] - b_pull, zero) + unit * (b_pull + pull) + wp.outer(warp, warp) * shear[2]
-    )
-    of_both = wp.outer(u, v) * slope[2] + unit * tau_pull + wp.outer(weft, warp) * shear[2]
+    of_warp = wp.outer(u, u) * wp.max(law.slope[0] - a_pull, zero) + unit * (a_pull + pull)
+    of_warp += wp.outer(cell.weft, cell.weft) * shear
+    of_weft = wp.outer(v, v) * wp.max(law.slope[1] - b_pull, zero) + unit * (b_pull + pull)
+    of_weft += wp.outer(cell.warp, cell.warp) * shear
+    of_both = wp.outer(u, v) * law.slope[2] + unit * tau_pull + wp.outer(cell.weft, cell.warp) * shear
     for k in range(9):
         i = k / 3
         j = k % 3

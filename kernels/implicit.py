@@ -9,7 +9,7 @@ import warp as wp
 
 from .cells import ACTING, CellForces, Cells
 from .indices import natural
-from .springs import Springs, spring_forces_on
+from .springs import Springs, sum_spring_viscosity, sum_springs
 
 wp.set_module_options({"enable_backward": False})
 
@@ -60,6 +60,42 @@ class VertexForces:
     guarded: wp.array(dtype=wp.int8)
 
 
+@wp.func
+def sum_cells(i: int, cells: Cells, cell_forces: CellForces, viscous: bool):
+    """Return the sums at vertex i of the forces, viscosities and stiffnesses of the cells that act; no viscosity unless `viscous`."""
+    force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    drag = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    stiffness = wp.float64(0.0)
+    e = natural(cells.offset[i])
+    end = cells.offset[i + 1]
+    while e < end:
+        slot = natural(cells.slot[e])
+        if cell_forces.acting[slot / 4] != wp.int8(0):
+            force += cell_forces.force[slot]
+            stiffness += cell_forces.stiffness[slot]
+            if viscous:
+                drag += cell_forces.viscosity[slot]
+        e += 1
+    return force, drag, stiffness
+
+
+@wp.func
+def sum_bonds(i: int, bonds: Bonds, bond_forces: BondForces):
+    """Return the sums at vertex i of the forces, viscosities and stiffnesses of its bonds."""
+    force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    drag = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    stiffness = wp.float64(0.0)
+    b = natural(bonds.offset[i])
+    end = bonds.offset[i + 1]
+    while b < end:
+        bond = natural(bonds.slot[b])
+        force += bond_forces.force[bond]
+        drag += bond_forces.viscosity[bond]
+        stiffness += bond_forces.stiffness[bond]
+        b += 1
+    return force, drag, stiffness
+
+
 @wp.kernel
 def gather_forces(
     position: wp.array(dtype=wp.vec2d),
@@ -86,9 +122,15 @@ def gather_forces(
     """
     i = natural(wp.tid() + first)
     viscosity = coefficients[0][0]
-    total, driving = spring_forces_on(i, position, velocity, springs, time_step, viscosity != wp.float64(0.0))
-    total += load[i]
+    viscous = viscosity != wp.float64(0.0)
+    total = load[i]
+    driving = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     k = spring_stiffness[i]
+    if springs.active != wp.float64(0.0):
+        _energy, _tension, force = sum_springs(i, position, springs)
+        total += force
+        if viscous:
+            driving = time_step * sum_spring_viscosity(i, velocity, springs)
     if scope != ACTING:
         height = wp.float64(wp.inf)
         acting = wp.int8(0)
@@ -103,24 +145,14 @@ def gather_forces(
         out.reach[i] = STEP_SHARE * height
         out.guarded[i] = acting
     if out.guarded[i] != wp.int8(0):
-        e = natural(cells.offset[i])
-        end = cells.offset[i + 1]
-        while e < end:
-            slot = natural(cells.slot[e])
-            if cell_forces.acting[slot / 4] != wp.int8(0):
-                total += cell_forces.force[slot]
-                k += cell_forces.stiffness[slot]
-                if viscosity != wp.float64(0.0):
-                    driving += cell_forces.viscosity[slot]
-            e += 1
-    b = natural(bonds.offset[i])
-    end = bonds.offset[i + 1]
-    while b < end:
-        bond = natural(bonds.slot[b])
-        total += bond_forces.force[bond]
-        driving += bond_forces.viscosity[bond]
-        k += bond_forces.stiffness[bond]
-        b += 1
+        force, drag, stiffness = sum_cells(i, cells, cell_forces, viscous)
+        total += force
+        driving += drag
+        k += stiffness
+    force, drag, stiffness = sum_bonds(i, bonds, bond_forces)
+    total += force
+    driving += drag
+    k += stiffness
     total = wp.cw_mul(total, bonds.freedom[i])
     driving = wp.cw_mul(driving, bonds.freedom[i]) * viscosity + total
     out.force[i] = total
@@ -149,36 +181,14 @@ def gather_potential(
     position: #V [m]. energy: #V [J]. force: #V [N]. Cells and bonds have been evaluated at these positions.
     """
     i = natural(wp.tid() + first)
-    total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     stored = wp.float64(0.0)
+    total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if springs.active != wp.float64(0.0):
-        here = position[i]
-        s = natural(springs.offset[i])
-        end = springs.offset[i + 1]
-        while s < end:
-            there = natural(springs.neighbor[s])
-            d = position[there] - here
-            length = wp.sqrt(wp.max(wp.dot(d, d), wp.float64(1.0e-300)))
-            stretch = length - springs.rest_length[s]
-            tension = springs.stiffness[s] * stretch
-            total += (tension / length) * d
-            if there > i:
-                stored += tension * stretch
-            s += 1
-    e = natural(cells.offset[i])
-    end = cells.offset[i + 1]
-    while e < end:
-        slot = natural(cells.slot[e])
-        if cell_forces.acting[slot / 4] != wp.int8(0):
-            total += cell_forces.force[slot]
-        e += 1
-    b = natural(bonds.offset[i])
-    end = bonds.offset[i + 1]
-    while b < end:
-        total += bond_forces.force[natural(bonds.slot[b])]
-        b += 1
-    energy[i] = wp.float64(0.5) * stored
-    force[i] = wp.cw_mul(total, bonds.freedom[i])
+        stored, _tension, total = sum_springs(i, position, springs)
+    of_cells, _drag, _stiffness = sum_cells(i, cells, cell_forces, False)
+    of_bonds, _viscosity, _k = sum_bonds(i, bonds, bond_forces)
+    energy[i] = stored
+    force[i] = wp.cw_mul(total + of_cells + of_bonds, bonds.freedom[i])
 
 
 @wp.func

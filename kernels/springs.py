@@ -1,4 +1,4 @@
-"""Springs of the mass-spring model: forces, viscosity, energy, gathered per vertex."""
+"""Springs of the mass-spring model: their law, and its sums over the springs around each vertex."""
 
 import warp as wp
 
@@ -26,49 +26,58 @@ class Springs:
 
 
 @wp.func
-def spring_force(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
-    """Return the force on the near end of a spring, minus the gradient of 1/2 k (l - L)^2; zero at zero length.
+def spring_law(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
+    """Return a spring's energy 1/2 k (l - L)^2 [J], its tension k (l - L) [N], and the force on its near end [N].
 
-    d: vector to the far end [m].
+    The force is minus the gradient of the energy, and zero at zero length. d: vector to the far end [m].
     """
     length = wp.sqrt(wp.max(wp.dot(d, d), wp.float64(1.0e-300)))
-    return stiffness * (wp.float64(1.0) - rest_length / length) * d
+    stretch = length - rest_length
+    tension = stiffness * stretch
+    return wp.float64(0.5) * tension * stretch, tension, (tension / length) * d
 
 
 @wp.func
-def spring_forces_on(
-    i: int,
-    position: wp.array(dtype=wp.vec2d),
-    velocity: wp.array(dtype=wp.vec2d),
-    springs: Springs,
-    time_step: wp.float64,
-    viscous: bool,
-):
-    """Return the sum of the spring forces on vertex i, and, if `viscous`, the viscosity of eq. (7) [N].
+def spring_force(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
+    """Return the force of `spring_law` alone [N]."""
+    _energy, _tension, force = spring_law(d, rest_length, stiffness)
+    return force
 
-    The viscosity is h sum_j k_ij (v_j - v_i).
 
-    Both are zero with a membrane, which has forces and viscosity of its own.
+@wp.func
+def sum_springs(i: int, position: wp.array(dtype=wp.vec2d), springs: Springs):
+    """Return the energy and the sum of |tension| of the springs from vertex i to later vertices, and the force of all on it.
+
+    So the sums over the vertices count each spring once.
     """
+    energy = wp.float64(0.0)
+    tension = wp.float64(0.0)
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    here = position[i]
+    s = natural(springs.offset[i])
+    end = springs.offset[i + 1]
+    while s < end:
+        there = natural(springs.neighbor[s])
+        stored, pull, push = spring_law(position[there] - here, springs.rest_length[s], springs.stiffness[s])
+        force += push
+        if there > i:
+            energy += stored
+            tension += wp.abs(pull)
+        s += 1
+    return energy, tension, force
+
+
+@wp.func
+def sum_spring_viscosity(i: int, velocity: wp.array(dtype=wp.vec2d), springs: Springs):
+    """Return sum_j k_ij (v_j - v_i), the viscosity of eq. (7) over the time step [N/s]."""
     viscosity = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    if springs.active != wp.float64(0.0):
-        here = position[i]
-        s = natural(springs.offset[i])
-        end = springs.offset[i + 1]
-        if viscous:
-            moving = velocity[i]
-            while s < end:
-                there = natural(springs.neighbor[s])
-                stiffness = springs.stiffness[s]
-                force += spring_force(position[there] - here, springs.rest_length[s], stiffness)
-                viscosity += stiffness * (velocity[there] - moving)
-                s += 1
-        while s < end:
-            there = natural(springs.neighbor[s])
-            force += spring_force(position[there] - here, springs.rest_length[s], springs.stiffness[s])
-            s += 1
-    return force, time_step * viscosity
+    here = velocity[i]
+    s = natural(springs.offset[i])
+    end = springs.offset[i + 1]
+    while s < end:
+        viscosity += springs.stiffness[s] * (velocity[natural(springs.neighbor[s])] - here)
+        s += 1
+    return viscosity
 
 
 @wp.kernel
@@ -84,17 +93,8 @@ def compute_spring_energy(
     position: #V [m]. energy: #V [J].
     """
     i = natural(wp.tid() + first)
-    here = position[i]
-    total = wp.float64(0.0)
-    s = natural(springs.offset[i])
-    end = springs.offset[i + 1]
-    while s < end:
-        there = natural(springs.neighbor[s])
-        if there > i:
-            stretch = wp.length(position[there] - here) - springs.rest_length[s]
-            total += wp.float64(0.5) * springs.stiffness[s] * stretch * stretch
-        s += 1
-    energy[i] = springs.active * total
+    stored, _tension, _force = sum_springs(i, position, springs)
+    energy[i] = springs.active * stored
 
 
 @wp.kernel
@@ -110,13 +110,5 @@ def compute_spring_tension(
     position: #V [m]. tension: #V [N].
     """
     i = natural(wp.tid() + first)
-    here = position[i]
-    total = wp.float64(0.0)
-    s = natural(springs.offset[i])
-    end = springs.offset[i + 1]
-    while s < end:
-        there = natural(springs.neighbor[s])
-        if there > i:
-            total += springs.stiffness[s] * wp.abs(wp.length(position[there] - here) - springs.rest_length[s])
-        s += 1
-    tension[i] = total
+    _stored, pull, _force = sum_springs(i, position, springs)
+    tension[i] = pull

@@ -9,8 +9,6 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 TINY = wp.constant(wp.float64(2.2250738585072014e-308))
 # Hourglass stiffness of quads over that of a membrane.
 HOURGLASS_SHARE = wp.constant(wp.float64(0.25))
-# A quad whose middle lines enclose an angle with less than this squared sine has no shape to keep.
-FLAT = wp.constant(wp.float64(1.0e-12))
 
 
 @wp.kernel
@@ -66,19 +64,6 @@ def list_springs(
 
 
 @wp.kernel
-def pick_values(
-    entry: wp.array(dtype=wp.int32),
-    value: wp.array(dtype=wp.float64),
-    first: int,
-    # outputs
-    listed: wp.array(dtype=wp.float64),
-):
-    """Copy the value of the spring that each entry of a list names."""
-    e = natural(wp.tid() + first)
-    listed[e] = value[natural(entry[e])]
-
-
-@wp.kernel
 def find_sides(
     corner: wp.array(dtype=wp.vec3i),
     offset: wp.array(dtype=wp.int32),
@@ -127,41 +112,6 @@ def sum_stiffness(
         stiffest = wp.max(stiffest, k)
         e += 1
     around[i] = total + pair_share * stiffest
-
-
-@wp.func
-def first_direction(position: wp.array(dtype=wp.vec2d), quad: wp.vec4i):
-    """Return the vector along a quad's edges 0-1 and 3-2 in the plane."""
-    p0 = position[natural(quad[0])]
-    p1 = position[natural(quad[1])]
-    p2 = position[natural(quad[2])]
-    p3 = position[natural(quad[3])]
-    return (p1 - p0) + (p2 - p3)
-
-
-@wp.kernel
-def find_directions(
-    position: wp.array(dtype=wp.vec2d),
-    quads: wp.array(dtype=wp.vec4i),
-    warp: wp.vec2d,
-    first: int,
-    # outputs
-    fourfold: wp.array(dtype=wp.vec2d),
-):
-    """Compute (cos 4a, sin 4a) of the angle a from the warp to each quad's first edges."""
-    q = natural(wp.tid() + first)
-    d = first_direction(position, quads[q])
-    along = wp.dot(d, warp)
-    across = warp[0] * d[1] - warp[1] * d[0]
-    length = wp.length(d)
-    if length == wp.float64(0.0):
-        along = wp.float64(1.0)
-        length = wp.float64(1.0)
-    c = along / length
-    s = across / length
-    c2 = c * c - s * s
-    s2 = wp.float64(2.0) * c * s
-    fourfold[q] = wp.vec2d(c2 * c2 - s2 * s2, wp.float64(2.0) * c2 * s2)
 
 
 @wp.struct
@@ -220,11 +170,13 @@ def weigh_quads(
     side: #Q, the first of each quad's half-edges. wider: #Q, how many times as long as on the body a and b are in the
     cloth.
     stiffness: #H. diagonal: #Q. lack: #Q, their shear deficit, as `cells.Cells.shear`. hold: #Q, missing stiffness of
-    the hourglass mode, in which no diagonal is strained [N/m] (`weigh_hourglass`).
+    the hourglass mode, in which no diagonal is strained [N/m].
     """
     q = natural(wp.tid() + first)
     quad = quads[q]
-    d = first_direction(position, quad)
+    d = (position[natural(quad[1])] - position[natural(quad[0])]) + (
+        position[natural(quad[2])] - position[natural(quad[3])]
+    )
     ka = lattice.along
     kb = lattice.across
     if wp.abs(lattice.direction[0] * d[1] - lattice.direction[1] * d[0]) > wp.abs(wp.dot(lattice.direction, d)):
@@ -263,47 +215,6 @@ def weigh_quads(
     stiffness[h + 2] = half_a
     stiffness[h + 3] = half_b
     diagonal[q] = half * shear * (inverse + ratio)
-
-
-@wp.kernel
-def weigh_hourglass(
-    vertices: wp.array(dtype=wp.vec3d),
-    quads: wp.array(dtype=wp.vec4i),
-    hold: wp.array(dtype=wp.float64),
-    first: int,
-    # outputs
-    weights: wp.array(dtype=wp.vec4d),
-):
-    """Compute the hourglass weights of quads.
-
-    With them a quad stores 1/2 |sum of weight_k p_k|^2, p its corners in the plane.
-
-    The weights are +1, -1, +1, -1, less the same mode of the quad's shape on the body, so that this shape under any
-    uniform strain stores nothing (Flanagan and Belytschko 1981), times the root of `hold`, #Q [N/m]. weights: #Q.
-    """
-    q = natural(wp.tid() + first)
-    quad = quads[q]
-    weights[q] = wp.vec4d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
-    if hold[q] > wp.float64(0.0):
-        p0 = vertices[quad[0]]
-        p1 = vertices[quad[1]]
-        p2 = vertices[quad[2]]
-        p3 = vertices[quad[3]]
-        half = wp.float64(0.5)
-        u = half * ((p1 - p0) + (p2 - p3))
-        v = half * ((p3 - p0) + (p2 - p1))
-        h = (p0 - p1) + (p2 - p3)
-        uu = wp.dot(u, u)
-        vv = wp.dot(v, v)
-        uv = wp.dot(u, v)
-        det = uu * vv - uv * uv
-        if det > FLAT * uu * vv:
-            along_u = half * (wp.dot(h, u) * vv - wp.dot(h, v) * uv) / det
-            along_v = half * (wp.dot(h, v) * uu - wp.dot(h, u) * uv) / det
-            one = wp.float64(1.0)
-            weights[q] = wp.sqrt(hold[q]) * wp.vec4d(
-                one + along_u + along_v, -one - along_u + along_v, one - along_u - along_v, -one + along_u - along_v
-            )
 
 
 @wp.kernel

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 import warp as wp
 from warpflat.kernels.guard import compute_guard_energy
+from warpflat.kernels.stiffness import measure_edges
 
+from warpflat.core import launch as launching
 from warpflat.core.errors import InputError
-from warpflat.core.launch import Launch, Sequence, record, split_range
+from warpflat.core.launch import Launch, Sequence, launch_each, record, split_range
 from warpflat.core.threads import thread_count
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.develop import develop
@@ -116,6 +118,64 @@ def test_recorded_launches_are_those_of_warp() -> None:
     np.testing.assert_array_equal(recorded.numpy(), energy.numpy())
 
 
+VERTICES = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0], [3.0, 4.0, 12.0]])
+EDGES = np.array([[0, 1], [1, 2], [0, 2]], dtype=np.int32)
+
+
+def test_arrays_of_numpy() -> None:
+    for _ in range(2):
+        length = np.zeros(3)
+        launch_each(measure_edges, 3, [VERTICES, EDGES], [length])
+        np.testing.assert_allclose(length, [5.0, 12.0, 13.0])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        [VERTICES.astype(np.float32), EDGES],
+        [VERTICES[:, :2].copy(), EDGES],
+        [VERTICES, EDGES.astype(np.int64)],
+        [wp.zeros(3, dtype=wp.vec2d, device="cpu"), EDGES],
+        [VERTICES],
+    ],
+)
+def test_what_does_not_fit_is_refused(wrong: list[object]) -> None:
+    with pytest.raises(RuntimeError, match=r"measure_edges|Could not convert"):
+        record(measure_edges, dim=3, inputs=wrong, outputs=[np.zeros(3)], device="cpu")
+
+
+def test_rows_that_do_not_lie_in_a_row() -> None:
+    """Every second row of a larger array: its strides are taken as they are."""
+    length, wide = np.zeros(3), np.repeat(VERTICES, 2, axis=0)
+    record(measure_edges, dim=3, inputs=[wide[::2], EDGES], outputs=[length], device="cpu").launch()
+    np.testing.assert_allclose(length, [5.0, 12.0, 13.0])
+
+
+def test_threads_that_need_a_kernel_at_once_load_it_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loaded twice, its code is unloaded under the first one's feet: crashes of narrow strips, whose levels are made beside them."""
+    inside, at_once = [], []
+    launch = wp.launch
+
+    def slow(*given: object, **named: object) -> object:
+        inside.append(threading.get_ident())
+        at_once.append(len(inside))
+        time.sleep(0.02)
+        inside.pop()
+        return launch(*given, **named)
+
+    monkeypatch.setattr(wp, "launch", slow)
+    lengths = np.zeros((4, 3))
+    threads = [
+        threading.Thread(target=launch_each, args=(measure_edges, 3, [VERTICES, EDGES], [length])) for length in lengths
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert at_once == [1] * 4
+    np.testing.assert_allclose(lengths, np.tile([5.0, 12.0, 13.0], (4, 1)))
+
+
 def test_ranges_run_on_threads_of_their_own() -> None:
     seen: dict[int, int] = {}
     together = threading.Barrier(3, timeout=30)  # passes only if three are inside at once
@@ -170,26 +230,31 @@ def test_an_error_in_a_thread_is_raised_in_the_caller(where: int, kind: type[Bas
     assert after == [1, 1, 1]
 
 
-def test_an_interrupt_while_waiting_leaves_later_launches_sound(monkeypatch: pytest.MonkeyPatch) -> None:
-    from warpflat.core import launch as launching
-
-    wait = launching._Barrier.wait
-
-    def interrupted(self: launching._Barrier, i: int) -> None:
-        if i == 0:
-            raise KeyboardInterrupt
-        wait(self, i)
-
+def test_an_interrupt_while_waiting_leaves_later_launches_sound() -> None:
     ran: list[int] = []
-    launch = Launch([lambda k=k: ran.append(k) for k in range(3)])
-    monkeypatch.setattr(launching._Barrier, "wait", interrupted)
+    interrupted, late = threading.Event(), threading.Event()
+
+    class Interrupted(launching.SimpleQueue):  # type: ignore[type-arg]
+        def get(self, *_: object, **__: object) -> None:
+            interrupted.set()
+            raise KeyboardInterrupt
+
+    def work(k: int) -> None:
+        if k:
+            interrupted.wait(30)
+            late.set()
+        ran.append(k)
+
+    before = launching._pool
+    before._done = Interrupted()
     with pytest.raises(KeyboardInterrupt):
-        launch.launch()
-    monkeypatch.undo()
+        Launch([lambda k=k: work(k) for k in range(3)]).launch()
+    assert late.wait(30)
+    assert launching._pool is not before
     time.sleep(0.01)
     ran.clear()
     for _ in range(10):
-        launch.launch()
+        Launch([lambda k=k: ran.append(k) for k in range(3)]).launch()
     assert sorted(ran) == sorted([0, 1, 2] * 10)
 
 

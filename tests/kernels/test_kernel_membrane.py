@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from small_networks import corner_vertices, filled
 from warpflat.kernels.cells import CellForces
 from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane, evaluate_membrane_potential
-from warpflat.kernels.strain import compute_membrane_strain
+from warpflat.kernels.strain import compute_worn_strain
 
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.model.membrane import make_cloth
@@ -259,7 +259,7 @@ def one_cell(F: FloatArray, fabric: Fabric) -> tuple[float, FloatArray]:
     strain, stress = (wp.zeros(1, dtype=wp.vec3d, device=DEVICE) for _ in range(2))
     energy, area = (wp.zeros(1, dtype=wp.float64, device=DEVICE) for _ in range(2))
     wp.launch(
-        compute_membrane_strain,
+        compute_worn_strain,
         dim=1,
         inputs=[
             wp.array(points, dtype=wp.vec2d, device=DEVICE),

@@ -12,8 +12,8 @@ from small_networks import CLOTH, DEVICE, shaken, small_network, vec2
 from warpflat.kernels.strain import compute_worn_strain
 
 from warpflat.fabric.fabric import grain_axes
+from warpflat.model.membrane import make_cloth
 from warpflat.model.network import SpringNetwork
-from warpflat.model.strain import make_membrane
 
 
 def worn(network: SpringNetwork, positions: NDArray[np.float64], *, pieces: int = 1) -> list[NDArray[np.float64]]:
@@ -21,12 +21,12 @@ def worn(network: SpringNetwork, positions: NDArray[np.float64], *, pieces: int 
     count = network.cell_count
     outputs = [wp.zeros(count, dtype=t, device=DEVICE) for t in (wp.vec3d, wp.vec3d, wp.float64, wp.float64)]
     bounds = np.linspace(0, network.face_count, pieces + 1).astype(int)
-    membrane = make_membrane(network.fabric, network.grain_angle)
+    cloth = make_cloth(network.fabric, grain_axes(network.grain_angle), network.device, linear=True)
     for first, last in pairwise(bounds):
         wp.launch(
             compute_worn_strain,
             dim=int(last - first),
-            inputs=[vec2(positions), network.cells, membrane, int(first)],
+            inputs=[vec2(positions), network.cells, cloth, int(first)],
             outputs=outputs,
             device=DEVICE,
         )

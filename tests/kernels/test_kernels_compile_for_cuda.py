@@ -11,7 +11,7 @@ import warp as wp
 import warpflat.kernels
 
 # Device functions alone are compiled with the kernels that call them.
-FUNCTIONS = {"guard_cell", "indices", "membrane_cell"}
+FUNCTIONS = {"indices", "membrane_cell"}
 MODULES = sorted({module.name for module in pkgutil.iter_modules(warpflat.kernels.__path__)} - FUNCTIONS)
 
 

@@ -33,6 +33,7 @@ __all__ = [
 
 # Modules that nearly every run needs. Those that take longest come first, so that no thread is left with one at the end.
 _COMMON_MODULES = (
+    "guard",
     "grid_lists",
     "coarsen",
     "cells",

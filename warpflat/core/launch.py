@@ -1,7 +1,7 @@
 """Launches on all cores: on the CPU a kernel runs over contiguous ranges of its threads, one range per core.
 
-A launch on the CPU is one serial loop that holds no interpreter lock while it runs, so ranges of it run at once from
-Python threads. A kernel that is launched so takes ``first: int`` as its last input and begins with
+A launch on the CPU is one serial loop that holds no interpreter lock while it runs, so ranges of it, each a recorded
+launch of Warp's, run at once from Python threads. A kernel that is launched so takes ``first: int`` as its last input and begins with
 ``i = wp.tid() + first``; it writes to places of its own index only, so that the result is the same, bit for bit, for
 any number of threads. On a CUDA device the same calls are ordinary launches, and a sequence that is run again and again becomes a graph.
 
@@ -14,21 +14,23 @@ argument.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import threading
+from collections.abc import Callable
 from collections.abc import Sequence as SequenceOf
 from functools import partial
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from warpflat.core.compile import start_warp
-from warpflat.core.launch_arguments import Command, launch_commands
+from warpflat.core.compile import compile_common_modules, kernel_cache_errors, start_warp
 from warpflat.core.threads import thread_count
 
 __all__ = ["Launch", "Sequence", "launch_each", "record", "record_copy", "record_zero", "split_range"]
+
+Command = Callable[[], None]
 
 # A range shorter than this is not worth waking a thread for (benchmarks/threads.py measures it).
 _LEAST_RANGE = 2048
@@ -58,7 +60,7 @@ class Launch:
     def __init__(
         self, commands: SequenceOf[Command], keep: object = None, device: str | wp.Device | None = "cpu"
     ) -> None:
-        """Hold the commands for the ranges, and in `keep` the objects that they point to."""
+        """Hold the commands for the ranges, and in `keep` the arrays that they point to."""
         self.commands = tuple(commands)
         self.device = wp.get_device(device)
         self._keep = keep
@@ -124,22 +126,28 @@ def record(
     where = wp.get_device(device)
     least = _LEAST_RANGE if least is None else max(least, 1)
     if where.is_cuda or dim < 2 * least:
-        return Launch(
-            launch_commands(kernel, [(0, dim)] if dim > 0 else [], inputs, outputs, where), (inputs, outputs), where
-        )
-    threads = thread_count() if threads is None else threads
-    ranges = split_range(dim, threads * _fair_turns(dim, threads, turns, least), least=least)
-    commands = launch_commands(kernel, ranges, inputs, outputs, where)
+        ranges, threads = [(0, dim)] if dim > 0 else [], 1
+    else:
+        threads = thread_count() if threads is None else threads
+        # So many that all threads take equally many.
+        each = max(1, min(turns, dim // (threads * least))) if threads > 1 else 1
+        ranges = split_range(dim, threads * each, least=least)
+    commands: list[Command] = []
+    # Of two threads that load a module at once one has its code unloaded by the other.
+    with _recording, kernel_cache_errors():  # nothing runs yet, but a module that is new is compiled
+        if ranges and kernel not in _known:
+            compile_common_modules(kernel.module, where)
+            _known.add(kernel)
+        for begin, end in ranges:
+            given = {"inputs": [*inputs, begin], "outputs": list(outputs)}
+            commands.append(wp.launch(kernel, dim=end - begin, **given, device=where, record_cmd=True).launch)
     if len(commands) > threads:
         commands = [partial(_run_all, commands[i::threads]) for i in range(threads)]
     return Launch(commands, keep=(inputs, outputs), device=where)
 
 
-def _fair_turns(dim: int, threads: int, most: int, least: int) -> int:
-    """Return how many ranges each thread takes if all take equally many."""
-    if threads == 1:
-        return 1
-    return max(1, min(most, dim // (threads * least)))
+_recording = threading.Lock()
+_known: set[wp.Kernel] = set()
 
 
 def _run_all(commands: SequenceOf[Command]) -> None:
@@ -181,168 +189,76 @@ def launch_each(
     record(kernel, dim=count, inputs=inputs, outputs=outputs, device=device, least=least).launch()
 
 
-class _Barrier:
-    """A dissemination barrier of `size` threads: in round r, thread i signals thread i + 2^r and waits for i - 2^r.
-
-    (The dissemination barrier of Hensgen, Finkel and Manber 1988.) The locks are binary semaphores. There are two sets in
-    turn: a thread may come to the next barrier before another has left this one.
-    """
-
-    def __init__(self, size: int) -> None:
-        locks: list[list[list[threading.Lock]]] = []
-        reach = [2**r for r in range((size - 1).bit_length())]
-        for _ in range(2):
-            locks.append([[_closed_lock() for _ in range(size)] for _ in reach])
-        self._rounds = [
-            [[(of[(i + d) % size].release, of[i].acquire) for d, of in zip(reach, turn, strict=True)] for turn in locks]
-            for i in range(size)
-        ]
-        self._turn = [0] * size
-        self._locks = [lock for turn in locks for of in turn for lock in of]
-
-    def wait(self, i: int) -> None:
-        turn = self._turn[i]
-        self._turn[i] = 1 - turn
-        for signal, wait in self._rounds[i][turn]:
-            signal()
-            wait()
-
-    def open(self) -> None:
-        """Open the barrier for good."""
-        for lock in self._locks:
-            _open(lock)
-
-
-def _closed_lock() -> threading.Lock:
-    lock = threading.Lock()
-    lock.acquire()
-    return lock
-
-
-def _open(lock: threading.Lock) -> None:
-    with contextlib.suppress(RuntimeError):  # it was open
-        lock.release()
-
-
-class _Job:
-    """Phases of commands, one per thread, and the first error."""
-
-    def __init__(self, phases: SequenceOf[SequenceOf[Command]], barrier: _Barrier) -> None:
-        self.phases = phases
-        self.barrier = barrier
-        self.error: BaseException | None = None
-        self.abandoned = False
-
-    def take_part(self, i: int) -> None:
-        """Take part as thread i. After an error only the barriers go on, so that no thread waits for ever."""
-        wait = self.barrier.wait
-        for commands in self.phases:
-            if i < len(commands) and self.error is None:
-                try:
-                    commands[i]()
-                except BaseException as error:
-                    self.error = error
-            wait(i)
-            if self.abandoned:
-                return
-
-
 class _Pool:
-    """Threads that wait for jobs; the caller is thread 0. They are daemons and die with the process."""
+    """Threads that run commands beside the caller. They are daemons and die with the process."""
 
-    def __init__(self, size: int) -> None:
-        self.size = size
+    def __init__(self) -> None:
         self.busy = threading.Lock()
-        self.closed = False
-        self._job: _Job | None = None
-        self._start = [_closed_lock() for _ in range(size)]
-        self._barriers: dict[int, _Barrier] = {}
-        for i in range(1, size):
-            threading.Thread(target=self._serve, args=(i,), name=f"warpflat-{i}", daemon=True).start()
+        self._size = 0
+        self._commands: SimpleQueue[Command | None] = SimpleQueue()
+        self._done: SimpleQueue[BaseException | None] = SimpleQueue()
 
-    def _serve(self, i: int) -> None:
-        start = self._start[i]
-        while True:
-            start.acquire()
-            if self.closed:
-                return
-            if self._job is not None:
-                try:
-                    self._job.take_part(i)
-                except RuntimeError:  # the barrier's locks were opened for good, under its feet
-                    if not self.closed:
-                        raise
+    def _serve(self) -> None:
+        while (command := self._commands.get()) is not None:
+            self._done.put(_error_of(command))
 
-    def run(self, phases: SequenceOf[SequenceOf[Command]], threads: int) -> None:
-        """Run the phases on the pool's threads. The caller holds the lock `busy`."""
-        barrier = self._barriers.get(threads) or self._barriers.setdefault(threads, _Barrier(threads))
-        job = self._job = _Job(phases, barrier)
-        try:
-            for i in range(1, threads):
-                self._start[i].release()
-            job.take_part(0)
-        except BaseException:  # an interrupt while waiting: nobody knows any more who is where
-            self.close()
-            raise
-        if job.error is not None:
-            raise job.error
+    def run(self, commands: SequenceOf[Command]) -> None:
+        """Run the commands at once, the first on the caller's thread. The caller holds the lock `busy`."""
+        while self._size < len(commands) - 1:
+            self._size += 1
+            threading.Thread(target=self._serve, name=f"warpflat-{self._size}", daemon=True).start()
+        for command in commands[1:]:
+            self._commands.put(command)
+        errors = [_error_of(commands[0]), *(self._done.get() for _ in commands[1:])]
+        for error in errors:
+            if error is not None:
+                raise error
 
     def close(self) -> None:
-        """End the threads; the pool cannot be used afterwards."""
-        global _pool
-        if self.closed:
-            return
-        self.closed = True
-        if self._job is not None:
-            self._job.abandoned = True
-        if _pool is self:
-            _pool = None
-        for lock in self._start:
-            _open(lock)
-        for barrier in self._barriers.values():
-            barrier.open()
+        """End the threads, each after what it is doing."""
+        for _ in range(self._size):
+            self._commands.put(None)
 
 
-_pool: _Pool | None = None
-_pool_making = threading.Lock()
+def _error_of(command: Command) -> BaseException | None:
+    try:
+        command()
+    except BaseException as error:
+        return error
+    return None
 
 
-def _pool_of(size: int) -> _Pool:
-    """Return the pool with at least this many threads."""
-    global _pool
-    with _pool_making:
-        if _pool is None or _pool.size < size:
-            old, _pool = _pool, _Pool(size)
-            if old is not None and old.busy.acquire(blocking=False):
-                old.close()
-                old.busy.release()
-        return _pool
+_pool = _Pool()
 
 
-def _forget_pool() -> None:
-    """Drop the pool in a forked process, which has none of its parent's threads."""
-    global _pool, _pool_making
-    _pool, _pool_making = None, threading.Lock()
+def _begin_anew() -> None:
+    """Make new threads and locks in a forked process, which has none of its parent's threads."""
+    global _pool, _recording
+    _pool, _recording = _Pool(), threading.Lock()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_pool)
+    os.register_at_fork(after_in_child=_begin_anew)
 
 
 def _run(phases: SequenceOf[SequenceOf[Command]]) -> None:
-    threads = max((len(commands) for commands in phases), default=1)
-    if threads > 1:
-        pool = _pool_of(threads)
-        # Another thread of the caller's may be using it, or a kernel's launch be inside one: then these run in order.
-        if pool.busy.acquire(blocking=False):
-            try:
-                if not pool.closed:
-                    pool.run(phases, threads)
-                    return
-            finally:
-                pool.busy.release()
-                if pool is not _pool:  # a larger one has taken its place meanwhile
-                    pool.close()
-    for commands in phases:
-        for command in commands:
-            command()
+    """Run phases of commands one after the other, those of a phase at once."""
+    global _pool
+    pool = _pool
+    # Another thread of the caller's may be using them, or a launch be inside one: then these run in order.
+    if not any(len(commands) > 1 for commands in phases) or not pool.busy.acquire(blocking=False):
+        for commands in phases:
+            _run_all(commands)
+        return
+    try:
+        for commands in phases:
+            if len(commands) > 1:
+                pool.run(commands)
+            else:
+                _run_all(commands)
+    except BaseException:
+        # After an interrupt others may still be at work, and nobody waits for them any more. The lock stays closed.
+        _pool = _Pool()
+        pool.close()
+        raise
+    pool.busy.release()

@@ -38,6 +38,7 @@ def make_cloth(
     device: wp.Device,
     *,
     curves: bool = True,
+    linear: bool = False,
     held: FloatArray | None = None,
 ) -> Cloth:
     """Return the fabric as the membrane's kernels take it.
@@ -47,6 +48,7 @@ def make_cloth(
         axes: unit vectors of warp and weft in the plane.
         device: for its arrays.
         curves: use its J-shaped curves; otherwise its secant stiffnesses only.
+        linear: plane stress alone, paper eq. (3), also under compression: no curves, no wrinkling, no locking.
         held: 3 #C, stiffness in the step's matrix at each cell's corners [N/m]; needed for forces only.
     """
     cloth = Cloth()
@@ -56,22 +58,16 @@ def make_cloth(
     cloth.shear = fabric.shear_stiffness
     cloth.k_warp, cloth.k_weft = fabric.stiffness_warp, fabric.stiffness_weft
     # Half of a thread's own stiffness: then the step is no stiffer than along the threads.
-    cloth.lock = 0.5 * min(fabric.stiffness_warp, fabric.stiffness_weft)
-    cloth.compression = fabric.compression_factor
+    cloth.lock = 0.0 if linear else 0.5 * min(fabric.stiffness_warp, fabric.stiffness_weft)
+    cloth.compression = 1.0 if linear else fabric.compression_factor
     for direction in ("warp", "weft"):
-        strain, tension = _points(fabric, direction, curves)
+        points: Curve = getattr(fabric, f"curve_{direction}") if curves and not linear else ()
+        points = points or ((1.0, getattr(fabric, f"stiffness_{direction}")),)
+        strain, tension = np.array([(0.0, 0.0), *points]).T
         setattr(cloth, f"strain_{direction}", wp.array(strain, dtype=wp.float64, device=device))
         setattr(cloth, f"tension_{direction}", wp.array(tension, dtype=wp.float64, device=device))
     cloth.held = wp.array(np.zeros(0) if held is None else held, dtype=wp.float64, device=device)
     return cloth
-
-
-def _points(fabric: Fabric, direction: str, curves: bool) -> tuple[FloatArray, FloatArray]:
-    points: Curve = getattr(fabric, f"curve_{direction}") if curves else ()
-    if not points:
-        points = ((1.0, getattr(fabric, f"stiffness_{direction}")),)
-    strain, tension = np.array([(0.0, 0.0), *points]).T
-    return strain, tension
 
 
 def step_matrix(

@@ -45,8 +45,7 @@ from warpflat.core.sorting import counting_sort
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells
 from warpflat.kernels.constraints import Seams, compute_seam_residuals
-from warpflat.kernels.guard import compute_guard_energy, evaluate_guard, evaluate_guard_potential
-from warpflat.kernels.guard_cell import ThreadGuard
+from warpflat.kernels.guard import ThreadGuard, compute_guard_energy, evaluate_guard, evaluate_guard_potential
 from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.line_solve import ThreadLines
 from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane, evaluate_membrane_potential

@@ -19,13 +19,10 @@ from warpflat.core.sorting import counting_sort
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.stiffness import (
     Lattice,
-    find_directions,
     find_sides,
     list_springs,
     measure_edges,
     measure_shear_stiffness,
-    pick_values,
-    weigh_hourglass,
     weigh_quads,
     weigh_triangles,
 )
@@ -59,6 +56,8 @@ _BUCKLING_SHARE = 0.75
 # follow edges up to the second angle.
 _ALIGNED, _OFF_GRAIN = np.deg2rad([7.5, 15.0])
 _QUARTER = np.pi / 2
+# A quad whose middle lines enclose an angle with less than this squared sine has no shape to keep.
+_LEAST_SINE_SQUARED = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +85,7 @@ class SpringsAround:
 
     def listed(self, values: FloatArray) -> FloatArray:
         """Return the springs' values (#S) at both of their ends, 2 #S."""
-        listed = np.empty(len(self.neighbor))
-        given = [self.entry, np.ascontiguousarray(values, dtype=np.float64)]
-        launch_each(pick_values, len(listed), given, [listed])
-        return listed
+        return np.asarray(values, dtype=np.float64)[self.entry]
 
     @property
     def count(self) -> int:
@@ -242,12 +238,36 @@ def _weigh_quads(
         shear_deficit[np.flatnonzero(is_quad)[lacking]] = deficit[lacking]
     unstable = np.flatnonzero(stabilisation)
     if len(unstable):
-        weights, hourglass = np.empty((len(unstable), 4)), np.zeros((len(faces), 4))
-        launch_each(
-            weigh_hourglass, len(unstable), [surface.vertices, quads[unstable], stabilisation[unstable]], [weights]
+        hourglass = np.zeros((len(faces), 4))
+        hourglass[np.flatnonzero(is_quad)[unstable]] = hourglass_weights(
+            surface.vertices[quads[unstable]], stabilisation[unstable]
         )
-        hourglass[np.flatnonzero(is_quad)[unstable]] = weights
     return diagonal, shear_deficit, hourglass
+
+
+def hourglass_weights(corners: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Return weights with which a quad stores 1/2 |sum of weight_k p_k|^2 [J], p its corners in the plane.
+
+    They are +1, -1, +1, -1, less the same mode of the quad's shape on the body, so that this shape under any uniform
+    strain stores nothing (Flanagan and Belytschko 1981), times the root of the stiffness.
+
+    Args:
+        corners: #Q by 4 by 3, on the body [m].
+        stiffness: #Q [N/m].
+
+    Returns:
+        #Q by 4 [(N/m)^1/2]; zero for a quad whose middle lines enclose next to no angle, which has no shape to keep.
+    """
+    p0, p1, p2, p3 = np.moveaxis(corners, 1, 0)
+    u, v, h = 0.5 * ((p1 - p0) + (p2 - p3)), 0.5 * ((p3 - p0) + (p2 - p1)), (p0 - p1) + (p2 - p3)
+    uu, vv, uv, hu, hv = ((a * b).sum(axis=1) for a, b in ((u, u), (v, v), (u, v), (h, u), (h, v)))
+    det = uu * vv - uv * uv
+    has_shape = det > _LEAST_SINE_SQUARED * uu * vv
+    det = np.where(has_shape, det, 1.0)
+    along_u, along_v = 0.5 * (hu * vv - hv * uv) / det, 0.5 * (hv * uu - hu * uv) / det
+    mode = np.array([[1.0, -1.0, 1.0, -1.0]])
+    mode = mode + np.outer(along_u, [1.0, -1.0, -1.0, 1.0]) + np.outer(along_v, [1.0, 1.0, -1.0, -1.0])
+    return np.asarray(mode * np.where(has_shape, np.sqrt(stiffness), 0.0)[:, None])
 
 
 def _listed_stiffness(surface: Surface, own: _SpringGeometry, of_side: FloatArray, diagonal: FloatArray) -> FloatArray:
@@ -310,10 +330,12 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
     The angle between cells and grain is that of the whole piece (the mean over its cells, taken with the fourfold
     symmetry of a grid).
     """
-    fourfold = np.empty((len(quads), 2))
-    launch_each(find_directions, len(quads), [positions, quads, wp.vec2d(*warp)], [fourfold])
-    # A row of complex numbers is summed many times as fast as two columns of reals.
-    mean = complex(fourfold.view(np.complex128).sum())
+    # Vectors as complex numbers: a row of these is summed many times as fast as two columns of reals.
+    p = positions.view(np.complex128)[:, 0]
+    along = ((p[quads[:, 1]] - p[quads[:, 0]]) + (p[quads[:, 2]] - p[quads[:, 3]])) * complex(warp[0], -warp[1])
+    length = np.abs(along)
+    twofold = (np.where(length > 0.0, along, 1.0) / np.where(length > 0.0, length, 1.0)) ** 2
+    mean = complex((twofold * twofold).sum())
     angle = float(np.angle(mean)) / 4.0
     across = np.array([-warp[1], warp[0]])
     lattice = Lattice()

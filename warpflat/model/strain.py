@@ -7,6 +7,7 @@ flat than on the body is in tension when worn.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import warp as wp
@@ -14,14 +15,9 @@ import warp as wp
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.fabric.fabric import Fabric, grain_axes
-from warpflat.kernels.strain import (
-    Membrane,
-    average_over_faces,
-    compute_membrane_strain,
-    compute_strain_energy,
-    compute_worn_strain,
-)
-from warpflat.model.membrane import Model, make_cloth, plane_stress
+from warpflat.kernels.membrane_cell import Cloth
+from warpflat.kernels.strain import average_over_faces, compute_worn_strain
+from warpflat.model.membrane import Model, make_cloth
 from warpflat.model.network import SpringNetwork
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
@@ -33,7 +29,6 @@ __all__ = [
     "WornStrain",
     "face_areas",
     "layout_errors",
-    "make_membrane",
     "strain_energy",
     "worn_cell_strain",
     "worn_strain",
@@ -42,17 +37,6 @@ __all__ = [
 
 # A cell smaller in the plane than this share of its area on the body is crushed to a point or a line.
 _COLLAPSED = 1e-9
-
-
-def make_membrane(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
-    """Return the fabric as an orthotropic sheet in plane stress, c_warp = K_warp / (1 - nu_12 nu_21) and so on."""
-    warp, weft = grain_axes(grain_angle)
-    membrane = Membrane()
-    membrane.warp, membrane.weft = wp.vec2d(*warp), wp.vec2d(*weft)
-    membrane.isotropic = int(fabric.is_isotropic)
-    membrane.c_warp, membrane.c_weft, membrane.c_cross = plane_stress(fabric)
-    membrane.shear = fabric.shear_stiffness
-    return membrane
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,14 +81,7 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
 
 def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
     """Return the strain energy of a layout (#V by 2 [m]), the sum of the faces' energies of `worn_strain` [J]."""
-    if network.model == "membrane":
-        return float(worn_cell_strain(network, positions, network.model)[2].numpy().sum())
-    device = network.device
-    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
-    energy = wp.empty(network.face_count, dtype=wp.float64, device=device)
-    given = [at, network.cells, make_membrane(network.fabric, network.grain_angle)]
-    launch_each(compute_strain_energy, network.face_count, given, [energy], device=device)
-    return float(energy.numpy().sum())
+    return float(worn_cell_strain(network, positions, network.model)[2].numpy().sum())
 
 
 def worn_cell_strain(network: SpringNetwork, positions: FloatArray, law: Model) -> list[wp.array]:
@@ -116,12 +93,14 @@ def worn_cell_strain(network: SpringNetwork, positions: FloatArray, law: Model) 
     device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     cells = _worn_arrays(network.cell_count, device)
-    kernel, cloth = compute_worn_strain, make_membrane(network.fabric, network.grain_angle)
-    if law == "membrane":
-        kernel, cloth = compute_membrane_strain, make_cloth(network.fabric, grain_axes(network.grain_angle), device)
-    inputs = [at, network.cells, cloth]
-    launch_each(kernel, network.face_count, inputs, cells, device=device)
+    cloth = _cloth(network.fabric, network.grain_angle, device.alias, law)
+    launch_each(compute_worn_strain, network.face_count, [at, network.cells, cloth], cells, device=device)
     return cells
+
+
+@lru_cache
+def _cloth(fabric: Fabric, grain_angle: float, device: str, law: Model) -> Cloth:
+    return make_cloth(fabric, grain_axes(grain_angle), wp.get_device(device), linear=law == "springs")
 
 
 def _worn_arrays(count: int, device: wp.Device) -> list[wp.array]:
