@@ -7,14 +7,13 @@ and of that only what is still as it was written, so that a file which somebody 
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from warpflat.core.atomic_files import is_input, latest_file, remove_file
 from warpflat.core.errors import InputError
-from warpflat.core.json_file import write_json
+from warpflat.core.json_file import read_json, write_json
 
 __all__ = ["record_file", "remove_stale", "require_own_metrics", "write_metrics"]
 
@@ -129,11 +128,12 @@ def _read(folder: Path) -> dict[str, Any]:
         InputError: it is something else by that name.
     """
     file = folder / "metrics.json"
-    try:
-        data = json.loads(latest_file(file).read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    latest = latest_file(file)
+    if not latest.exists():
         return {}
-    except (OSError, ValueError, RecursionError):
+    try:
+        data = read_json(latest, noted=False)
+    except InputError:
         data = None
     if not isinstance(data, dict) or "warpflat" not in data:
         raise InputError(

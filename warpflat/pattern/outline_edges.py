@@ -28,18 +28,21 @@ def chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> lis
     Raises:
         InputError: they do not close.
     """
-    left = list(parts)
-    chain = [left.pop(0)]
-    while left:
-        end = chain[-1][2][-1]
-        distances = [(np.linalg.norm(points[k] - end), n, k) for n, (_, _, points) in enumerate(left) for k in (0, -1)]
-        distance, number, at = min(distances)
-        name, kind, points = left.pop(number)
-        if distance > _SAME:
+    chain = [parts[0]]
+    # The last end of each line stands before its first: of two that are as near, the line is turned.
+    ends = np.array([points[[-1, 0]] for _, _, points in parts])
+    ends[0] = np.inf
+    while len(chain) < len(parts):
+        distances = np.linalg.norm(ends - chain[-1][2][-1], axis=2)
+        number, at = divmod(int(distances.argmin()), 2)
+        ends[number] = np.inf
+        name, kind, points = parts[number]
+        if not distances[number, at] <= _SAME:
             raise InputError(
-                f"{where}: edge {chain[-1][0]!r} ends {1e3 * distance:.1f} mm from the next, {name!r}; edges must share their corners"
+                f"{where}: edge {chain[-1][0]!r} ends {1e3 * distances[number, at]:.1f} mm from the next, {name!r}; "
+                "edges must share their corners"
             )
-        chain.append((name, kind, points if at == 0 else points[::-1]))
+        chain.append((name, kind, points if at == 1 else points[::-1]))
     gap = float(np.linalg.norm(chain[-1][2][-1] - chain[0][2][0]))
     if gap > _SAME:
         raise InputError(f"{where}: the outline is open by {1e3 * gap:.1f} mm; its edges must close")
