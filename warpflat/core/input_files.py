@@ -24,6 +24,7 @@ __all__ = [
     "Place",
     "check_regular",
     "check_values",
+    "guarded",
     "is_among",
     "listening_to_reads",
     "note_read",
@@ -103,15 +104,29 @@ def reading(
     Raises:
         InputError: the file cannot be read, for whatever reason.
     """
-    file, form, place = Path(path), FORMATS[kind], Place()
+    file = Path(path)
     if noted:
         note_read(file)
+    with guarded(file, kind, missing=missing) as place:
+        check_regular(file, FORMATS[kind].most)
+        yield place
+
+
+@contextmanager
+def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator[Place]:
+    """Guard what is done with the content of a file that has been read, or of a folder: see :func:`reading`.
+
+    Raises:
+        InputError: whatever went wrong.
+    """
+    form, place = FORMATS[kind], Place()
     try:
-        check_regular(file, form.most)
         yield place
     except InputError as error:
-        where = "" if str(error).startswith(str(file)) else f"{file}: "
-        raise InputError(f"{where}{error}") from error
+        told = str(error)
+        for before in (place.at, str(file)):
+            told = told if told.startswith((before, str(file))) else f"{before}: {told}"
+        raise InputError(told) from error
     except FileNotFoundError as error:
         if error.filename is not None and Path(error.filename) != file:
             raise InputError(f"{file}: needs {error.filename}, which is missing") from None
@@ -166,7 +181,7 @@ def _similar_file(path: Path) -> str:
     except (OSError, ValueError):
         return ""
     close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.7)
-    return f"; did you mean {str(path.parent / close[0])!r}?" if close else ""
+    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def check_values(data: Any, *, depth_only: bool = False) -> None:

@@ -21,12 +21,12 @@ from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split
 from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_words import seams_of_words
 
-__all__ = ["check_closed", "outermost", "read_dxf", "read_quantity"]
+__all__ = ["MOST_POINTS", "check_closed", "outermost", "read_dxf", "read_quantity"]
 
 # Curves are flattened to within this [m].
 _FLAT = 2e-5
-# Points of a drawing, at most: a pattern of several sizes has some ten thousand.
-_MOST_POINTS = 1_000_000
+#: Points of a drawing, at most: a pattern of several sizes has some ten thousand.
+MOST_POINTS = 1_000_000
 _METRES = {"METRIC": 1e-3, "ENGLISH": 0.0254}
 # The header's $INSUNITS, where no text names the units: inches, feet, millimetres, centimetres, metres.
 _METRES_OF_HEADER = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0}
@@ -98,7 +98,7 @@ def _garment(path: Path, allowance: float | None, place: Place) -> Garment:
     units = next((text for text in (each.value("UNITS") for each in found.values()) if text), "")
     metres = _METRES.get(units.upper(), _METRES_OF_HEADER.get(document.header.get("$INSUNITS", 0), 1e-3))
     for name, entities in layouts:
-        _add_lines(found[name], entities, metres, _MOST_POINTS - sum(each.count for each in found.values()), place)
+        _add_lines(found[name], entities, metres, MOST_POINTS - sum(each.count for each in found.values()), place)
     place.at = ""
     style, blocks = found[""], [(name, found[name]) for name, _ in layouts[1:]]
     pieces, words = list[Piece](), dict[tuple[str, str], list[tuple[str, str, str]]]()
@@ -160,15 +160,18 @@ def check_closed(lines: Sequence[FloatArray], loops: Iterable[FloatArray], metre
     """
     import shapely
 
-    closed = [shapely.Polygon(ring).buffer(0) for ring in loops if len(ring) > 2]
-    pieces, least = shapely.union_all(closed), _LEAST_SHARE * max((each.area for each in closed), default=0.0)
+    closed = np.array([shapely.Polygon(ring) for ring in loops if len(ring) > 2])
+    pieces, least = shapely.STRtree(closed), _LEAST_SHARE * max((each.area for each in closed), default=0.0)
     for chain in shapely.get_parts(
         shapely.line_merge(shapely.MultiLineString([line for line in lines if len(line) > 1]))
     ):
         points = np.array(chain.coords)
         gap, area = float(np.linalg.norm(points[-1] - points[0])), float(shapely.convex_hull(chain).area)
         round_something = len(points) > 2 and area > max(least, _LEAST_SHARE * (0.25 * chain.length) ** 2)
-        if round_something and gap < _NEARLY_CLOSED * chain.length and not pieces.intersects(chain.centroid):
+        if not round_something or gap >= _NEARLY_CLOSED * chain.length:
+            continue
+        # An outline may cross itself: of a point alone it is told whether it lies within.
+        if not shapely.intersects(closed[pieces.query(chain.centroid)], chain.centroid).any():
             at = ", ".join(f"{1e3 * metres * x:.0f}" for x in points[0])
             raise InputError(
                 f"{where}: an outline is open by {1e3 * metres * gap:.1f} mm at ({at}) mm; join its ends, for a piece is a closed line"
@@ -238,7 +241,7 @@ def _add_lines(found: _Block, entities: Iterable[Any], metres: float, most: int,
         points = points[np.linalg.norm(np.diff(points, axis=0, prepend=np.inf), axis=1) > 1e-9]
         found.count += len(points)
         if found.count > most:
-            raise InputError(f"the drawing has more than {_MOST_POINTS:,} points; leave out all but the pattern")
+            raise InputError(f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern")
         if len(points) > 1:
             closed = bool(np.linalg.norm(points[0] - points[-1]) < 1e-6 * max(1.0, float(np.ptp(points))))
             found.lines.setdefault(layer, []).append((points[:-1] if closed else points, closed))

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import reading
+from warpflat.core.input_files import guarded
 from warpflat.core.json_file import read_json
 from warpflat.core.text import quote_value
 from warpflat.core.toml_file import check_table
@@ -51,7 +51,7 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
     """
     path = Path(path)
     data = read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
-    with reading(path, "JSON"):
+    with guarded(path, "JSON"):
         return pattern_from_json(data)
 
 

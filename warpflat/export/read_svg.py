@@ -17,7 +17,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, Place, reading
 from warpflat.core.text import quote_value
-from warpflat.export.read_dxf import check_closed, outermost, read_quantity
+from warpflat.export.read_dxf import MOST_POINTS, check_closed, outermost, read_quantity
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
 from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_words import seams_of_words
@@ -31,6 +31,7 @@ _SAMPLES = np.linspace(0.0, 1.0, 25)[1:]
 _KINDS = {"sew": "seam", "hem": "hem", "fold": "fold", "dart": "dart"}
 # Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
 _DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
+_TOO_MANY = f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern"
 _LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
@@ -193,9 +194,13 @@ def _own_piece(group: ET.Element, matrix: FloatArray, words: dict[str, list[tupl
 def _other_pieces(root: ET.Element, page: FloatArray, allowance: float, file: str, place: Place) -> list[Piece]:
     found: dict[int, tuple[FloatArray, str]] = {}
     unclosed = list[FloatArray]()
+    total = 0
     for element, matrix in _walk(root, page):
         place.at = f"{element.tag.rpartition('}')[2]} {quote_value(element.get('id', ''))}"
         for points, closed in _lines(element, matrix):
+            total += len(points)
+            if total > MOST_POINTS:
+                raise InputError(_TOO_MANY)
             if closed:
                 found[id(points)] = points, element.get(_LABEL) or element.get("id") or ""
             else:
@@ -247,7 +252,11 @@ def _flatten(text: str) -> Iterator[tuple[FloatArray, bool]]:
     pen: Any = RecordingPen()
     parse_path(text, pen)
     points: list[FloatArray] = []
+    count = 0
     for command, args in pen.value:
+        count += len(_SAMPLES) if command in ("curveTo", "qCurveTo") else 1
+        if count > MOST_POINTS:
+            raise InputError(_TOO_MANY)
         control = [np.array(point, dtype=np.float64) for point in args]
         if command == "moveTo":
             points = [control[0][None]]

@@ -16,6 +16,8 @@ __all__ = ["chain_edges", "find_darts", "inset", "split_outline"]
 
 # Ends that are closer than this are one corner [m].
 _SAME = 5e-4
+# An outline of more points is made simpler: what lies within this [m] of its curve is left out.
+_MOST_POINTS, _FLAT = 5000, 2e-5
 
 
 def chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> list[Edge]:
@@ -61,9 +63,20 @@ def split_outline(ring: FloatArray, corners: FloatArray | None = None) -> list[E
     Args:
         ring: #P by 2 [m], the first point not repeated.
         corners: #C by 2 [m], known ones; else where the line turns by more than 35 degrees.
+
+    Raises:
+        InputError: the line has too many points that are not needed for its curves.
     """
     if np.linalg.norm(ring[0] - ring[-1]) < 1e-7:
         ring = ring[:-1]
+    if len(ring) > _MOST_POINTS:
+        import shapely
+
+        ring = np.asarray(shapely.LineString(ring).simplify(_FLAT, preserve_topology=False).coords)
+        if len(ring) > _MOST_POINTS:
+            raise InputError(
+                f"an outline has {len(ring):,} points that do not lie in its curves, {_MOST_POINTS:,} are the most; smooth it"
+            )
     if _area(ring) < 0.0:
         ring = ring[::-1]
     if corners is not None and len(corners) > 1:

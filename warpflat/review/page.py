@@ -14,8 +14,10 @@ from typing import Any
 from warpflat.core.activity import report_activity
 from warpflat.core.atomic_files import atomic_path, latest_file
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import guarded
+from warpflat.core.json_file import read_json
 from warpflat.export.colours import SMALLEST_SCALE
-from warpflat.review.film import open_film, pack_film
+from warpflat.review.film import open_film, pack_film, pack_foreign_film
 from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
 
 __all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
@@ -34,13 +36,7 @@ def read_run(folder: Path) -> tuple[dict[str, Any], list[str], str]:
         InputError: there is no `metrics.json` of warpflat.
     """
     path = folder / "metrics.json"
-    try:
-        metrics = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"cannot read {path}: {reason}; give the folder of a run") from None
-    except (ValueError, RecursionError):
-        metrics = None
+    metrics = read_json(path, missing="no such file; give the folder of a run")
     if not isinstance(metrics, dict) or not isinstance(metrics.get("pieces"), dict) or not metrics["pieces"]:
         raise InputError(f"{path}: is not of a run of warpflat; give the folder that `warpflat run` has written")
     files = metrics.get("files")
@@ -62,7 +58,8 @@ def review_folder(folder: str | Path) -> Path:
     folder = Path(folder)
     metrics, files, name = read_run(folder)
     with output_folder(folder, ["review.html"]):
-        write_review(folder, metrics, files, name=name)
+        with guarded(folder, "JSON"):
+            write_review(folder, metrics, files, name=name, film=lambda: pack_foreign_film(folder / "frames.usdc"))
         record_file(folder, name, "review.html")
     return folder / "review.html"
 
@@ -101,14 +98,11 @@ def write_review(
         pictures: of :func:`pack_pictures`, those that were packed before.
 
     Raises:
-        InputError: a file cannot be read as what it is, or the page cannot be written.
+        InputError: the film cannot be read, or the page cannot be written.
     """
     report_activity("writing the review page")
     path = folder / "review.html"
-    try:
-        page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)), pictures or {})
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
-        raise InputError(f"{folder}: a file of the run is damaged ({error}); run the scene again") from error
+    page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)), pictures or {})
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path.name
