@@ -16,6 +16,7 @@ from random import Random
 import click
 from tqdm import tqdm
 
+from .foreign_files import FOREIGN_ENDINGS
 from .known_faults import known_faults
 from .mutations import SHARES, random_case
 from .promise import Case, Verdict, Worker
@@ -62,6 +63,7 @@ def _save(case: Case, number: int) -> Path:
         "metrics": "metrics.json",
         "scan": "scan.obj",
         "arguments": "arguments.json",
+        **{kind: ending[1:] for ending, kind in FOREIGN_ENDINGS.items()},
     }.get(case.kind, f"{case.kind}.toml" if name.endswith(".toml") else case.kind)
     file = FOUND / f"{number}.{ending}"
     file.write_bytes(content)

@@ -6,6 +6,9 @@ NAME.fabric.toml                                                     listed, and
 NAME.pattern.json                                                    exported in all formats
 NAME.metrics.json                                                    in the folder of results before a run
 NAME.scan.obj                                                        made a mannequin
+NAME.dxf, .svg, .garmentcode.json                                    its edges listed by `drape --edges`; .rul too
+NAME.sewing.toml                                                     beside a DXF
+NAME.frames.usdc, .lift.obj, .runmetrics.json, .runpattern.json      in the folder of a run: reviewed, exported, draped
 NAME.arguments.json                                                  a list of strings: the command line
 
 NAME says what the file has, such as `one_vertex_far_away`. A file must keep the promise, and may be refused or not;
@@ -17,6 +20,7 @@ from __future__ import annotations
 import gzip
 from pathlib import Path
 
+from .foreign_files import FOREIGN_ENDINGS, foreign_cases_of_file
 from .promise import Case
 from .seeds import MESHES, case_of_file
 
@@ -30,6 +34,7 @@ _TWO_ENDINGS = {
     ".metrics.json": "metrics",
     ".scan.obj": "scan",
     ".arguments.json": "arguments",
+    **FOREIGN_ENDINGS,
 }
 
 
@@ -42,7 +47,8 @@ def cases_of(file: Path) -> list[Case]:
     if kind not in (*MESHES, "usd", *_TWO_ENDINGS.values()):
         raise ValueError(f"{file}: the name tells no kind; see {__name__}")
     refused = True if ".refused." in name else False if ".accepted." in name else None
-    return case_of_file(kind, content, name=name.partition(".")[0], refused=refused)
+    read = foreign_cases_of_file if kind in FOREIGN_ENDINGS.values() else case_of_file
+    return read(kind, content, name=name.partition(".")[0], refused=refused)
 
 
 def regression_files() -> list[Path]:

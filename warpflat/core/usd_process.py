@@ -18,7 +18,9 @@ from warpflat.core.memory_limit import require_memory_for_usd
 
 __all__ = ["UNREADABLE", "answer", "read_apart"]
 
-UNREADABLE = "not a readable USD file: damaged, cut short, or with values of another type than its schema's"
+UNREADABLE = (
+    "not a readable USD file: damaged, cut short, or with values of another type than its schema's; write it again"
+)
 
 # Memory that reading may take beside the library's own, and more per byte of the file, since lists of corners pack tightly [bytes].
 _MEMORY, _MEMORY_PER_BYTE = 2**30, 200

@@ -122,7 +122,7 @@ def open_film(path: Path) -> list[FilmPiece]:
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
-        raise InputError(f"{path}: is not a USD file that can be opened; run the scene again") from error
+        raise InputError("is not a USD file that can be opened; run the scene again") from error
     found = [FilmPiece(stage, prim) for prim in stage.GetDefaultPrim().GetChildren() if prim.GetChild("pattern")]
     return [piece for piece in found if piece.times]
 
