@@ -196,8 +196,7 @@ def foreign_cases_of_file(kind: str, content: bytes, *, name: str = "odd", refus
         files = {f"out/{file}": data for file, data in run_folder().items()} | {member: content}
         review = case(("review", "out", "--quiet"), files, member, "*")
         export = case(("export", "out", "--format", "svg", "--format", "dxf", "--quiet"), files, member, "*")
-        # It names what is wrong with the pattern, or that it has no seams.
-        drape = case(("drape", "out", "--quiet"), files, member, "*")
+        drape = case(("drape", "out", "--edges"), files, member)
         return {"frames": [review], "lift": [drape], "runmetrics": [review, export], "runpattern": [export, drape]}[
             kind
         ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -91,6 +92,8 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
 def _garment(path: Path, allowance: float | None, place: Place) -> Garment:
     from ezdxf import recover
 
+    # Its log goes nowhere, but to the handlers of a program that has its own.
+    logging.getLogger("ezdxf").addHandler(logging.NullHandler())
     document: Any = recover.readfile(str(path))[0]
     space = document.modelspace()
     layouts = [("", space), *((block.name, block) for block in document.blocks if not block.name.startswith("*"))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import xml.etree.ElementTree as ET
@@ -249,6 +250,7 @@ def _flatten(text: str) -> Iterator[tuple[FloatArray, bool]]:
     from fontTools.pens.recordingPen import RecordingPen  # type: ignore[import-untyped]
     from fontTools.svgLib.path import parse_path  # type: ignore[import-untyped]
 
+    logging.getLogger("fontTools").addHandler(logging.NullHandler())
     pen: Any = RecordingPen()
     parse_path(text, pen)
     points: list[FloatArray] = []
