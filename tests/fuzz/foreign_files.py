@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
 from .promise import Case
 
-__all__ = ["FOREIGN_ENDINGS", "FOREIGN_SHARES", "foreign_case", "foreign_cases_of_file"]
+__all__ = ["FOREIGN_ENDINGS", "FOREIGN_SHARES", "foreign_bounds", "foreign_case", "foreign_cases_of_file"]
 
 FOREIGN_SHARES = {
     "dxf": 10, "svg": 10, "sewing": 3, "garmentcode": 3, "rul": 1, "frames": 3, "lift": 4, "runmetrics": 4, "runpattern": 3,
@@ -206,3 +209,39 @@ def foreign_cases_of_file(kind: str, content: bytes, *, name: str = "odd", refus
     if kind == "rul":
         return [case(("drape", file), {file: content}, file)]
     return [case(("drape", file, "--edges"), {file: content}, file)]
+
+
+def foreign_bounds() -> Iterator[Case]:
+    """Drawings that are too much, a second for each thousand of their entities; devices in the place of files."""
+    head = _tags((0, "SECTION"), (2, "ENTITIES"))
+    star = [
+        _tags((0, "LINE"), (8, 1), (10, 0), (20, 0), (11, f"{1e3 * math.cos(k):.3f}"), (21, f"{1e3 * math.sin(k):.3f}"))
+        for k in range(20_000)
+    ]
+    circles = [_tags((0, "CIRCLE"), (8, 1), (10, k % 100 * 30), (20, k // 100 * 30), (40, 40)) for k in range(10_000)]
+    rings = [_tags((0, "CIRCLE"), (8, 1), (10, 0), (20, 0), (40, 1 + 0.01 * k)) for k in range(10_000)]
+    for name, entities in (("star of lines", star), ("chain of circles", circles), ("concentric circles", rings)):
+        content = (head + "".join(entities) + _tags((0, "ENDSEC"), (0, "EOF"))).encode()
+        yield from _too_much("dxf", content, f"dxf: a {name}", len(entities) / 1000)
+    page = '<svg xmlns="http://www.w3.org/2000/svg" width="1000mm" viewBox="0 0 1000 1000"><path d="M{} Z"/></svg>'
+    for turn, name in ((2e-5 * math.pi, "circle"), (1.0, "star")):
+        points = (f"{500 + 400 * math.cos(turn * k):.4f},{500 + 400 * math.sin(turn * k):.4f}" for k in range(100_000))
+        yield from _too_much("svg", page.format(" L".join(points)).encode(), f"svg: a {name} of 100,000 points", 100)
+    for file, arguments in (
+        ("odd.dxf", ("drape", "odd.dxf", "--edges")),
+        ("odd.svg", ("drape", "odd.svg", "--edges")),
+        ("odd.toml", ("run", "odd.toml")),
+        ("odd.toml", ("batch", "odd.toml")),
+        ("odd.obj", ("flatten", "odd.obj", "--units", "m")),
+        ("odd.usda", ("flatten", "odd.usda")),
+        ("out/metrics.json", ("review", "out")),
+        ("out/pattern.json", ("export", "out", "--format", "svg")),
+        ("out/pattern.json", ("drape", "out", "--edges")),
+    ):
+        words = f"{arguments[0]}: {file} is a link to /dev/zero"
+        yield Case("device", {"out/empty": b""}, arguments, links={file: "/dev/zero"}, name=words, refused=True)
+
+
+def _too_much(kind: str, content: bytes, name: str, seconds: float) -> Iterator[Case]:
+    for case in foreign_cases_of_file(kind, content):
+        yield replace(case, name=name, seconds=max(seconds, 20.0))
