@@ -50,6 +50,8 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
         InputError: the file is missing, no JSON, of another schema, or does not hold together.
     """
     path = Path(path)
+    if path.parent.is_file():
+        raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies")
     data = read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
     with guarded(path, "JSON"):
         return pattern_from_json(data)

@@ -58,7 +58,7 @@ def review_folder(folder: str | Path) -> Path:
     folder = Path(folder)
     metrics, files, name = read_run(folder)
     with output_folder(folder, ["review.html"]):
-        with guarded(folder, "JSON"):
+        with guarded(folder / "metrics.json", "JSON"):
             write_review(folder, metrics, files, name=name, film=lambda: pack_foreign_film(folder / "frames.usdc"))
         record_file(folder, name, "review.html")
     return folder / "review.html"
