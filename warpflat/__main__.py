@@ -23,6 +23,8 @@ def program() -> int:
     # Dense matrices have some hundred rows. A second thread of OpenBLAS gains nothing there, and while other processes run it waits for a
     # core: a fifth of the processor time of a block.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # USD prints a banner for each of its settings in the environment, in every process that loads it.
+    os.environ.setdefault("TF_ENV_SETTING_ALERTS_ENABLED", "0")
     _silence_libraries()
     code: int | None = None
     try:
