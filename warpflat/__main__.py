@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 
+from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.signals import end_at_once, ignore_at_exit
 
 __all__ = ["program"]
@@ -23,17 +24,22 @@ def program() -> int:
     # Dense matrices have some hundred rows. A second thread of OpenBLAS gains nothing there, and while other processes run it waits for a
     # core: a fifth of the processor time of a block.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # USD prints a banner for each of its settings in the environment, in every process that loads it.
+    os.environ.setdefault("TF_ENV_SETTING_ALERTS_ENABLED", "0")
     _silence_libraries()
-    from warpflat.cli.main import main
-
     code: int | None = None
     try:
+        from warpflat.cli.main import main
+
         code = main()
-        return code
+    except Exception as error:
+        # While the commands are imported; `main` itself lets nothing through.
+        code = report_internal_error(error, sys.argv[1:])
     finally:
         end_at_once(code)
         # All files are closed; to look for what is unreachable once more before the process ends takes half a second.
         gc.freeze()
+    return code
 
 
 def _silence_libraries() -> None:

@@ -17,6 +17,7 @@ import click
 from tqdm import tqdm
 
 from .folders import packed
+from .foreign_files import FOREIGN_ENDINGS
 from .known_faults import known_faults
 from .mutations import SHARES, random_case
 from .promise import Case, Verdict, Worker
@@ -68,6 +69,7 @@ def _save(case: Case, number: int) -> Path:
         "scan": "scan.obj",
         "arguments": "arguments.json",
         "studio": "studio.json",
+        **{kind: ending[1:] for ending, kind in FOREIGN_ENDINGS.items()},
     }.get(case.kind, f"{case.kind}.toml" if name.endswith(".toml") else case.kind)
     file = FOUND / f"{number}.{ending}"
     file.write_bytes(content)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .foreign_files import foreign_bounds
 from .mutations import DIGITS, NAMES
 from .promise import Case, Environment
 from .regressions import cases_of, regression_files
@@ -318,5 +319,6 @@ GROUPS = {
     "meshes": _meshes,
     "usd": _usd_files,
     "command lines": _command_lines,
+    "bounds": foreign_bounds,
 }
 """The faults that need no process of their own."""

@@ -17,6 +17,7 @@ from typing import Any
 import click
 
 from . import seeds, studio_messages
+from .foreign_files import FOREIGN_SHARES, foreign_case
 from .geometry import GEOMETRY_SHARES, geometry_case
 from .promise import Case
 
@@ -230,13 +231,15 @@ def toml_text(table: dict[str, Any]) -> str:
     return "".join(f"{json.dumps(key)} = {_toml_value(value)}\n" for key, value in table.items())
 
 
-def _damaged_toml(random: Random, text: str) -> bytes:
+def damaged_toml(random: Random, text: str) -> bytes:
+    """A file of TOML with a damage of its bytes or its tables."""
     if random.randrange(3) == 0:
         return damaged_bytes(random, text.encode())
     return _spelled(toml_text(damaged_structure(random, tomllib.loads(text))))
 
 
-def _damaged_json(random: Random, value: Any) -> bytes:
+def damaged_json(random: Random, value: Any) -> bytes:
+    """A file of JSON with a damage of its bytes or its data."""
     if random.randrange(4) == 0:
         return damaged_bytes(random, json.dumps(value).encode())
     return _spelled(json.dumps(damaged_structure(random, value)))
@@ -294,22 +297,24 @@ def random_case(kind: str, random: Random) -> Case:
         from .folders import random_folder
 
         return random_folder(kind, random)
+    if kind in FOREIGN_SHARES:
+        return foreign_case(kind, random)
     if kind == "arguments":
         content = json.dumps(odd_arguments(random)).encode()
     elif kind == "scene":
         slow = random.randrange(20) == 19
-        content = _damaged_toml(random, seeds.FORM_SCENE if slow else random.choice(list(seeds.SCENES.values())))
+        content = damaged_toml(random, seeds.FORM_SCENE if slow else random.choice(list(seeds.SCENES.values())))
         content = _MUCH_WORK.sub(rb"\g<1>5", content)
     elif kind == "fabric":
-        content = _damaged_toml(random, seeds.FABRIC)
+        content = damaged_toml(random, seeds.FABRIC)
     elif kind == "pattern":
-        content = _damaged_json(random, seeds.pattern())
+        content = damaged_json(random, seeds.pattern())
     elif kind == "metrics":
-        content = _damaged_json(random, seeds.METRICS)
+        content = damaged_json(random, seeds.METRICS)
     elif kind == "scan":
         content = damaged_bytes(random, random.choice(seeds.bodies()))
     elif kind == "gltf" and random.randrange(2):
-        content = _damaged_json(random, json.loads(seeds.meshes("gltf")[0]))
+        content = damaged_json(random, json.loads(seeds.meshes("gltf")[0]))
     else:
         content = damaged_bytes(random, random.choice(seeds.meshes(kind)))
     return random.choice(seeds.case_of_file(kind, content))
@@ -317,7 +322,7 @@ def random_case(kind: str, random: Random) -> Case:
 
 SHARES = {
     "obj": 9, "ply": 10, "stl": 6, "off": 7, "glb": 6, "gltf": 6, "usda": 6, "usdc": 7, "usdz": 3, "scene": 12, "fabric": 9, "pattern": 11,
-    "metrics": 4, "scan": 1, "arguments": 12, "batch": 6, "result": 4, "folder": 6, **GEOMETRY_SHARES,
+    "metrics": 4, "scan": 1, "arguments": 12, "batch": 6, "result": 4, "folder": 6, **GEOMETRY_SHARES, **FOREIGN_SHARES,
 }  # fmt: skip
 """How many of a hundred cases, or so, are of which kind: few where one takes seconds."""
 if find_spec("viser") is not None:  # the extra `studio`

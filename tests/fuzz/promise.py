@@ -291,7 +291,7 @@ class Worker:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env={**os.environ, "WARPFLAT_THREADS": "1"},
+            env={**os.environ, "WARPFLAT_THREADS": "1", "WARPFLAT_TRACEBACK": "1"},
         )
         warm = Case("obj", {"cloth.obj": WARM}, ("flatten", "cloth.obj", "--units", "m", "--out", "out"), seconds=300)
         self.run(warm)  # compiles and loads the kernels, which no case shall pay for

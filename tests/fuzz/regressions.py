@@ -6,6 +6,9 @@ NAME.fabric.toml                                                     listed, and
 NAME.pattern.json                                                    exported in all formats
 NAME.metrics.json                                                    in the folder of results before a run
 NAME.scan.obj                                                        made a mannequin
+NAME.dxf, .svg, .garmentcode.json                                    its edges listed by `drape --edges`; .rul too
+NAME.sewing.toml                                                     beside a DXF
+NAME.frames.usdc, .lift.obj, .runmetrics.json, .runpattern.json      in the folder of a run: reviewed, exported, draped
 NAME.arguments.json                                                  a list of strings: the command line
 NAME.studio.json                                                     done to the studio, as studio_messages says
 NAME.folder.json                                                     files, links and command line (see `folders.py`)
@@ -21,6 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from .folders import unpacked
+from .foreign_files import FOREIGN_ENDINGS, foreign_cases_of_file
 from .promise import Case
 from .seeds import MESHES, case_of_file
 from .studio_messages import attack_case
@@ -36,6 +40,7 @@ _TWO_ENDINGS = {
     ".scan.obj": "scan",
     ".arguments.json": "arguments",
     ".studio.json": "studio",
+    **FOREIGN_ENDINGS,
 }
 
 
@@ -52,7 +57,8 @@ def cases_of(file: Path) -> list[Case]:
     refused = True if ".refused." in name else False if ".accepted." in name else None
     if kind == "studio":
         return [attack_case(content, refused=refused)]
-    return case_of_file(kind, content, name=name.partition(".")[0], refused=refused)
+    read = foreign_cases_of_file if kind in FOREIGN_ENDINGS.values() else case_of_file
+    return read(kind, content, name=name.partition(".")[0], refused=refused)
 
 
 def regression_files() -> list[Path]:

@@ -20,6 +20,7 @@ from warpflat.cli.drape import drape
 from warpflat.cli.export import export
 from warpflat.cli.fabrics import fabrics
 from warpflat.cli.flatten import flatten
+from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.review import review
@@ -29,6 +30,7 @@ from warpflat.cli.studio import studio
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
 from warpflat.core.optional_files import listening_to_left_out
+from warpflat.core.source_date import source_date
 from warpflat.core.text import one_line
 
 __all__ = ["cli", "main"]
@@ -94,6 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
     _open_stderr()
     try:
+        source_date()
         code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
         return code if isinstance(code, int) else DONE
     except InputError as error:
@@ -110,11 +113,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of a pipe, such as head, has what it wanted.
         sys.stderr.close()
         return DONE
-    except (MemoryError, RuntimeError, ImportError, OSError) as error:
-        if is_out_of_memory(error):
+    except Exception as error:
+        if isinstance(error, MemoryError | RuntimeError | ImportError | OSError) and is_out_of_memory(error):
             return _fail(f"not enough memory: {_memory_words(error)}; use a coarser mesh, or give it more memory")
         if not isinstance(error, OSError):
-            raise
+            return report_internal_error(error, sys.argv[1:] if arguments is None else arguments)
         reason = (error.strerror or str(error)).lower()
         if error.filename is None and _was_printing(error):
             _discard_output()

@@ -21,6 +21,7 @@ Exit codes:
   1    done, but a piece did not converge, has flipped faces or lies over itself, in whatever size, or no
        pattern could be drawn
   2    bad input; one line says what is wrong, where, and what would be right
+  70   an internal error, which is the program's own fault; WARPFLAT_TRACEBACK=1 prints its traceback
   129  the terminal was closed
   130  interrupted
   143  terminated"""

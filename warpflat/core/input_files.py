@@ -1,19 +1,219 @@
-"""Input files are recorded here, so that a run never replaces one of them."""
+"""The door for files that others made: each is recorded, so that a run never replaces it, bounded, and read under one guard."""
 
 from __future__ import annotations
 
+import difflib
 import os
-from collections.abc import Callable, Iterable, Iterator
+import stat
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.errors import CannotWriteError
+from warpflat.core.errors import CannotWriteError, InputError
+from warpflat.core.memory_limit import is_out_of_memory, memory_limit
+from warpflat.core.text import control_in, one_line, quote_value
 
-__all__ = ["is_among", "listening_to_reads", "note_read", "noting_resolver", "refuse_to_replace"]
+__all__ = [
+    "FARTHEST",
+    "FORMATS",
+    "RIGHT_NUMBER",
+    "FileFormat",
+    "Place",
+    "check_regular",
+    "check_values",
+    "guarded",
+    "is_among",
+    "listening_to_reads",
+    "note_read",
+    "noting_resolver",
+    "reading",
+    "refuse_to_replace",
+]
 
 Listener = Callable[[Path], object]
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """What is read of a format.
+
+    Attributes:
+        name: as messages have it, with its article.
+        most: the size of a file [bytes], at most; what it is read into takes some five times as much.
+        right: what would be right, where a file cannot be read.
+    """
+
+    name: str
+    most: int
+    right: str
+
+
+_MEGABYTE = 1_000_000
+#: The formats that are read, by their names for `reading`.
+FORMATS: Mapping[str, FileFormat] = {
+    "TOML": FileFormat("TOML", 4 * _MEGABYTE, "give a text file in TOML"),
+    "JSON": FileFormat("JSON", 200 * _MEGABYTE, "run the scene again"),
+    "DXF": FileFormat("a DXF pattern", 50 * _MEGABYTE, "export it again as DXF R12, outlines as closed polylines"),
+    "SVG": FileFormat("an SVG pattern", 20 * _MEGABYTE, "export it again as plain SVG, outlines as closed paths"),
+    "mesh": FileFormat("a mesh", 500 * _MEGABYTE, "export it again with vertices and faces alone"),
+    "piece": FileFormat("a piece of a run", 500 * _MEGABYTE, "run the scene again"),
+    "film": FileFormat("the film of a run", 4000 * _MEGABYTE, "run the scene again"),
+    "start": FileFormat("a start", 500 * _MEGABYTE, "give an OBJ file with texture coordinates"),
+}
+#: No coordinate of a surface or a pattern is larger [m].
+FARTHEST = 1e4
+# Tables and lists of a file lie in at most so many others.
+_DEEPEST = 50
+# Texts of several lines may have these; what reads a name refuses them.
+_BLANKS = "\t\n\r"
+#: What a message says of a whole number that is too large.
+RIGHT_NUMBER = "a whole number is written in 64 bits, up to 9223372036854775807"
+# Letters of a library's words that a message quotes.
+_LONGEST_REASON = 120
+
+
+@dataclass
+class Place:
+    """Where in a file its reader is.
+
+    Attributes:
+        at: in words, such as "line 3"; a message about the file begins with it.
+    """
+
+    at: str = ""
+
+
+@contextmanager
+def reading(
+    path: str | os.PathLike[str], kind: str, *, missing: str = "no such file", noted: bool = True
+) -> Iterator[Place]:
+    """Guard the reading of a file that others made: whatever goes wrong in the block is one line about the file.
+
+    The file is reported as by :func:`note_read`, and must be as :func:`check_regular` asks. A reader that knows where it is says so in
+    the `Place` that is yielded. Errors of input that the block raises are passed on, with the file's name before them.
+
+    Args:
+        path: of the file.
+        kind: a key of `FORMATS`.
+        missing: what is said where there is no such file.
+        noted: whether it is reported; not what a run reads of its own folder.
+
+    Raises:
+        InputError: the file cannot be read, for whatever reason.
+    """
+    file = Path(path)
+    if noted:
+        note_read(file)
+    with guarded(file, kind, missing=missing) as place:
+        check_regular(file, FORMATS[kind].most)
+        yield place
+
+
+@contextmanager
+def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator[Place]:
+    """Guard what is done with the content of a file that has been read, or of a folder: see :func:`reading`.
+
+    Raises:
+        InputError: whatever went wrong.
+    """
+    form, place = FORMATS[kind], Place()
+    try:
+        yield place
+    except InputError as error:
+        told = str(error)
+        for before in (place.at, str(file)):
+            told = told if told.startswith((before, str(file))) else f"{before}: {told}"
+        raise InputError(told) from error
+    except FileNotFoundError as error:
+        if error.filename is not None and Path(error.filename) != file:
+            raise InputError(f"{file}: needs {error.filename}, which is missing") from None
+        raise InputError(f"{file}: {missing}{_similar_file(file)}") from None
+    except Exception as error:
+        at = f"{place.at}: " if place.at else ""
+        if is_out_of_memory(error):
+            told = ", ".join(filter(None, ["not enough memory to read it", memory_limit()]))
+            raise InputError(f"{file}: {at}{told}; give a smaller file, or more memory") from error
+        if isinstance(error, OSError):
+            raise InputError(f"{file}: {at}cannot be read: {(error.strerror or str(error)).lower()}") from error
+        raise InputError(f"{file}: {at}cannot be read as {form.name} ({_reason(error)}); {form.right}") from error
+
+
+def _reason(error: Exception) -> str:
+    """Return why a library could not read a file, in its words where it has some."""
+    if isinstance(error, RecursionError):
+        return "nested too deeply"
+    words = one_line(str(error))[:_LONGEST_REASON]
+    # A missing key's only word is the key.
+    return f"{type(error).__name__} {words}".strip() if isinstance(error, LookupError) or not words else words
+
+
+def check_regular(path: Path, most: int) -> None:
+    """Check that a path is that of a regular file of bounded size: a pipe would be waited for, and a device never ends.
+
+    Args:
+        path: of the file.
+        most: bytes that it may have.
+
+    Raises:
+        InputError: without the file's name: it is something else, or larger.
+        OSError: there is no such file.
+    """
+    try:
+        found = path.stat()
+    except ValueError as error:  # a name with NUL in it
+        raise InputError(f"cannot be read: {error}") from None
+    if stat.S_ISDIR(found.st_mode):
+        raise InputError("is a directory; give the name of a file")
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError("is a pipe or a device; give a regular file")
+    if found.st_size > most:
+        raise InputError(
+            f"has {found.st_size / _MEGABYTE:,.0f} MB; at most {most / _MEGABYTE:,.0f} MB are read of this kind of file"
+        )
+
+
+def _similar_file(path: Path) -> str:
+    try:
+        names = [entry.name for entry in path.parent.iterdir()]
+    except (OSError, ValueError):
+        return ""
+    close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.7)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def check_values(data: Any, *, depth_only: bool = False) -> None:
+    """Check data of a file: tables are not nested too deeply, whole numbers fit into 64 bits, texts have no control characters.
+
+    Args:
+        data: tables, lists, numbers and texts.
+        depth_only: whether only the nesting is checked.
+
+    Raises:
+        InputError: without the file's name: the first that is not.
+    """
+    todo: list[tuple[str, int, Any]] = [("", 0, data)]
+    for key, depth, value in todo:
+        where = f"{key}: " if key else ""
+        if depth > _DEEPEST:
+            raise InputError(f"{where}nested too deeply; tables and lists may lie in at most {_DEEPEST} others")
+        if isinstance(value, dict):
+            for name, below in value.items():
+                inner = f"{key}.{name}" if key else name
+                if not depth_only and (letter := control_in(name, _BLANKS)):
+                    raise InputError(f"{inner}: the key has the control character {letter!r} in it; leave it out")
+                todo.append((inner, depth + 1, below))
+        elif isinstance(value, list):
+            todo += [(key, depth + 1, below) for below in value]
+        elif depth_only:
+            continue
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise InputError(f"{where}{quote_value(value)} is too large; {RIGHT_NUMBER}")
+        elif isinstance(value, str) and (letter := control_in(value, _BLANKS)):
+            raise InputError(f"{where}{quote_value(value)} has the control character {letter!r} in it; leave it out")
+
 
 _listeners: ContextVar[tuple[Listener, ...]] = ContextVar("readers", default=())
 
@@ -48,6 +248,8 @@ def noting_resolver(file: Path) -> Any:
         def get(self, name: str) -> bytes:
             for place in (name.strip(), name.strip().lstrip("/"), Path(name).name):  # where trimesh looks for it
                 note_read(Path(self.parent) / place)
+                if (Path(self.parent) / place).exists():
+                    check_regular(Path(self.parent) / place, FORMATS["mesh"].most)
             return bytes(super().get(name))
 
     return Noting(str(file))

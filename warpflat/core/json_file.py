@@ -1,4 +1,4 @@
-"""`metrics.json`: plain JSON at full precision."""
+"""JSON files: read under the guard of all input, and written plain at full precision."""
 
 from __future__ import annotations
 
@@ -6,13 +6,31 @@ import json
 import math
 import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from warpflat.core.atomic_files import atomic_path
+from warpflat.core.input_files import check_values, reading
 
-__all__ = ["plain_json", "write_json"]
+__all__ = ["plain_json", "read_json", "write_json"]
+
+
+def read_json(path: Path, *, missing: str = "no such file", noted: bool = True) -> Any:
+    """Read the data of a file.
+
+    Args:
+        path: of the file.
+        missing, noted: as of :func:`warpflat.core.input_files.reading`.
+
+    Raises:
+        InputError: it cannot be read, is no JSON, or is nested too deeply.
+    """
+    with reading(path, "JSON", missing=missing, noted=noted):
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
+        check_values(data, depth_only=True)
+    return data
 
 
 def write_json(path: str | os.PathLike[str], data: Mapping[str, Any]) -> None:

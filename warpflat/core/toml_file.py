@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.input_files import note_read
-from warpflat.core.text import control_in, quote_value
+from warpflat.core.input_files import RIGHT_NUMBER, check_values, reading
+from warpflat.core.text import quote_value
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -25,11 +25,6 @@ else:
 __all__ = ["Table", "check_table", "document_as_toml", "read_toml", "tables_as_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
-
-_RIGHT_NUMBER = "a whole number is written in 64 bits, up to 9223372036854775807"
-_DEEPEST = 50
-# Texts of several lines may have these; what reads a name refuses them.
-_BLANKS = "\t\n\r"
 
 
 class Table(BaseModel):
@@ -44,55 +39,17 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         InputError: no such file, a directory, unreadable, or not TOML (with the line).
     """
-    note_read(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")  # as some editors save it, with a byte order mark
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file{_similar_file(path)}") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a directory; give a .toml file") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is not a text file (byte {error.start}); give a .toml file in UTF-8") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
-    except ValueError:  # Python turns no more than 4300 digits into a number
-        raise InputError(f"{path}: has a number of thousands of digits; {_RIGHT_NUMBER}") from None
-    except RecursionError:
-        raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
-    _check_values(tables, path)
+    with reading(path, "TOML"):
+        try:
+            tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors save it with a byte order mark
+        except UnicodeDecodeError as error:
+            raise InputError(f"is not a text file (byte {error.start}); give a .toml file in UTF-8") from None
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"is not valid TOML: {error}") from None
+        except ValueError:  # Python turns no more than 4300 digits into a number
+            raise InputError(f"has a number of thousands of digits; {RIGHT_NUMBER}") from None
+        check_values(tables)
     return tables
-
-
-def _check_values(tables: dict[str, Any], path: Path) -> None:
-    """Check that whole numbers fit into 64 bits, that texts have no control characters, and that tables are not nested too deeply.
-
-    Raises:
-        InputError: the first that is not.
-    """
-    todo: list[tuple[str, int, Any]] = [("", 0, tables)]
-    for key, depth, value in todo:
-        if depth > _DEEPEST:
-            raise InputError(f"{path}: {key}: nested too deeply; tables and lists may lie in at most {_DEEPEST} others")
-        if isinstance(value, dict):
-            for name, below in value.items():
-                inner = f"{key}.{name}" if key else name
-                if letter := control_in(name, _BLANKS):
-                    raise InputError(
-                        f"{path}: {inner}: the key has the control character {letter!r} in it; leave it out"
-                    )
-                todo.append((inner, depth + 1, below))
-        elif isinstance(value, list):
-            todo += [(key, depth + 1, below) for below in value]
-        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
-            raise InputError(f"{path}: {key}: {quote_value(value)} is too large; {_RIGHT_NUMBER}")
-        elif isinstance(value, str) and (letter := control_in(value, _BLANKS)):
-            raise InputError(
-                f"{path}: {key}: {quote_value(value)} has the control character {letter!r} in it; leave it out"
-            )
 
 
 def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") -> Model:
@@ -197,17 +154,6 @@ def _guess(given: Any, annotation: Any) -> str:
 
     options = [str(x) for m in _members(annotation) if get_origin(m) is Literal for x in get_args(m)]
     return f"; {nearest(str(given), options)}" if options else ""
-
-
-def _similar_file(path: Path) -> str:
-    import difflib
-
-    try:
-        names = [p.name for p in path.parent.iterdir()]
-    except OSError:
-        return ""
-    close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.7)
-    return f"; did you mean {str(path.parent / close[0])!r}?" if close else ""
 
 
 def tables_as_toml(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import note_read
+from warpflat.core.input_files import FARTHEST, reading
 from warpflat.draping.whole_pieces import MIRRORED
 from warpflat.pattern.pieces import Piece
 
@@ -31,10 +31,10 @@ def read_lift(path: Path) -> Lift:
     Raises:
         InputError: the file cannot be read, or has no pattern.
     """
-    note_read(path)
     space, flat, faces = [], [], []
-    try:
-        for line in path.read_text(encoding="utf-8").splitlines():
+    with reading(path, "piece") as place:
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            place.at = f"line {number}"
             key, *words = line.split()[:5] or [""]
             if key == "v":
                 space.append([float(word) for word in words[:3]])
@@ -43,13 +43,17 @@ def read_lift(path: Path) -> Lift:
             elif key == "f":
                 corners = [[int(part) - 1 for part in word.split("/")[:2]] for word in words]
                 faces += [[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)]
+        place.at = ""
+        if not faces:
+            raise InputError("has no faces 'f v/vt'; run the scene again")
         triangles = np.array(faces, dtype=np.int64).reshape(-1, 3, 2)
+        # A run writes no negative numbers, which NumPy would count from the end.
+        if triangles.min() < 0:
+            raise InputError("refers to a vertex before its first; run the scene again")
         surface, pattern = np.array(space)[triangles[:, :, 0]], np.array(flat)[triangles[:, :, 1]]
-    except (OSError, ValueError, IndexError) as error:
-        raise InputError(f"{path}: cannot be read as a piece of a run ({error}); run the scene again") from None
-    if not len(triangles):
-        raise InputError(f"{path}: has no faces 'f v/vt'; run the scene again")
-    inverse = np.linalg.pinv(np.stack([pattern[:, 1] - pattern[:, 0], pattern[:, 2] - pattern[:, 0]], axis=-1))
+        if not (np.abs(surface).max() < FARTHEST and np.abs(pattern).max() < FARTHEST):
+            raise InputError(f"a vertex lies farther than {FARTHEST:g} m off; run the scene again")
+        inverse = np.linalg.pinv(np.stack([pattern[:, 1] - pattern[:, 0], pattern[:, 2] - pattern[:, 0]], axis=-1))
     tree = cKDTree(pattern.mean(axis=1))
 
     def lift(points: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import datetime, timezone
+from datetime import datetime
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import turning_angles
+from warpflat.core.source_date import source_date
 from warpflat.core.text import control_in, plain_letters
 from warpflat.export.grade_rules import grade_rules, write_rul
 from warpflat.export.letters import titles
@@ -73,7 +74,7 @@ def write_dxf(
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
     for size in chosen:
         garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
-    scale, created = UNITS[units], created or _now()
+    scale, created = UNITS[units], created or source_date()
     rules = grade_rules(garment, chosen) if rul is not None and len(chosen) > 1 else None
     blocks, space = list[str](), list[str]()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
@@ -100,23 +101,6 @@ def write_dxf(
         stream.write(_tags((0, "EOF")))
     if rules is not None and rul is not None:
         write_rul(rules, rul, name=table, dialect=dialect, units=units, scale=scale, created=created)
-
-
-def _now() -> datetime:
-    """Return the present, or the time that SOURCE_DATE_EPOCH [s] names, so that a repeat gives the same bytes.
-
-    Raises:
-        InputError: the variable is no number of seconds.
-    """
-    given = os.environ.get("SOURCE_DATE_EPOCH")
-    if not given:
-        return datetime.now().astimezone()
-    try:
-        return datetime.fromtimestamp(int(given), tz=timezone.utc)
-    except (ValueError, OverflowError, OSError):
-        raise InputError(
-            f"SOURCE_DATE_EPOCH = {given!r}: it must be whole seconds since 1970, such as 1700000000"
-        ) from None
 
 
 def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +16,18 @@ from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import note_read
+from warpflat.core.input_files import FARTHEST, Place, reading
+from warpflat.core.text import quote_value
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
 from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_words import seams_of_words
 
-__all__ = ["check_closed", "outermost", "read_dxf"]
+__all__ = ["MOST_POINTS", "check_closed", "outermost", "read_dxf", "read_quantity"]
 
 # Curves are flattened to within this [m].
 _FLAT = 2e-5
+#: Points of a drawing, at most: a pattern of several sizes has some ten thousand.
+MOST_POINTS = 1_000_000
 _METRES = {"METRIC": 1e-3, "ENGLISH": 0.0254}
 # The header's $INSUNITS, where no text names the units: inches, feet, millimetres, centimetres, metres.
 _METRES_OF_HEADER = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0}
@@ -39,13 +45,17 @@ class _Block:
     lines: dict[str, list[tuple[FloatArray, bool]]] = field(default_factory=dict)
     points: dict[str, list[FloatArray]] = field(default_factory=dict)
     texts: list[tuple[str, str, FloatArray]] = field(default_factory=list)
+    count: int = 0
+    _loops: dict[str, list[FloatArray]] = field(default_factory=dict)
 
     def closed(self, layer: str) -> list[FloatArray]:
         return [points for points, closed in self.lines.get(layer, []) if closed]
 
     def loops(self, layer: str) -> list[FloatArray]:
         """Return the closed lines of a layer, and those that its open lines form together (#P by 2 each)."""
-        return [*self.closed(layer), *_joined(self.open(layer))]
+        if layer not in self._loops:
+            self._loops[layer] = [*self.closed(layer), *_joined(self.open(layer))]
+        return self._loops[layer]
 
     def open(self, layer: str) -> list[FloatArray]:
         return [points for points, closed in self.lines.get(layer, []) if not closed]
@@ -74,22 +84,26 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
     Raises:
         InputError: the file cannot be read, has no piece, or an outline does not close.
     """
-    import ezdxf
+    path = Path(path)
+    with reading(path, "DXF") as place:
+        return _garment(path, allowance, place)
+
+
+def _garment(path: Path, allowance: float | None, place: Place) -> Garment:
     from ezdxf import recover
 
-    path = Path(path)
-    note_read(path)
-    try:
-        document: Any = recover.readfile(str(path))[0]
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, ezdxf.DXFError, ValueError, KeyError, AttributeError, TypeError) as error:
-        raise InputError(f"{path}: cannot be read as DXF ({str(error)[:80]})") from None
+    # Its log goes nowhere, but to the handlers of a program that has its own.
+    logging.getLogger("ezdxf").addHandler(logging.NullHandler())
+    document: Any = recover.readfile(str(path))[0]
     space = document.modelspace()
-    style = _collect(space)
-    blocks = [(block.name, _collect(block)) for block in document.blocks if not block.name.startswith("*")]
-    units = next((text for text in (each.value("UNITS") for _, each in [("", style), *blocks]) if text), "")
+    layouts = [("", space), *((block.name, block) for block in document.blocks if not block.name.startswith("*"))]
+    found = {name: _texts(entities, place) for name, entities in layouts}
+    units = next((text for text in (each.value("UNITS") for each in found.values()) if text), "")
     metres = _METRES.get(units.upper(), _METRES_OF_HEADER.get(document.header.get("$INSUNITS", 0), 1e-3))
+    for name, entities in layouts:
+        _add_lines(found[name], entities, metres, MOST_POINTS - sum(each.count for each in found.values()), place)
+    place.at = ""
+    style, blocks = found[""], [(name, found[name]) for name, _ in layouts[1:]]
     pieces, words = list[Piece](), dict[tuple[str, str], list[tuple[str, str, str]]]()
     # Other programs draw on layers of their own; a block that is not in the drawing, such as an arrow, is no piece then.
     inserted = {entity.dxf.name for entity in space if entity.dxftype() == "INSERT"}
@@ -126,11 +140,19 @@ def outermost(loops: Iterable[FloatArray]) -> list[FloatArray]:
 
     rings = [(ring, shapely.Polygon(ring)) for ring in loops if len(ring) > 2]
     rings = sorted((pair for pair in rings if pair[1].area > 0.0), key=lambda pair: -pair[1].area)
-    found: list[tuple[FloatArray, Any]] = []
-    for ring, polygon in rings:
-        if not any(other.contains(polygon.representative_point()) for _, other in found):
-            found.append((ring, polygon))
-    return [ring for ring, _ in found]
+    polygons = np.array([polygon for _, polygon in rings])
+    shapely.prepare(polygons)
+    tree, found = shapely.STRtree(polygons), np.zeros(len(rings), dtype=bool)
+    for number, polygon in enumerate(polygons):
+        inside = polygon.representative_point()
+        around = tree.query(inside)
+        found[number] = not shapely.contains(polygons[around[found[around]]], inside).any()
+    return [rings[number][0] for number in np.flatnonzero(found)]
+
+
+def read_quantity(text: str) -> int:
+    """Return how often a piece is cut, as a file has it; 1 where it is no number from 1 to 999."""
+    return int(text) if re.fullmatch(r"\s*0*[1-9][0-9]{0,2}\s*", text) else 1
 
 
 def check_closed(lines: Sequence[FloatArray], loops: Iterable[FloatArray], metres: float, where: str) -> None:
@@ -141,15 +163,18 @@ def check_closed(lines: Sequence[FloatArray], loops: Iterable[FloatArray], metre
     """
     import shapely
 
-    closed = [shapely.Polygon(ring).buffer(0) for ring in loops if len(ring) > 2]
-    pieces, least = shapely.union_all(closed), _LEAST_SHARE * max((each.area for each in closed), default=0.0)
+    closed = np.array([shapely.Polygon(ring) for ring in loops if len(ring) > 2])
+    pieces, least = shapely.STRtree(closed), _LEAST_SHARE * max((each.area for each in closed), default=0.0)
     for chain in shapely.get_parts(
         shapely.line_merge(shapely.MultiLineString([line for line in lines if len(line) > 1]))
     ):
         points = np.array(chain.coords)
         gap, area = float(np.linalg.norm(points[-1] - points[0])), float(shapely.convex_hull(chain).area)
         round_something = len(points) > 2 and area > max(least, _LEAST_SHARE * (0.25 * chain.length) ** 2)
-        if round_something and gap < _NEARLY_CLOSED * chain.length and not pieces.intersects(chain.centroid):
+        if not round_something or gap >= _NEARLY_CLOSED * chain.length:
+            continue
+        # An outline may cross itself: of a point alone it is told whether it lies within.
+        if not shapely.intersects(closed[pieces.query(chain.centroid)], chain.centroid).any():
             at = ", ".join(f"{1e3 * metres * x:.0f}" for x in points[0])
             raise InputError(
                 f"{where}: an outline is open by {1e3 * metres * gap:.1f} mm at ({at}) mm; join its ends, for a piece is a closed line"
@@ -164,9 +189,11 @@ def _joined(lines: Sequence[FloatArray]) -> list[FloatArray]:
         return []
     ends = np.concatenate([line[[0, -1]] for line in lines])
     step = _MEET * max(float(np.ptp(ends, axis=0).max()), 1e-9)
-    # Ends that meet get the same place: the first of them.
-    first = cKDTree(ends).query_ball_point(ends, step)
-    place = ends[[min(near) for near in first]].reshape(len(lines), 2, 2)
+    # Ends that meet get the same place: the first of them. Those in one cell of a fine grid are as one, as the middle of a star.
+    _, sample, cell = np.unique(np.floor(ends / (0.25 * step)), axis=0, return_index=True, return_inverse=True)
+    near = cKDTree(ends[sample]).query_ball_point(ends[sample], step)
+    first = np.array([sample[each].min() for each in near])
+    place = ends[first[cell.ravel()]].reshape(len(lines), 2, 2)
     strings = [
         shapely.LineString(np.concatenate([place[k, :1], line[1:-1], place[k, 1:]])) for k, line in enumerate(lines)
     ]
@@ -174,27 +201,59 @@ def _joined(lines: Sequence[FloatArray]) -> list[FloatArray]:
     return [np.array(ring.exterior.coords)[:-1] for ring in rings]
 
 
-def _collect(space: Any) -> _Block:
+def _texts(entities: Iterable[Any], place: Place) -> _Block:
+    """Return the texts and the points of a block."""
+    found = _Block()
+    for entity in entities:
+        kind, layer = entity.dxftype(), str(entity.dxf.layer)
+        if kind in ("TEXT", "MTEXT", "POINT"):
+            place.at = f"{kind} on layer {quote_value(layer)}"
+            at = _finite(np.array(tuple(entity.dxf.location if kind == "POINT" else entity.dxf.insert)[:2]))
+            if kind == "POINT":
+                found.points.setdefault(layer, []).append(at)
+            else:
+                text = entity.dxf.text if kind == "TEXT" else entity.plain_text()
+                found.texts.append((layer, str(text).strip(), at))
+    return found
+
+
+def _add_lines(found: _Block, entities: Iterable[Any], metres: float, most: int, place: Place) -> None:
+    """Add the lines of a block to it, curves flattened; what has no length is left out.
+
+    Raises:
+        InputError: a coordinate is no number or far off, or there are more than `most` points.
+    """
     from ezdxf.path import make_path
 
-    found = _Block()
-    for entity in space:
+    for entity in entities:
         kind, layer = entity.dxftype(), str(entity.dxf.layer)
-        if kind in ("TEXT", "MTEXT"):
-            text = entity.dxf.text if kind == "TEXT" else entity.plain_text()
-            found.texts.append((layer, str(text).strip(), np.array(tuple(entity.dxf.insert)[:2])))
-        elif kind == "POINT":
-            found.points.setdefault(layer, []).append(np.array(tuple(entity.dxf.location)[:2]))
-        elif kind in ("POLYLINE", "LWPOLYLINE", "LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE"):
-            path = make_path(entity)
-            points = np.array([tuple(p)[:2] for p in path.flattening(_FLAT * 1e3)]).reshape(-1, 2)
-            kept = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])
-            points = points[kept]
-            if len(points) < 2:
-                continue
+        if kind not in ("POLYLINE", "LWPOLYLINE", "LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE"):
+            continue
+        place.at = f"{kind} on layer {quote_value(layer)}"
+        if kind == "POLYLINE" and not (entity.is_2d_polyline or entity.is_3d_polyline):
+            raise InputError("is a surface, not a line; a pattern is drawn with lines in the plane")
+        if kind == "SPLINE" and max(len(entity.control_points), len(entity.fit_points)) < 2:
+            continue
+        path = make_path(entity)
+        corners = np.array([tuple(corner)[:2] for corner in path.control_vertices()]).reshape(-1, 2)
+        if np.abs(corners * metres).max(initial=0.0) > FARTHEST or not np.isfinite(corners).all():
+            raise InputError(f"reaches farther than {FARTHEST:g} m, or has a coordinate that is no number")
+        # At once all points of a curve would take gigabytes.
+        flat = islice(path.flattening(_FLAT / metres), most - found.count + 1)
+        points = np.array([tuple(point)[:2] for point in flat]).reshape(-1, 2)
+        points = points[np.linalg.norm(np.diff(points, axis=0, prepend=np.inf), axis=1) > 1e-9]
+        found.count += len(points)
+        if found.count > most:
+            raise InputError(f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern")
+        if len(points) > 1:
             closed = bool(np.linalg.norm(points[0] - points[-1]) < 1e-6 * max(1.0, float(np.ptp(points))))
             found.lines.setdefault(layer, []).append((points[:-1] if closed else points, closed))
-    return found
+
+
+def _finite(at: FloatArray) -> FloatArray:
+    if not np.isfinite(at).all():
+        raise InputError("its place is no number")
+    return at
 
 
 def _piece(
@@ -207,7 +266,7 @@ def _piece(
 ) -> Piece:
     """Return the piece of a block; add what is sewn to its edges to `words`, by size and piece."""
     name, size = block.value("PIECE NAME") or block_name, block.value("SIZE")
-    quantity = block.value("QUANTITY").split(",")[0].strip()
+    quantity = read_quantity(block.value("QUANTITY").split(",")[0])
     parts, sewn = _named_parts(block, metres)
     darts = []
     if parts:
@@ -219,7 +278,7 @@ def _piece(
         edges = _edges_without_names(block, metres, allowance, where)
     grain = [points * metres for points, _ in block.lines.get("7", []) if len(points) > 1]
     return Piece(
-        name=name, size=size, edges=edges, darts=darts, quantity=int(quantity) if quantity.isdigit() else 1,
+        name=name, size=size, edges=edges, darts=darts, quantity=quantity,
         grain=_upwards(grain[0][[0, -1]]) if grain else None, fabric=block.value("FABRIC"),
     )  # fmt: skip
 
@@ -234,12 +293,14 @@ def _named_parts(block: _Block, metres: float) -> tuple[list[tuple[str, str, Flo
         (layer, points) for layer in ("14", "8", "6") for points, closed in block.lines.get(layer, []) if not closed
     ]
     parts, sewn, last = list[tuple[str, str, FloatArray]](), list[tuple[str, str]](), ""
-    # The name stands on a point of its line, and on no other line's.
+    # The name stands on the middle point of its line, and on no other line's.
+    middles = np.array([_middle(points) for _, points in lines]).reshape(-1, 2)
     for _, text, at in block.texts:
-        if text.startswith("EDGE: ") and lines:
+        if text.startswith("EDGE: ") and len(parts) < len(lines):
             last = text.removeprefix("EDGE: ")
-            off = [_distance(points, at) for _, points in lines]
-            layer, points = lines.pop(int(np.argmin(off)))
+            nearest_line = int(np.linalg.norm(middles - at, axis=1).argmin())
+            middles[nearest_line] = np.inf
+            layer, points = lines[nearest_line]
             parts.append((last, {"6": "fold", "8": "dart"}.get(layer, "seam"), points * metres))
         elif text.startswith("SEAM: ") and last:
             sewn.append((last, text.removeprefix("SEAM: ")))
@@ -255,10 +316,8 @@ def _is_leg(points: FloatArray, tips: Sequence[FloatArray]) -> bool:
     return any(np.linalg.norm(points[end] - tip) < 1e-6 for tip in tips for end in (0, -1))
 
 
-def _distance(points: FloatArray, at: FloatArray) -> float:
-    """Return the distance of a point from a line's middle point, or from its points."""
-    middle = points[len(points) // 2] if len(points) > 2 else points.mean(axis=0)
-    return float(np.linalg.norm(middle - at))
+def _middle(points: FloatArray) -> FloatArray:
+    return points[len(points) // 2] if len(points) > 2 else points.mean(axis=0)
 
 
 def _edges_without_names(block: _Block, metres: float, allowance: float | None, where: str) -> list[Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,8 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import guarded
+from warpflat.core.json_file import read_json
 from warpflat.core.text import quote_value
 from warpflat.core.toml_file import check_table
 from warpflat.export.pattern_json import SCHEMA
@@ -49,20 +50,11 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
         InputError: the file is missing, no JSON, of another schema, or does not hold together.
     """
     path = Path(path)
-    try:
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; a run leaves a pattern.json in its folder") from None
-    except NotADirectoryError:
-        raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies") from None
-    except RecursionError:
-        raise InputError(f"{path}: cannot be read as JSON (nested too deeply)") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as JSON ({error})") from None
-    try:
+    if path.parent.is_file():
+        raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies")
+    data = read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
+    with guarded(path, "JSON"):
         return pattern_from_json(data)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def pattern_from_json(data: Any) -> DraftedGarment:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
+from xml.parsers import expat
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import note_read
-from warpflat.export.read_dxf import check_closed, outermost
+from warpflat.core.input_files import FARTHEST, Place, reading
+from warpflat.core.text import quote_value
+from warpflat.export.read_dxf import MOST_POINTS, check_closed, outermost, read_quantity
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
 from warpflat.pattern.pieces import Garment, Piece
 from warpflat.pattern.seam_words import seams_of_words
@@ -22,10 +26,13 @@ from warpflat.pattern.seam_words import seams_of_words
 __all__ = ["read_svg"]
 
 _MILLIMETRES = {"": 25.4 / 96, "px": 25.4 / 96, "mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6}
-_LENGTH = re.compile(r"\s*([0-9.eE+-]+)\s*([a-z]*)\s*")
+_LENGTH = re.compile(r"\s*([0-9.eE+-]*[0-9.])\s*([a-z]*)\s*")
 _TRANSFORM = re.compile(r"(\w+)\s*\(([^)]*)\)")
 _SAMPLES = np.linspace(0.0, 1.0, 25)[1:]
 _KINDS = {"sew": "seam", "hem": "hem", "fold": "fold", "dart": "dart"}
+# Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
+_DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
+_TOO_MANY = f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern"
 _LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
@@ -43,25 +50,20 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         InputError: the file cannot be read, has no piece, or an outline does not close.
     """
     path = Path(path)
-    note_read(path)
-    try:
-        root = ET.parse(path).getroot()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, ET.ParseError, ValueError, LookupError) as error:
-        raise InputError(f"{path}: cannot be read as SVG ({str(error)[:80]})") from None
+    with reading(path, "SVG") as place:
+        return _garment(path, allowance or 0.0, place)
+
+
+def _garment(path: Path, allowance: float, place: Place) -> Garment:
+    root = _parse(path)
     page = _page_matrix(root)
-    try:
-        groups = [(element, matrix) for element, matrix in _walk(root, page) if "data-piece" in element.attrib]
-        pieces, words = list[Piece](), dict[str, list[tuple[str, str, str]]]()
-        for group, matrix in groups:
-            pieces.append(_own_piece(group, matrix, words, str(path)))
-        if not pieces:
-            pieces = _other_pieces(root, page, allowance or 0.0, str(path))
-    except (ValueError, IndexError, KeyError, AssertionError, NotImplementedError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: has a path that cannot be read ({str(error)[:80]})") from None
+    groups = [(element, matrix) for element, matrix in _walk(root, page) if "data-piece" in element.attrib]
+    pieces, words = list[Piece](), dict[str, list[tuple[str, str, str]]]()
+    for group, matrix in groups:
+        place.at = f"piece {quote_value(group.get('data-piece'))}"
+        pieces.append(_own_piece(group, matrix, words, str(path)))
+    if not pieces:
+        pieces = _other_pieces(root, page, allowance, str(path), place)
     if not pieces:
         raise InputError(f"{path}: has no closed path; a piece is a closed path")
     sizes: dict[str, list[Piece]] = {}
@@ -70,13 +72,58 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
     return Garment(name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])))
 
 
+def _parse(path: Path) -> ET.Element:
+    """Return the tree of an XML file. Entities that hold others, or that are other files, are refused.
+
+    Raises:
+        InputError: it has such, or is nested too deeply or has too many elements.
+        ExpatError: it is no XML.
+    """
+    parser, builder = expat.ParserCreate(namespace_separator="}"), ET.TreeBuilder()
+    count = depth = 0
+
+    def entity(name: str, parameter: bool, value: str | None, *_: object) -> None:
+        if value is None or parameter or "&" in value or len(value) > _LONGEST_ENTITY:
+            raise InputError(f"declares the entity {quote_value(name)}, which is another file, long or made of others")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count, depth
+        count, depth = count + 1, depth + 1
+        if depth > _DEEPEST or count > _MOST_ELEMENTS:
+            raise InputError(
+                f"line {parser.CurrentLineNumber}: nested deeper than {_DEEPEST}, or more than {_MOST_ELEMENTS:,} elements; "
+                "ungroup the drawing, and leave out all but the pattern"
+            )
+        builder.start(_qualified(tag), {_qualified(key): value for key, value in attributes.items()})
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(_qualified(tag))
+
+    parser.EntityDeclHandler, parser.StartElementHandler, parser.EndElementHandler = entity, start, end
+    parser.Parse(path.read_bytes(), True)
+    return builder.close()
+
+
+def _qualified(name: str) -> str:
+    """Return a name as ElementTree has it, its namespace in braces."""
+    return "{" + name if "}" in name else name
+
+
 def _page_matrix(root: ET.Element) -> FloatArray:
     """Return the 2 by 3 matrix from the units of the drawing to metres, y upwards."""
     scale = _MILLIMETRES["px"]
     width, box = _LENGTH.fullmatch(root.get("width", "")), root.get("viewBox", "").replace(",", " ").split()
     if width and width[2] in _MILLIMETRES:
-        wide = float(width[1]) * _MILLIMETRES[width[2]]
-        scale = wide / float(box[2]) if len(box) == 4 and float(box[2]) > 0.0 else _MILLIMETRES[width[2]]
+        scale = _MILLIMETRES[width[2]]
+        if len(box) == 4:
+            wide, view = float(width[1]) * scale, float(box[2])
+            if not (0.0 < wide < np.inf and 0.0 < view < np.inf):
+                raise InputError(
+                    f"width {quote_value(width[0])} and viewBox {quote_value(' '.join(box))} must be numbers above 0"
+                )
+            scale = wide / view
     return np.array([[scale, 0.0, 0.0], [0.0, -scale, 0.0]]) * 1e-3
 
 
@@ -136,25 +183,30 @@ def _own_piece(group: ET.Element, matrix: FloatArray, words: dict[str, list[tupl
         raise InputError(f"{where}: has no sewing line; a group of a piece has paths with data-edge")
     edges = chain_edges(parts, where)
     ends = np.array([points[k] for points in legs for k in (0, -1)]).reshape(-1, 2)
-    close = [sum(bool(np.linalg.norm(end - other) < 1e-6) for other in ends) for end in ends]
-    tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n] > 1}
+    close = cKDTree(ends).query(ends, k=2)[0][:, 1] < 1e-6 if len(ends) else []
+    tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n]}
     darts = find_darts(edges, tips, where)
-    quantity = group.get("data-quantity", "1")
     return Piece(
         name=name, size=size, edges=edges, darts=darts, grain=None if grain is None else grain[[0, -1]],
-        quantity=int(quantity) if quantity.isdigit() else 1,
+        quantity=read_quantity(group.get("data-quantity", "1")),
     )  # fmt: skip
 
 
-def _other_pieces(root: ET.Element, page: FloatArray, allowance: float, file: str) -> list[Piece]:
+def _other_pieces(root: ET.Element, page: FloatArray, allowance: float, file: str, place: Place) -> list[Piece]:
     found: dict[int, tuple[FloatArray, str]] = {}
     unclosed = list[FloatArray]()
+    total = 0
     for element, matrix in _walk(root, page):
+        place.at = f"{element.tag.rpartition('}')[2]} {quote_value(element.get('id', ''))}"
         for points, closed in _lines(element, matrix):
+            total += len(points)
+            if total > MOST_POINTS:
+                raise InputError(_TOO_MANY)
             if closed:
                 found[id(points)] = points, element.get(_LABEL) or element.get("id") or ""
             else:
                 unclosed.append(points)
+    place.at = ""
     check_closed(unclosed, [points for points, _ in found.values()], 1.0, file)
     pieces, taken = [], set[str]()
     for number, ring in enumerate(outermost([points for points, _ in found.values()]), start=1):
@@ -187,7 +239,10 @@ def _lines(element: ET.Element, matrix: FloatArray) -> Iterator[tuple[FloatArray
         if closed and np.linalg.norm(points[0] - points[-1]) < 1e-9:
             points = points[:-1]
         if len(points) > 1:
-            yield points @ matrix[:, :2].T + matrix[:, 2], closed
+            placed = points @ matrix[:, :2].T + matrix[:, 2]
+            if not np.abs(placed).max() < FARTHEST:
+                raise InputError(f"{tag} reaches farther than {FARTHEST:g} m, or has a coordinate that is no number")
+            yield placed, closed
 
 
 def _flatten(text: str) -> Iterator[tuple[FloatArray, bool]]:
@@ -195,10 +250,15 @@ def _flatten(text: str) -> Iterator[tuple[FloatArray, bool]]:
     from fontTools.pens.recordingPen import RecordingPen  # type: ignore[import-untyped]
     from fontTools.svgLib.path import parse_path  # type: ignore[import-untyped]
 
+    logging.getLogger("fontTools").addHandler(logging.NullHandler())
     pen: Any = RecordingPen()
     parse_path(text, pen)
     points: list[FloatArray] = []
+    count = 0
     for command, args in pen.value:
+        count += len(_SAMPLES) if command in ("curveTo", "qCurveTo") else 1
+        if count > MOST_POINTS:
+            raise InputError(_TOO_MANY)
         control = [np.array(point, dtype=np.float64) for point in args]
         if command == "moveTo":
             points = [control[0][None]]

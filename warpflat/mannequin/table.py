@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import listening_to_reads, note_read
+from warpflat.core.input_files import listening_to_reads
 from warpflat.core.text import MADE_TO_MEASURE
 from warpflat.core.toml_file import Table
 from warpflat.mannequin.mannequin import Mannequin
@@ -95,8 +95,7 @@ def mannequin_from_scan_file(path: Path, *, options: ScanOptions, resolution_mm:
     Raises:
         InputError: the file cannot be read as a mesh, or the mesh is no standing body.
     """
-    note_read(path)
-    sources = [path.absolute()]
+    sources: list[Path] = []
     with listening_to_reads(sources.append):
         vertices, faces = read_scan(path)
     try:

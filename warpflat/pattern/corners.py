@@ -67,11 +67,13 @@ def find_corners(ring: FloatArray, angle: float) -> set[int]:
     border = _Border(ring)
     turns = np.abs(border.turning_at_vertices())
     corners = _narrow_end_corners(border, angle)
+    taken = np.zeros(border.count, dtype=bool)
+    taken[corners] = True
     for i in sorted(np.flatnonzero(turns > angle).tolist(), key=lambda i: (-turns[i], i)):
         # The window of a corner shows in its neighbours' turns too; the next vertex of a coarse border does not.
-        if all(border.distance(i, j) > border.window for j in corners):
-            corners.append(i)
-    return set(corners)
+        between = np.abs(border.along[: border.count][taken] - border.along[i])
+        taken[i] |= bool((np.minimum(between, border.length - between) > border.window).all())
+    return set(np.flatnonzero(taken).tolist())
 
 
 def _narrow_end_corners(border: _Border, angle: float) -> list[int]:

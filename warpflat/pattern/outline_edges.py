@@ -16,6 +16,8 @@ __all__ = ["chain_edges", "find_darts", "inset", "split_outline"]
 
 # Ends that are closer than this are one corner [m].
 _SAME = 5e-4
+# An outline of more points is made simpler: what lies within this [m] of its curve is left out.
+_MOST_POINTS, _FLAT = 5000, 2e-5
 
 
 def chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> list[Edge]:
@@ -28,18 +30,21 @@ def chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> lis
     Raises:
         InputError: they do not close.
     """
-    left = list(parts)
-    chain = [left.pop(0)]
-    while left:
-        end = chain[-1][2][-1]
-        distances = [(np.linalg.norm(points[k] - end), n, k) for n, (_, _, points) in enumerate(left) for k in (0, -1)]
-        distance, number, at = min(distances)
-        name, kind, points = left.pop(number)
-        if distance > _SAME:
+    chain = [parts[0]]
+    # The last end of each line stands before its first: of two that are as near, the line is turned.
+    ends = np.array([points[[-1, 0]] for _, _, points in parts])
+    ends[0] = np.inf
+    while len(chain) < len(parts):
+        distances = np.linalg.norm(ends - chain[-1][2][-1], axis=2)
+        number, at = divmod(int(distances.argmin()), 2)
+        ends[number] = np.inf
+        name, kind, points = parts[number]
+        if not distances[number, at] <= _SAME:
             raise InputError(
-                f"{where}: edge {chain[-1][0]!r} ends {1e3 * distance:.1f} mm from the next, {name!r}; edges must share their corners"
+                f"{where}: edge {chain[-1][0]!r} ends {1e3 * distances[number, at]:.1f} mm from the next, {name!r}; "
+                "edges must share their corners"
             )
-        chain.append((name, kind, points if at == 0 else points[::-1]))
+        chain.append((name, kind, points if at == 1 else points[::-1]))
     gap = float(np.linalg.norm(chain[-1][2][-1] - chain[0][2][0]))
     if gap > _SAME:
         raise InputError(f"{where}: the outline is open by {1e3 * gap:.1f} mm; its edges must close")
@@ -58,9 +63,20 @@ def split_outline(ring: FloatArray, corners: FloatArray | None = None) -> list[E
     Args:
         ring: #P by 2 [m], the first point not repeated.
         corners: #C by 2 [m], known ones; else where the line turns by more than 35 degrees.
+
+    Raises:
+        InputError: the line has too many points that are not needed for its curves.
     """
     if np.linalg.norm(ring[0] - ring[-1]) < 1e-7:
         ring = ring[:-1]
+    if len(ring) > _MOST_POINTS:
+        import shapely
+
+        ring = np.asarray(shapely.LineString(ring).simplify(_FLAT, preserve_topology=False).coords)
+        if len(ring) > _MOST_POINTS:
+            raise InputError(
+                f"an outline has {len(ring):,} points that do not lie in its curves, {_MOST_POINTS:,} are the most; smooth it"
+            )
     if _area(ring) < 0.0:
         ring = ring[::-1]
     if corners is not None and len(corners) > 1:

@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import FARTHEST, reading
+from warpflat.core.usd_process import UNREADABLE, read_apart
 from warpflat.export.colours import energy_colours
 from warpflat.export.geometry import face_areas, outline_edges
 from warpflat.export.usd_colours import VertexColours
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["FilmPiece", "Shape", "open_film", "pack_film"]
+__all__ = ["FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
 
 # Bytes of all layouts before compression; beyond, every second frame is left out, or every third ...
 _ROOM = 4_000_000
@@ -120,9 +122,45 @@ def open_film(path: Path) -> list[FilmPiece]:
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
-        raise InputError(f"{path}: is not a USD file that can be opened; run the scene again") from error
+        raise InputError("is not a USD file that can be opened; run the scene again") from error
     found = [FilmPiece(stage, prim) for prim in stage.GetDefaultPrim().GetChildren() if prim.GetChild("pattern")]
     return [piece for piece in found if piece.times]
+
+
+def pack_foreign_film(path: Path) -> dict[str, Any] | None:
+    """Pack a film of a folder that others may have changed: it is read in a process of its own, every frame of it.
+
+    Raises:
+        InputError: it cannot be read as a film.
+    """
+    packed: dict[str, Any] | None
+    with reading(path, "film"):
+        packed = read_apart(f"{__name__}:read_whole_film", path)
+    return packed
+
+
+def read_whole_film(path: Path) -> dict[str, Any] | None:
+    """Read all frames of a film, and pack it.
+
+    Raises:
+        InputError: without the file's name: it is no film. Any error of USD is the file's fault, of whatever type it is.
+    """
+    try:
+        pieces = open_film(path)
+        for piece in pieces:
+            for time in piece.times:
+                shape = piece.shape(
+                    max((change for change in piece.changes if change <= time), default=piece.changes[0])
+                )
+                if not np.abs(piece.positions(time, len(shape.surface))).max() < FARTHEST:
+                    raise ValueError("a point that is no number")
+                if len(piece.density(time)) != len(shape.faces):
+                    raise ValueError("energies of other faces")
+        return pack_film(pieces)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(UNREADABLE) from error
 
 
 def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:

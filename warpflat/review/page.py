@@ -7,8 +7,7 @@ import io
 import json
 import os
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -17,13 +16,13 @@ from typing import Any
 from warpflat.core.activity import report_activity
 from warpflat.core.atomic_files import atomic_path, latest_file
 from warpflat.core.errors import InputError
-from warpflat.core.memory_limit import is_out_of_memory
+from warpflat.core.input_files import guarded
 from warpflat.core.own_files import open_result, read_result, recorded_files
 from warpflat.export.colours import SMALLEST_SCALE
-from warpflat.review.film import open_film, pack_film
+from warpflat.review.film import open_film, pack_film, pack_foreign_film
 from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
 
-__all__ = ["pack_frames", "pack_pictures", "read_run", "reading_members", "review_folder", "write_review"]
+__all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
 
 # Nothing on the page may ask for anything from elsewhere, nor from the disk.
 _POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
@@ -54,24 +53,6 @@ def read_run(folder: Path) -> tuple[dict[str, Any], list[str], str]:
     return metrics, listed, name
 
 
-@contextmanager
-def reading_members(folder: Path) -> Iterator[None]:
-    """Guard the reading of the files of a run, which others may have changed in any way.
-
-    Raises:
-        InputError: whatever goes wrong in the block.
-    """
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        if is_out_of_memory(error) or getattr(error, "errno", None) is not None:  # Pillow's own errors have no number
-            raise
-        words = f"{type(error).__name__} {error}".strip()
-        raise InputError(f"{folder}: a file of the run is damaged ({words[:200]}); run the scene again") from error
-
-
 def review_folder(folder: str | Path) -> Path:
     """Write `review.html` into the folder of an earlier run; return its path.
 
@@ -84,7 +65,8 @@ def review_folder(folder: str | Path) -> Path:
     folder = Path(folder)
     metrics, files, name = read_run(folder)
     with output_folder(folder, ["review.html"], guard=True):
-        write_review(folder, metrics, files, name=name)
+        with guarded(folder / "metrics.json", "JSON"):
+            write_review(folder, metrics, files, name=name, film=lambda: pack_foreign_film(folder / "frames.usdc"))
         record_file(folder, name, "review.html")
     return folder / "review.html"
 
@@ -123,12 +105,11 @@ def write_review(
         pictures: of :func:`pack_pictures`, those that were packed before.
 
     Raises:
-        InputError: a file cannot be read as what it is, or the page cannot be written.
+        InputError: the film cannot be read, or the page cannot be written.
     """
     report_activity("writing the review page")
     path = folder / "review.html"
-    with reading_members(folder):
-        page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)), pictures or {})
+    page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)), pictures or {})
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path.name

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from pydantic import Field
 
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
+from warpflat.core.json_file import read_json
 from warpflat.core.toml_file import Table, check_table, read_toml
 from warpflat.mannequin.table import MannequinTable, mannequin_from_table
 from warpflat.scene.load import errors_named, expand_variables
@@ -154,19 +154,16 @@ def _read(path: Path, table: SewingTable) -> tuple[Garment, dict[str, Lift], dic
     pattern = read_pattern_json(path / "pattern.json" if folder else path).garment
     if folder is None:
         return pattern, {}, None
-    from warpflat.core.input_files import note_read
-
     lifts = {
         piece.name: read_lift(folder / f"{piece.name}.obj")
         for piece in pattern.pieces[pattern.sample]
         if (folder / f"{piece.name}.obj").is_file()
     }
-    try:
-        note_read(folder / "metrics.json")
-        metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-        found = (metrics.get("mannequin") or {}).get("table")
-    except (OSError, ValueError, AttributeError):
-        found = None
+    if not (folder / "metrics.json").exists():
+        return pattern, lifts, None
+    metrics = read_json(folder / "metrics.json")
+    body = metrics.get("mannequin") if isinstance(metrics, dict) else None
+    found = body.get("table") if isinstance(body, dict) else None
     return pattern, lifts, found if isinstance(found, dict) else None
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -14,7 +16,7 @@ from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, expect, nearest
 from warpflat.core.file_names import check_file_name, make_file_name, plain_label
-from warpflat.core.input_files import listening_to_reads, note_read
+from warpflat.core.input_files import listening_to_reads, reading
 from warpflat.core.text import quote_value
 from warpflat.surface.io.read_obj import read_obj
 from warpflat.surface.io.read_off import read_off
@@ -132,15 +134,10 @@ def read_scan(path: str | PathLike[str]) -> tuple[FloatArray, IntArray]:
         InputError: one line that names the file.
     """
     file = Path(path)
-    try:
-        _check_file(file)
+    with _reading_mesh(file):
         raw = _read(file, None, None)
         polygons, keep, _ = distinct_corners(raw.polygons)
         return raw.vertices, split_polygons(check_positions(raw.vertices), polygons[keep])[0]
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from error
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
 
 
 def read_mesh_file(
@@ -156,49 +153,33 @@ def read_mesh_file(
     """
     expect(path, (str, PathLike), "path", "that of a mesh file")
     file = Path(path)
-    note_read(file)
+    sources: list[Path] = []
     report_activity(f"reading {file.name}")
-    sources = [file.absolute()]
-    try:
+    with listening_to_reads(sources.append), _reading_mesh(file):
         if name:
             check_file_name(name)
-        with listening_to_reads(sources.append):
-            raw, scale = _read_with_unit(file, units, prim)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from error
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+        if units is not None and units not in METRES_PER_UNIT:
+            raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
+        raw = _read(file, units, prim)
+        if raw.scale is None:
+            raise InputError(_ask_for_units(raw))
     report_activity("checking the mesh")
-    return file, raw, scale, sources
+    return file, raw, raw.scale, sources
 
 
-def _read_with_unit(file: Path, units: str | None, prim: str | None) -> tuple[RawMesh, float]:
-    """Read a mesh file, and return the metres per unit beside it.
+@contextmanager
+def _reading_mesh(file: Path) -> Iterator[None]:
+    """Guard the reading of a mesh file, which must have a known suffix and not be empty.
 
     Raises:
-        InputError: without the file's name: unknown or missing units, or a file that is none of a mesh.
-        OSError: it cannot be opened.
+        InputError: the file cannot be read, for whatever reason.
     """
-    if units is not None and units not in METRES_PER_UNIT:
-        raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
-    _check_file(file)
-    raw = _read(file, units, prim)
-    if raw.scale is None:
-        raise InputError(_ask_for_units(raw))
-    return raw, raw.scale
-
-
-def _check_file(file: Path) -> None:
-    if file.is_dir():
-        raise InputError("is a directory, not a mesh file")
-    if not file.exists():
-        beside = [p.name for p in file.parent.iterdir() if p.suffix in SUFFIXES] if file.parent.is_dir() else []
-        close = nearest(file.name, beside).partition("? ")[0] if beside else ""
-        raise InputError("does not exist" + (f"; {close}?" if close.startswith("did you mean") else ""))
-    if file.suffix.lower() not in SUFFIXES:
-        raise InputError(f"unknown kind of file {file.suffix!r}; {nearest(file.suffix.lower(), SUFFIXES)}")
-    if file.stat().st_size == 0:
-        raise InputError("is empty")
+    with reading(file, "mesh", missing="does not exist"):
+        if file.suffix.lower() not in SUFFIXES:
+            raise InputError(f"unknown kind of file {file.suffix!r}; {nearest(file.suffix.lower(), SUFFIXES)}")
+        if file.stat().st_size == 0:
+            raise InputError("is empty")
+        yield
 
 
 def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:

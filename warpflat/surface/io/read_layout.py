@@ -9,6 +9,8 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import FARTHEST, reading
+from warpflat.core.text import quote_value
 
 __all__ = ["read_layout"]
 
@@ -21,34 +23,33 @@ def read_layout(path: Path) -> FloatArray:
     Raises:
         InputError: the file cannot be read, has no texture coordinates, or parts a vertex in the plane.
     """
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read as a start: {error.strerror}; must be an OBJ file") from None
     places: list[list[float]] = []
     of_vertex: dict[int, int] = {}
     count = 0
-    for number, line in enumerate(lines, start=1):
-        key, _, rest = line.strip().partition(" ")
-        if key == "v":
-            count += 1
-        elif key == "vt":
-            try:
+    with reading(path, "start") as place:
+        for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+            place.at = f"line {number}"
+            key, _, rest = line.strip().partition(" ")
+            if key == "v":
+                count += 1
+            elif key == "vt":
                 x, y = (float(word) for word in rest.split()[:2])
-            except ValueError:
-                raise InputError(f"{path}: line {number}: {line.strip()[:40]!r} is not 'vt x y'") from None
-            places.append([x, y])
-        elif key == "f":
-            for vertex, place in ((int(v), int(t)) for v, t in _CORNER.findall(rest)):
-                own = vertex - 1 if vertex > 0 else count + vertex
-                at = place - 1 if place > 0 else len(places) + place
-                if not (0 <= own < count and 0 <= at < len(places)):
-                    raise InputError(f"{path}: line {number}: corner {vertex}/{place} is not in the file")
-                before = of_vertex.setdefault(own, at)
-                if places[before] != places[at]:
-                    raise InputError(
-                        f"{path}: line {number}: vertex {own} has two texture coordinates; a start must not be cut"
-                    )
+                if not abs(x) + abs(y) < FARTHEST:
+                    raise InputError(f"line {number}: {line.strip()[:40]!r} is not 'vt x y' in metres")
+                places.append([x, y])
+            elif key == "f":
+                for vertex, corner in ((int(v), int(t)) for v, t in _CORNER.findall(rest)):
+                    own = vertex - 1 if vertex > 0 else count + vertex
+                    at = corner - 1 if corner > 0 else len(places) + corner
+                    if not (0 <= own < count and 0 <= at < len(places)):
+                        raise InputError(
+                            f"line {number}: corner {quote_value(vertex)}/{quote_value(corner)} is not in the file"
+                        )
+                    before = of_vertex.setdefault(own, at)
+                    if places[before] != places[at]:
+                        raise InputError(
+                            f"line {number}: vertex {own} has two texture coordinates; a start must not be cut"
+                        )
     if not of_vertex:
         raise InputError(f"{path}: has no texture coordinates; a start is read from 'vt x y' and faces 'f v/vt'")
     layout = np.full((count, 2), np.nan)

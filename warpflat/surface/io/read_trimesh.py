@@ -82,7 +82,9 @@ def _load_scene(file: Path) -> Any:
         check_ply(file)
     elif suffix == ".stl":
         check_stl(file)
-    options = {"fix_texture": False, "skip_materials": True} if suffix == ".ply" else {}
+    # Textures are never opened.
+    options = {} if suffix == ".stl" else {"skip_materials": True}
+    options |= {"fix_texture": False} if suffix == ".ply" else {}
     # Its log goes nowhere, but to the handlers of a program that has its own.
     logging.getLogger("trimesh").addHandler(logging.NullHandler())
     try:

@@ -5,9 +5,6 @@ The process that reads a file loads this module only: see :mod:`warpflat.surface
 
 from __future__ import annotations
 
-import os
-import pickle
-import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,19 +14,13 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.memory_limit import require_memory_for_usd
 from warpflat.core.text import quote_value
+from warpflat.core.usd_process import UNREADABLE
 
-__all__ = ["ALL_PRIMS", "UNREADABLE", "UsdMesh", "answer", "read_usd_stage"]
-
-# Memory that reading may take beside the library's own, and more per byte of the file, since lists of corners pack tightly [bytes].
-_MEMORY, _MEMORY_PER_BYTE = 2**30, 200
-_SECONDS, _BYTES_PER_SECOND = 20, 10**6
+__all__ = ["ALL_PRIMS", "UsdMesh", "read_usd_stage"]
 
 #: Stands for all mesh prims of a stage.
 ALL_PRIMS = "*"
-
-UNREADABLE = "not a readable USD file: damaged, cut short, or with values of another type than its schema's"
 
 
 @dataclass(kw_only=True)
@@ -84,41 +75,6 @@ def read_usd_stage(path: Path, *, prim: str | None, metres_per_unit: float | Non
     if warned := _warned(warnings):
         mesh.notes.append(f"the stage was not read whole: {warned}")
     return mesh
-
-
-def answer() -> None:
-    """Read the file named on standard input, and write its mesh, or the words of an error, to standard output."""
-    # Other output of the library must not mix with the mesh.
-    out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    path, prim, metres_per_unit = pickle.load(sys.stdin.buffer)
-    try:
-        require_memory_for_usd()
-        from pxr import UsdGeom, UsdUtils  # noqa: F401, as the limit counts what comes after it
-
-        _limit(path.stat().st_size)
-        result: UsdMesh | str = read_usd_stage(path, prim=prim, metres_per_unit=metres_per_unit)
-    except InputError as error:
-        result = str(error)
-    pickle.dump(result, out, protocol=pickle.HIGHEST_PROTOCOL)
-    out.close()
-
-
-def _limit(size: int) -> None:
-    """Limit this process's memory and time by the size of the file [bytes], where the system can."""
-    if sys.platform != "linux":
-        return
-    import resource
-
-    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    for kind, most in (
-        (resource.RLIMIT_AS, taken + _MEMORY + _MEMORY_PER_BYTE * size),
-        (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_PER_SECOND),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        soft, hard = resource.getrlimit(kind)
-        least = min(limit for limit in (most, soft, hard) if limit != resource.RLIM_INFINITY)
-        resource.setrlimit(kind, (least, hard))
 
 
 def _warned(warnings: Any) -> str:

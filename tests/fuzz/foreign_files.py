@@ -1,0 +1,247 @@
+"""Patterns of other programs, and folders of runs that others have changed: their seeds, damages and cases.
+
+The kinds: "dxf" and "svg" (their edges are listed), "sewing" (a TOML file of seams beside a DXF), "garmentcode" (JSON of another
+program), "rul" (grade rules, which are no pattern), and the members of a run's folder, "frames", "lift", "runmetrics" and
+"runpattern", each read by the commands that read it.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+from .promise import Case
+
+__all__ = ["FOREIGN_ENDINGS", "FOREIGN_SHARES", "foreign_bounds", "foreign_case", "foreign_cases_of_file"]
+
+FOREIGN_SHARES = {
+    "dxf": 10, "svg": 10, "sewing": 3, "garmentcode": 3, "rul": 1, "frames": 3, "lift": 4, "runmetrics": 4, "runpattern": 3,
+}  # fmt: skip
+FOREIGN_ENDINGS = {
+    ".dxf": "dxf",
+    ".svg": "svg",
+    ".sewing.toml": "sewing",
+    ".garmentcode.json": "garmentcode",
+    ".rul": "rul",
+    ".frames.usdc": "frames",
+    ".lift.obj": "lift",
+    ".runmetrics.json": "runmetrics",
+    ".runpattern.json": "runpattern",
+}
+_MEMBERS = {
+    "frames": "frames.usdc",
+    "lift": "bodice.obj",
+    "runmetrics": "metrics.json",
+    "runpattern": "pattern.json",
+}
+_SCENE = """fabric = 'denim'
+datum = 'centre'
+name = 'bodice'
+[surface]
+shape = 'bodice'
+resolution = 5
+[relax]
+max_steps = 30
+[output]
+frames = 6
+picture = false
+review = false
+[pattern]
+formats = ['json', 'dxf', 'svg']
+"""
+_SEWING = """spacing_mm = 20
+allowance_mm = 5
+fabric = 'woven'
+[[seams]]
+name = 'side'
+sides = ['PIECE.edge_1', 'PIECE.edge_3']
+[[pieces]]
+name = 'PIECE'
+quantity = 2
+at = 'front'
+[mannequin]
+size = 'EU 38'
+"""
+_GARMENTCODE = {
+    "pattern": {
+        "panels": {
+            "front": {
+                "translation": [0, 100, 20],
+                "rotation": [0, 0, 0],
+                "vertices": [[0, 0], [40, 0], [40, 60], [0, 60]],
+                "edges": [
+                    {"endpoints": [0, 1]},
+                    {"endpoints": [1, 2], "curvature": {"type": "quadratic", "params": [[0.5, 0.1]]}},
+                    {"endpoints": [2, 3]},
+                    {"endpoints": [3, 0]},
+                ],
+            }
+        },
+        "stitches": [[{"panel": "front", "edge": 1}, {"panel": "front", "edge": 3}]],
+    },
+    "properties": {"units_in_meter": 100, "normalize_panel_translation": False},
+}
+_RUL = b"ASTM/D13Proposal 1 Version: D 6673-04\nUNITS: METRIC\nGRADE RULE TABLE: a\nSIZE LIST: 36 38\nRULE: DELTA 1\n0.0,0.0 1.0,2.0\nEND\n"
+_SVG = b"""<?xml version="1.0"?>
+<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "svg11.dtd" [<!ENTITY ns "http://www.w3.org/2000/svg">]>
+<svg xmlns="http://www.w3.org/2000/svg" width="400mm" height="300mm" viewBox="0 0 400 300">
+<g transform="translate(5,5) rotate(3) scale(1.0)" id="layer"><path id="A" d="M0,0 h100 v80 q-50,20 -100,0 z"/>
+<path id="B" d="M150,0 C200,10 240,0 260,60 A30,20 10 0 1 200,120 L150,100 Z"/></g>
+<rect id="C" x="300" y="10" width="60" height="90"/><polygon points="10,200 60,200 60,250"/>
+<polyline points="100,200 160,200 160,260 100,260 100,200"/></svg>
+"""
+
+
+def _tags(*pairs: tuple[int, object]) -> str:
+    return "".join(f"{code}\n{value}\n" for code, value in pairs)
+
+
+def _dxf() -> bytes:
+    """A block of a polyline with a bulge, and lines, an arc, a circle, an ellipse and a spline beside it."""
+    ring = _tags((0, "POLYLINE"), (8, 1), (66, 1), (70, 1))
+    for x, y, bulge in ((0, 0, 0), (400, 0, 0.2), (400, 300, 0), (0, 300, -0.1)):
+        ring += _tags((0, "VERTEX"), (8, 1), (10, x), (20, y), (42, bulge))
+    ring += _tags((0, "SEQEND"))
+    texts = "".join(
+        _tags((0, "TEXT"), (8, 1), (10, 5), (20, 5), (40, 5), (1, text))
+        for text in ("PIECE NAME: B", "SIZE: M", "QUANTITY: 2", "UNITS: METRIC")
+    )
+    grain = _tags((0, "LINE"), (8, 7), (10, 50), (20, 50), (11, 50), (21, 250))
+    others = _tags((0, "CIRCLE"), (8, 2), (10, 700), (20, 0), (40, 60))
+    others += _tags((0, "ARC"), (8, 2), (10, 900), (20, 0), (40, 60), (50, 10), (51, 200))
+    others += _tags(
+        (0, "ELLIPSE"),
+        (100, "AcDbEntity"),
+        (8, 2),
+        (100, "AcDbEllipse"),
+        (10, 900),
+        (20, 300),
+        (11, 50),
+        (21, 0),
+        (40, 0.5),
+        (41, 0),
+        (42, 6.283185307),
+    )
+    others += _tags((0, "LWPOLYLINE"), (100, "AcDbEntity"), (8, 2), (100, "AcDbPolyline"), (90, 3), (70, 1))
+    others += _tags((10, 0), (20, 600), (42, 0.3), (10, 100), (20, 600), (10, 100), (20, 700))
+    others += _tags(
+        (0, "SPLINE"), (100, "AcDbEntity"), (8, 2), (100, "AcDbSpline"), (70, 8), (71, 3), (72, 8), (73, 4), (74, 0)
+    )
+    others += _tags(*((40, knot) for knot in (0, 0, 0, 0, 1, 1, 1, 1)))
+    others += "".join(_tags((10, x), (20, y), (30, 0)) for x, y in ((300, 600), (350, 700), (400, 500), (450, 600)))
+    others += _tags(
+        (0, "MTEXT"), (100, "AcDbEntity"), (8, 2), (100, "AcDbMText"), (10, 0), (20, 0), (1, "STYLE NAME: a")
+    ) + _tags((0, "POINT"), (8, 2), (10, 0), (20, 0))
+    insert = _tags((0, "INSERT"), (8, 1), (2, "B"), (10, 0), (20, 0))
+    block = (
+        _tags((0, "BLOCK"), (8, 1), (2, "B"), (70, 0), (10, 0), (20, 0))
+        + ring
+        + texts
+        + grain
+        + _tags((0, "ENDBLK"), (8, 1))
+    )
+    header = _tags(
+        (0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1015"), (9, "$INSUNITS"), (70, 4), (0, "ENDSEC")
+    )
+    blocks = _tags((0, "SECTION"), (2, "BLOCKS")) + block + _tags((0, "ENDSEC"))
+    entities = _tags((0, "SECTION"), (2, "ENTITIES")) + insert + others + _tags((0, "ENDSEC"), (0, "EOF"))
+    return (header + blocks + entities).encode()
+
+
+@functools.cache
+def run_folder() -> dict[str, bytes]:
+    """The files of a small run, by name."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "bodice.toml").write_text(_SCENE)
+        command = [sys.executable, "-m", "warpflat", "run", "bodice.toml", "--out", "out", "--quiet"]
+        subprocess.run(command, cwd=folder, check=False, capture_output=True)
+        return {file.name: file.read_bytes() for file in (Path(folder) / "out").iterdir()}
+
+
+def _seeds(kind: str) -> tuple[bytes, ...]:
+    if kind in _MEMBERS:
+        return (run_folder()[_MEMBERS[kind]],)
+    if kind in ("dxf", "svg"):
+        return run_folder()[f"bodice.{kind}"], _dxf() if kind == "dxf" else _SVG, _dxf() if kind == "dxf" else _SVG
+    return {"sewing": (_SEWING.encode(),), "garmentcode": (json.dumps(_GARMENTCODE).encode(),), "rul": (_RUL,)}[kind]
+
+
+def foreign_case(kind: str, random: Random) -> Case:
+    """A damaged seed of one of these kinds, and a command that reads it."""
+    from .mutations import damaged_bytes, damaged_json, damaged_toml
+
+    seed = random.choice(_seeds(kind))
+    if kind == "sewing":
+        content = damaged_toml(random, seed.decode())
+    elif kind in ("garmentcode", "runmetrics", "runpattern"):
+        content = damaged_json(random, json.loads(seed))
+    else:
+        content = damaged_bytes(random, seed)
+    return random.choice(foreign_cases_of_file(kind, content))
+
+
+def foreign_cases_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool | None = None) -> list[Case]:
+    """The cases that read a file of one of these kinds."""
+
+    def case(arguments: tuple[str, ...], files: dict[str, bytes], subject: str, replaces: str = "") -> Case:
+        return Case(kind, files, arguments, subject, None, name=name, refused=refused, seconds=60.0, replaces=replaces)
+
+    if kind in _MEMBERS:
+        member = f"out/{_MEMBERS[kind]}"
+        files = {f"out/{file}": data for file, data in run_folder().items()} | {member: content}
+        review = case(("review", "out", "--quiet"), files, member, "*")
+        export = case(("export", "out", "--format", "svg", "--format", "dxf", "--quiet"), files, member, "*")
+        drape = case(("drape", "out", "--edges"), files, member)
+        return {"frames": [review], "lift": [drape], "runmetrics": [review, export], "runpattern": [export, drape]}[
+            kind
+        ]
+    file = name + next(ending for ending, of in FOREIGN_ENDINGS.items() if of == kind)
+    if kind == "sewing":
+        return [case(("drape", "p.dxf", "--seams", file, "--edges"), {"p.dxf": _dxf(), file: content}, file)]
+    if kind == "rul":
+        return [case(("drape", file), {file: content}, file)]
+    return [case(("drape", file, "--edges"), {file: content}, file)]
+
+
+def foreign_bounds() -> Iterator[Case]:
+    """Drawings that are too much, a second for each thousand of their entities; devices in the place of files."""
+    head = _tags((0, "SECTION"), (2, "ENTITIES"))
+    star = [
+        _tags((0, "LINE"), (8, 1), (10, 0), (20, 0), (11, f"{1e3 * math.cos(k):.3f}"), (21, f"{1e3 * math.sin(k):.3f}"))
+        for k in range(20_000)
+    ]
+    circles = [_tags((0, "CIRCLE"), (8, 1), (10, k % 100 * 30), (20, k // 100 * 30), (40, 40)) for k in range(10_000)]
+    rings = [_tags((0, "CIRCLE"), (8, 1), (10, 0), (20, 0), (40, 1 + 0.01 * k)) for k in range(10_000)]
+    for name, entities in (("star of lines", star), ("chain of circles", circles), ("concentric circles", rings)):
+        content = (head + "".join(entities) + _tags((0, "ENDSEC"), (0, "EOF"))).encode()
+        yield from _too_much("dxf", content, f"dxf: a {name}", len(entities) / 1000)
+    page = '<svg xmlns="http://www.w3.org/2000/svg" width="1000mm" viewBox="0 0 1000 1000"><path d="M{} Z"/></svg>'
+    for turn, name in ((2e-5 * math.pi, "circle"), (1.0, "star")):
+        points = (f"{500 + 400 * math.cos(turn * k):.4f},{500 + 400 * math.sin(turn * k):.4f}" for k in range(100_000))
+        yield from _too_much("svg", page.format(" L".join(points)).encode(), f"svg: a {name} of 100,000 points", 100)
+    for file, arguments in (
+        ("odd.dxf", ("drape", "odd.dxf", "--edges")),
+        ("odd.svg", ("drape", "odd.svg", "--edges")),
+        ("odd.toml", ("run", "odd.toml")),
+        ("odd.toml", ("batch", "odd.toml")),
+        ("odd.obj", ("flatten", "odd.obj", "--units", "m")),
+        ("odd.usda", ("flatten", "odd.usda")),
+        ("out/metrics.json", ("review", "out")),
+        ("out/pattern.json", ("export", "out", "--format", "svg")),
+        ("out/pattern.json", ("drape", "out", "--edges")),
+    ):
+        words = f"{arguments[0]}: {file} is a link to /dev/zero"
+        yield Case("device", {"out/empty": b""}, arguments, links={file: "/dev/zero"}, name=words, refused=True)
+
+
+def _too_much(kind: str, content: bytes, name: str, seconds: float) -> Iterator[Case]:
+    for case in foreign_cases_of_file(kind, content):
+        yield replace(case, name=name, seconds=max(seconds, 20.0))
