@@ -24,7 +24,7 @@ from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]

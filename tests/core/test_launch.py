@@ -18,7 +18,7 @@ from warpflat.fabric.library import find_fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.shapes import bodice
 
 
@@ -51,7 +51,8 @@ def steps_of(threads: int, *, triangles: bool) -> dict[str, np.ndarray]:
     network = SpringNetwork.build(surface, find_fabric("denim"), start, device="cpu")
     state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
     assert len(state._buffers.advance.commands) == threads
-    state.sweep(20)
+    for _ in range(20):
+        state.step()
     return {
         "position": state.position.numpy().copy(),
         "velocity": state.velocity.numpy().copy(),
@@ -60,7 +61,7 @@ def steps_of(threads: int, *, triangles: bool) -> dict[str, np.ndarray]:
         "face force": np.where(
             np.repeat(state._buffers.face_acting.numpy(), 4)[:, None] != 0, state._buffers.face_force.numpy(), 0.0
         )[(surface.faces >= 0).ravel()],
-        "energies": state.potentials(),
+        "energies": np.array([state.energies().spring, state.energies().guard]),
     }
 
 

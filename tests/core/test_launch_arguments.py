@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 import warp as wp
-from warpflat.kernels.prolongation import Weights, transfer
+from warpflat.kernels.springs import Springs, compute_spring_tension
 from warpflat.kernels.stiffness import find_directions, measure_edges
 
 from warpflat.core import launch_arguments as packing
@@ -42,20 +42,29 @@ def test_arrays_numbers_and_vectors(either_way: str) -> None:
 
 
 def test_structs_and_ranges(either_way: str) -> None:
-    weights = Weights()
-    weights.offset = wp.array(np.arange(1001), dtype=wp.int32, device="cpu")
-    weights.column = wp.array(np.arange(1000)[::-1].copy(), dtype=wp.int32, device="cpu")
-    weights.weight = wp.array(np.full(1000, 2.0), dtype=wp.float64, device="cpu")
+    springs = Springs()
+    springs.offset = wp.array(np.minimum(np.arange(1001), 999), dtype=wp.int32, device="cpu")
+    springs.neighbor = wp.array(np.arange(1, 1000), dtype=wp.int32, device="cpu")
+    springs.rest_length = wp.zeros(999, dtype=wp.float64, device="cpu")
+    springs.stiffness = wp.array(np.full(999, 2.0), dtype=wp.float64, device="cpu")
+    springs.active = 1.0
     values = np.random.default_rng(0).normal(size=(1000, 2))
     given = wp.array(values, dtype=wp.vec2d, device="cpu")
     for threads in (1, 3):
-        got = wp.zeros(1000, dtype=wp.vec2d, device="cpu")
+        got = wp.zeros(1000, dtype=wp.float64, device="cpu")
         launch = record(
-            transfer, dim=1000, inputs=[weights, given], outputs=[got], device="cpu", threads=threads, least=1
+            compute_spring_tension,
+            dim=1000,
+            inputs=[given, springs],
+            outputs=[got],
+            device="cpu",
+            threads=threads,
+            least=1,
         )
         assert len(launch.commands) == threads
         launch.launch()
-        np.testing.assert_array_equal(got.numpy(), 2.0 * values[::-1])
+        expected = 2.0 * np.linalg.norm(np.diff(values, axis=0), axis=1)
+        np.testing.assert_allclose(got.numpy()[:-1], expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

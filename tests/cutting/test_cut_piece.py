@@ -26,7 +26,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.scene.cut_tables import CutTable
 from warpflat.scene.cuts import plan_cuts
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface import half_edges as mesh_half_edges
 from warpflat.surface.cells import face_creases, make_cells
 from warpflat.surface.cut.cut_mesh import cut_along

@@ -283,7 +283,7 @@ def test_a_step_limit_is_reported_not_hidden():
         fabric=cloth(200.0),
         datum="centre",
         device=DEVICE,
-        relax=RelaxOptions(max_steps=12, solver="plain"),
+        relax=RelaxOptions(max_steps=12, solver="paper"),
     )
     assert not piece.converged
     assert piece.measures["converged"] is False
@@ -292,7 +292,7 @@ def test_a_step_limit_is_reported_not_hidden():
     assert piece.captions()["converged"] == "NO"
 
 
-@pytest.mark.parametrize("solver", ["plain", "multilevel"])
+@pytest.mark.parametrize("solver", ["paper", "auto"])
 def test_a_limit_that_the_first_of_two_rounds_reaches_leaves_a_residual_too(solver: Solver):
     piece = flatten(
         make_shape("dome", resolution=17, triangles=True),

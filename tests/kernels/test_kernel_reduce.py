@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import warp as wp
 from devices import DEVICE
+from warpflat.core.device_sums import DeviceSums
 from warpflat.kernels.reduce import add_share, dot_blocks, least_of_blocks, subtract, sum_blocks
 
-from warpflat.core.device_sums import DeviceSums
 from warpflat.core.launch import launch_each
 
 BEGIN = np.array([0, 3, 4, 10], dtype=np.int32)

@@ -20,10 +20,9 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import worn_strain
 from warpflat.scene.load import load_scene
 from warpflat.scene.surface import scene_surface
-from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.grain import GrainAlignment
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relax import relax
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation, relax_by_steps
 from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -89,7 +88,7 @@ def test_the_pattern_does_not_depend_on_the_start():
     state = Relaxation(
         network, options, start=start, alignments=[GrainAlignment(lower=int(datum[0]), upper=int(datum[-1]))]
     )
-    assert relax(state).converged
+    assert relax_by_steps(state).converged
     assert apart(first.positions, state.positions()).max() < 1.5e-3
 
 

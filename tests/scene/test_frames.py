@@ -103,7 +103,7 @@ def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
 
     settings = {
         "surface": {"shape": "dome", "resolution": 9},
-        "relax": {"solver": "plain", "max_steps": 40},
+        "relax": {"solver": "paper", "max_steps": 40},
         "output": {"frame_every": 5, "picture": False},
         "pattern": {"formats": []},
     }

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from surface_meshes import numbered_grid as grid
-
 from warpflat.solver.multigrid.coarsen import coarsen, coarsenings_of
 from warpflat.solver.multigrid.cubic_interpolation import LatticeProlongation
+
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import Lattice, cut_lattice, find_lattice, rows_and_columns
