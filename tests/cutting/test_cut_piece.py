@@ -262,7 +262,7 @@ def test_the_relaxation_goes_on_from_the_present_layout(bodice: Flattening):
     assert np.array_equal(first[0], bodice.positions[result.vertex_origin])
     assert seen[0].model_energy == pytest.approx(bodice.stages[-1].model_energy_j, rel=1e-9)
     assert {progress.stage for progress in seen} == {"cut:bust"}
-    assert [stage.name for stage in result.stages] == ["develop", "relax", "cut:bust"]
+    assert [stage.name for stage in result.stages] == ["develop", "steps", "relax", "steps", "cut:bust"]
 
 
 def test_cuts_may_meet_and_follow_one_another(bodice: Flattening, bust_cut: Flattening):

@@ -206,6 +206,12 @@ class Descent(Generic[P]):
         return None
 
 
+def _continued(new: Relaxation, state: Relaxation) -> Relaxation:
+    """Return a state whose directions have been measured anew, with the counts and the last check of the one before."""
+    new.steps, new.restarts, new.work_units, new.status = state.steps, state.restarts, state.work_units, state.status
+    return new
+
+
 class _Directions:
     """The layout in which the directions of springs are measured.
 
@@ -225,9 +231,7 @@ class _Directions:
         """Return the state to go on with from a point, reached after so many iterations."""
         self._measured = iterations
         self._layout = self._layout + self._share * (point.positions - self._layout)
-        new = self._measure(point.positions, self._layout)
-        new.steps, new.restarts, new.work_units = state.steps, state.restarts, state.work_units
-        new.status = state.status
+        new = _continued(self._measure(point.positions, self._layout), state)
         energy = new.energies().potential
         if energy > (1.0 + _RISE) * self._energy:
             self._share *= 0.5
@@ -285,6 +289,8 @@ def relax(
     start = state.positions()
     layout = None if first is None else start
     align_grain(state.alignments, start)
+    if measure is not None and first is not None:
+        state = _continued(measure(start, start), state)
     problem = _Cloth(state)
     point = problem.at(start)
     if not np.isfinite(point.energy):

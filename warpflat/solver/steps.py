@@ -439,10 +439,10 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
         state.place(start)
         energies = status.energies
     elif network.seams is None and network.bonds.freedom.numpy().all():
-        # Nothing holds a piece in its place, from which steps drift by some millimetres.
+        # Nothing holds a piece in its place, from which steps drift by some millimetres. L-BFGS leaves its first vertex where it is.
         layout = state.positions()
         for each in state.alignments:
-            layout[each.vertices] += (start[each.vertices] - layout[each.vertices]).mean(axis=0)
+            layout[each.vertices] += start[each.vertices][0] - layout[each.vertices][0]
         state.place(layout)
     state.status = Status(energies=energies)
     return Outcome(
