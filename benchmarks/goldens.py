@@ -118,7 +118,7 @@ def command(arguments: Sequence[str], folder: Path) -> Record:
     titles = {".": "."}  # of the folders of a batch, whose own names change with the version
     for task in out.glob("*/task.json"):
         told = json.loads(task.read_text(encoding="utf-8"))
-        titles[task.parent.name] = " ".join(str(told[key]) for key in ("scene", "body", "fabric") if told.get(key))
+        titles[task.parent.name] = " ".join(str(told[key]) for key in ("body", "fabric"))
     for file in sorted(path.relative_to(out) for path in out.rglob("*") if path.is_file()):
         title = titles.get(str(file.parent), str(file.parent))
         record["files"].append(file.name if title == "." else f"{title}/{file.name}")
