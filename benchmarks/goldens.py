@@ -118,7 +118,7 @@ def command(arguments: Sequence[str], folder: Path) -> Record:
     titles = {".": "."}  # of the folders of a batch, whose own names change with the version
     for task in out.glob("*/task.json"):
         told = json.loads(task.read_text(encoding="utf-8"))
-        titles[task.parent.name] = " ".join(str(told[key]) for key in ("scene", "body", "fabric") if told.get(key))
+        titles[task.parent.name] = " ".join(str(told[key]) for key in ("body", "fabric"))
     for file in sorted(path.relative_to(out) for path in out.rglob("*") if path.is_file()):
         title = titles.get(str(file.parent), str(file.parent))
         record["files"].append(file.name if title == "." else f"{title}/{file.name}")
@@ -228,11 +228,13 @@ def garment(_: Path) -> Record:
 
 def pieces_of_a_file(folder: Path) -> Record:
     """Both halves of a bodice, read from one file and sewn where they meet."""
-    bodice = warpflat.make_shape("bodice", resolution=25)
-    lines = [f"v {x} {y} {z}" for x, y, z in bodice.vertices.tolist()]
+    bodice, lines, count = warpflat.make_shape("bodice", resolution=25), list[str](), 1
     is_left = bodice.vertices[bodice.faces, 0].mean(axis=1) < 0.0
     for name, half in (("left", bodice.faces[is_left]), ("right", bodice.faces[~is_left])):
-        lines += [f"o {name}", *(f"f {' '.join(map(str, face))}" for face in (1 + half).tolist())]
+        used, own = np.unique(half, return_inverse=True)
+        lines += [f"o {name}", *(f"v {x} {y} {z}" for x, y, z in bodice.vertices[used].tolist())]
+        lines += [f"f {' '.join(map(str, face))}" for face in (count + own.reshape(half.shape)).tolist()]
+        count += len(used)
     (folder / "halves.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
     pieces = warpflat.flatten_all(warpflat.read_pieces(folder / "halves.obj", units="m"), fabric="woven")
     sewn = warpflat.sew_pieces(pieces)
