@@ -178,7 +178,15 @@ def test_a_wider_gap_parts_the_ends_further_at_a_higher_price():
 def test_an_edit_of_a_parted_piece_is_parted_again():
     strip = flatten(curled_strip(), device=DEVICE)
     woven = change_fabric(strip, "woven")
-    assert [stage.name for stage in woven.stages] == ["develop", "steps", "relax", "contact", "steps", "fabric:woven", "contact"]
+    assert [stage.name for stage in woven.stages] == [
+        "develop",
+        "steps",
+        "relax",
+        "contact",
+        "steps",
+        "fabric:woven",
+        "contact",
+    ]
     assert woven.overlap == 0.0
     assert woven.contact_energy > 0.0
     # A dart from the inner side to the middle, whose sides coincide when it is made.

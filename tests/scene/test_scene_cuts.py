@@ -238,13 +238,14 @@ def test_a_cut_from_border_to_border_gives_two_pieces_with_files_of_their_own(tm
 def test_auto_cut_finds_cuts_and_stops(tmp_path: Path):
     found = run_scene(scene(auto_cut={"max_cuts": 1, "by": "per_cm"}, **QUIET), tmp_path / "one")
     stages = found.metrics["pieces"]["trial"]["stages"]
-    assert len(stages) == 4
+    assert [stage["name"] for stage in stages[:3]] == ["develop", "steps", "relax"]
+    assert len(stages) == 7
     assert any(note.startswith("cuts found: ") for note in found.notes)
-    enough = stages[1]["model_energy_j"] + 0.01
+    enough = stages[2]["model_energy_j"] + 0.01
     # The same cut is drawn into the mesh, and not made.
     settings = {"max_cuts": 1, "by": "per_cm", "stop_below": enough}
     none = run_scene(scene(auto_cut=settings, **QUIET), tmp_path / "none")
-    assert len(none.metrics["pieces"]["trial"]["stages"]) == 2
+    assert len(none.metrics["pieces"]["trial"]["stages"]) == 3
 
 
 def test_auto_cut_leaves_a_piece_whole_where_there_is_nothing_to_cut_and_says_why(tmp_path: Path):

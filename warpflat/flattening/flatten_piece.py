@@ -52,6 +52,10 @@ def flatten(
 ) -> Flattening:
     """Flatten one piece: develop it from its datum line, then relax its mass-spring model to the minimum of its energy.
 
+    By default the relaxation begins with the paper's approximate implicit steps, eqs. (4) to (10), which end where by eq. (11) they gain
+    little (`RelaxOptions.first_steps_gain`); L-BFGS over one factor takes the rest. The stages "steps" and "relax" tell both. With
+    `RelaxOptions(solver="paper")` the steps go on alone. Strain energies are eqs. (1) to (3).
+
     Args:
         surface: a `Surface`, or the path of a mesh file.
         fabric: a `Fabric`, or a name of the library (`warpflat fabrics` lists it).

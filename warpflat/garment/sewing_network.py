@@ -91,7 +91,5 @@ class SewingNetwork:
                         residual=None if np.isnan(end.residual) else end.residual,
                     )
                 )
-            sewn[name] = replace(
-                piece, positions=layout[own], stages=tuple(stages), unsewn=piece.unsewn or piece
-            )
+            sewn[name] = replace(piece, positions=layout[own], stages=tuple(stages), unsewn=piece.unsewn or piece)
         return sewn

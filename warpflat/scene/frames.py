@@ -203,6 +203,10 @@ def _counts_whole(measures: Mapping[str, float]) -> dict[str, float | int]:
     return {key: round(value) if key in _COUNTS else value for key, value in measures.items()}
 
 
+#: Stage of the paper's steps with which a relaxation begins (`warpflat.flattening.progress`, which loads the solver).
+_STEPS = "steps"
+
+
 class FrameRecorder:
     """Keeps the layouts of one piece; a callback of `flatten` and of `cut`."""
 
@@ -220,7 +224,7 @@ class FrameRecorder:
         self._schedule = new_schedule()
         self._plans: list[CutPlan] = []
         self._faces = surface.faces
-        self._ended = True
+        self._ended, self._steps = True, False
         self._first = self._last = np.empty((0, 2))
         self._end_density = np.empty(0)
 
@@ -228,12 +232,19 @@ class FrameRecorder:
         """Keep the layout if the schedule asks for it, and if the piece has moved."""
         if self._keys is None:
             return
-        begins = self._ended or progress.surface.faces is not self._faces
+        in_steps = progress.stage == _STEPS
+        if in_steps and not self._steps and not self._ended:
+            # The layout from which they start is theirs.
+            self.stages[-1].name = _STEPS
+            self._steps = True
+        follows = self._steps and not in_steps
+        begins = self._ended or follows or progress.surface.faces is not self._faces
         if not begins and not self._schedule.is_due(progress.step, progress.max_steps):
             return
         positions = progress.positions()
         if begins:
             self._begin_stage("relax" if progress.stage == "develop" else progress.stage, progress.surface, positions)
+            self._steps = in_steps
             self._schedule.is_due(progress.step, progress.max_steps)
         elif not self._has_moved(positions):
             return

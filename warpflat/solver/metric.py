@@ -85,7 +85,7 @@ def laplacian_solution(surface: Surface) -> Callable[[FloatArray], FloatArray]:
 
     def cycle(level: int, right: NDArray[np.float32]) -> NDArray[np.float32]:
         if level == len(levels):
-            return lowest(right).astype(np.float32)
+            return lowest(right.astype(np.float64)).astype(np.float32)
         fine, inverse, up, down = levels[level]
         x = inverse * right
         x += up @ cycle(level + 1, down @ (right - fine @ x))
@@ -117,7 +117,7 @@ class LaplacianFactor:
     def between(self, vertices: IntArray) -> FloatArray:
         """Return the inverse's entries between some vertices."""
         table = self._columns(vertices)[:, vertices]
-        return np.kron(table, np.eye(2))
+        return np.asarray(np.kron(table, np.eye(2)), dtype=np.float64)
 
     def _columns(self, vertices: IntArray) -> FloatArray:
         new = [vertex for vertex in vertices.tolist() if vertex not in self._column]
