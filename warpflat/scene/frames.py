@@ -181,7 +181,7 @@ class Film:
         self, writer: FrameWriter, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool
     ) -> None:
         measures = {
-            "stage": stage.name,
+            "stage": _STEPS if 0 < frame.measures.get("step", 0) <= stage.last_first_step else stage.name,
             "stage_number": number,
             "interpolated": frame.face_energy_density is None,
             **_counts_whole(frame.measures),
@@ -224,7 +224,7 @@ class FrameRecorder:
         self._schedule = new_schedule()
         self._plans: list[CutPlan] = []
         self._faces = surface.faces
-        self._ended, self._steps = True, False
+        self._ended = True
         self._first = self._last = np.empty((0, 2))
         self._end_density = np.empty(0)
 
@@ -232,19 +232,14 @@ class FrameRecorder:
         """Keep the layout if the schedule asks for it, and if the piece has moved."""
         if self._keys is None:
             return
-        in_steps = progress.stage == _STEPS
-        if in_steps and not self._steps and not self._ended:
-            # The layout from which they start is theirs.
-            self.stages[-1].name = _STEPS
-            self._steps = True
-        follows = self._steps and not in_steps
-        begins = self._ended or follows or progress.surface.faces is not self._faces
+        begins = self._ended or progress.surface.faces is not self._faces
+        if progress.stage == _STEPS and not begins:
+            self.stages[-1].last_first_step = progress.step
         if not begins and not self._schedule.is_due(progress.step, progress.max_steps):
             return
         positions = progress.positions()
         if begins:
             self._begin_stage("relax" if progress.stage == "develop" else progress.stage, progress.surface, positions)
-            self._steps = in_steps
             self._schedule.is_due(progress.step, progress.max_steps)
         elif not self._has_moved(positions):
             return
@@ -264,7 +259,7 @@ class FrameRecorder:
         self._keep(
             result.positions,
             result.face_energy_density,
-            {"step": result.stages[-1].steps, **result.layout_measures},
+            {"step": self.stages[-1].last_first_step + result.stages[-1].steps, **result.layout_measures},
         )
         self._ended, self._end_density = True, result.face_energy_density
 

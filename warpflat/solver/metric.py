@@ -4,7 +4,8 @@ A metric A stands for the second derivative of the energy; the direction of desc
 `LaplacianFactor`: the Laplacian of the surface times the cloth's stiffness, the same for all layouts (Liu et al. 2017). On surfaces too
 large to factor its solution is a V-cycle: damped Jacobi before and after a correction by the coarser mesh, whose matrix is P^T L P, down
 to one that is factored (Briggs, Henson and McCormick, A Multigrid Tutorial); L-BFGS takes as many iterations with it.
-`StiffnessFactor`: the Gauss-Newton stiffness J^T J of springs, guard and equations in one layout, in which stiff seams cost no more iterations than soft ones.
+`StiffnessFactor`: the Gauss-Newton stiffness J^T J of springs, guard and equations in one layout, in which stiff seams cost no more
+iterations than soft ones.
 
 Rows R are added to it exactly, (A + R^T R)^-1 = A^-1 - A^-1 R^T (I + R A^-1 R^T)^-1 R A^-1: contacts, and the chords of the grain,
 which are held as rows of infinite stiffness, without the I.
