@@ -343,7 +343,7 @@ def test_cuts_are_tried_with_the_options_of_the_run(monkeypatch: pytest.MonkeyPa
     assert not given
     assert front.measures["wear"]["would_help"] == []
     assert advise(front).measures["wear"]["would_help"]
-    assert {(one.solver, one.check_every) for one in given} == {("plain", 7)}
+    assert {(one.solver, one.check_every) for one in given} == {("paper", 7)}
     assert all(one.energy_tolerance == pytest.approx(2e-4) for one in given)
 
 

@@ -64,7 +64,7 @@ def test_no_frame_moves_a_vertex_by_more_than_a_twentieth_of_its_stage(tmp_path:
         "relax",
         "relax",
         "cut:slit",
-        "cut:slit",
+        "steps",
         "sew",
     ]
     tags = [prim.GetAttribute("warpflat:interpolated").Get(at) for at in range(1, 61)]
