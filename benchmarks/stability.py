@@ -60,7 +60,7 @@ Energies = Iterator[tuple[float, float]]
 
 
 def approximate_implicit(case: Case, time_step: float, *, damped: bool) -> Energies:
-    """`warpflat.solver.relaxation`, step by step."""
+    """`warpflat.solver.steps`, step by step."""
     state = Relaxation(case.network, RelaxOptions(time_step=time_step, kinetic_damping=damped), start=case.start)
     while True:
         state.step()
