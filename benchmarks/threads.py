@@ -38,7 +38,8 @@ def sweep_of(network: SpringNetwork, start: FloatArray) -> Callable[[], None]:
     state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
 
     def sweep() -> None:
-        state.sweep(SWEEP, watch_every=SWEEP)
+        for number in range(SWEEP):
+            state.step(check_cells=number == 0)
         wp.synchronize_device(network.device)
 
     # Launches are recorded when they are first used, for so many threads as are wished for then.
