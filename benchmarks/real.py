@@ -35,7 +35,7 @@ from warpflat.flattening.result import Flattening
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.strain import layout_errors, strain_energy
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface
@@ -108,7 +108,7 @@ def _ours(surface: Surface, fabric: str, repeats: int) -> tuple[dict[str, Any], 
 
     def energy(positions: FloatArray) -> float:
         state.position.assign(positions)
-        value = float(state.potentials().sum())
+        value = float(state.energies().potential)
         return value if math.isfinite(value) else math.inf
 
     end = energy(watched.positions)

@@ -61,7 +61,7 @@ CLOTH = warpflat.Fabric(
 # Our solvers by name: what `warpflat.flatten` is called with beside the surface, the fabric and the datum.
 OURS: dict[str, dict[str, Any]] = {
     "warpflat": {},
-    "warpflat plain": {"relax": warpflat.RelaxOptions(solver="plain", max_steps=1_000_000)},
+    "warpflat plain": {"relax": warpflat.RelaxOptions(solver="paper", max_steps=1_000_000)},
 }
 # Peers get no slower than this to be waited for, above which sizes.
 _MOST_VERTICES = {"L-BFGS": 200_000, "SLIM": 200_000, "LSCM": 200_000, "warpflat plain": 50_000}

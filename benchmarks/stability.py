@@ -23,8 +23,7 @@ from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relax import relax
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation, relax_by_steps
 from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
@@ -52,7 +51,7 @@ class Case:
         start = develop(surface, surface.lines["centre"]).positions
         network = SpringNetwork.build(surface, fabric, start, device="cpu")
         options = RelaxOptions(residual_tolerance=1e-6, energy_tolerance=1e-10)
-        energies = relax(Relaxation(network, options, start=start)).energies
+        energies = relax_by_steps(Relaxation(network, options, start=start)).energies
         return cls(network=network, start=start, least=energies.potential, guard=energies.guard)
 
 
@@ -61,7 +60,7 @@ Energies = Iterator[tuple[float, float]]
 
 
 def approximate_implicit(case: Case, time_step: float, *, damped: bool) -> Energies:
-    """`warpflat.solver.relaxation`, step by step."""
+    """`warpflat.solver.steps`, step by step."""
     state = Relaxation(case.network, RelaxOptions(time_step=time_step, kinetic_damping=damped), start=case.start)
     while True:
         state.step()

@@ -31,7 +31,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.flattening.progress import Progress
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.connectivity import border_of, components
 from warpflat.surface.io.read import read_scan, read_surface
 from warpflat.surface.mesh import Surface
@@ -135,7 +135,7 @@ def measure(name: str, surface: Surface, fabric: str, repeats: int) -> tuple[boo
 
     def energy(positions: FloatArray) -> float:
         state.position.assign(positions)
-        value = float(state.potentials().sum())
+        value = float(state.energies().potential)
         return value if math.isfinite(value) else math.inf
 
     def moved(positions: FloatArray) -> float:

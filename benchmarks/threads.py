@@ -24,7 +24,7 @@ from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
@@ -38,7 +38,8 @@ def sweep_of(network: SpringNetwork, start: FloatArray) -> Callable[[], None]:
     state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
 
     def sweep() -> None:
-        state.sweep(SWEEP, watch_every=SWEEP)
+        for number in range(SWEEP):
+            state.step(check_cells=number == 0)
         wp.synchronize_device(network.device)
 
     # Launches are recorded when they are first used, for so many threads as are wished for then.

@@ -76,21 +76,22 @@ class Stage(Entry):
     """A stage of a piece's history, with the energies at its end."""
 
     name: str
-    """develop, relax, contact, sew, cut:NAME and so on."""
+    """develop, steps (the paper's, with which a relaxation begins), relax, contact, sew, cut:NAME and so on."""
     model_energy_j: float
     """What is minimised: springs and guard, or membrane and guard."""
     guard_energy_j: float
     strain_energy_j: float
     """Eq. (3) of the paper."""
     steps: int
+    """Approximate implicit steps, or iterations of L-BFGS."""
     work_units: float
     """All work, in approximate implicit steps over all vertices."""
     seconds: float
     converged: bool
     residual: float | None
-    """Largest force on a vertex over the mean spring force."""
+    """Largest force on a vertex over the mean spring force; null for develop and steps."""
     left: Left | None
-    """Of L-BFGS; null for other schemes."""
+    """Of L-BFGS; null for the paper's steps."""
 
 
 class CutSeam(Entry):

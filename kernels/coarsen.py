@@ -9,8 +9,7 @@ wp.set_module_options({"enable_backward": False})
 # Quality is 4 sqrt(3) area / sum of squared sides: 1 for an equilateral triangle, below 0 for a mirrored one. This
 # times a parallelogram's area over half the sum.
 _EQUILATERAL = wp.constant(wp.float64(1.7320508075688772))
-# Least quality of a new triangle in the plane, and least cosine of the border's turn at a vertex that may collapse.
-LEAST_FLAT_QUALITY = wp.constant(wp.float64(0.05))
+# Least cosine of the border's turn at a vertex that may collapse.
 LEAST_STRAIGHT = wp.constant(wp.float64(0.7))
 
 
@@ -21,13 +20,12 @@ class Ring:
     Two that follow each other form a triangle with it, and so do the last and the first. At the border the last is -1,
     for the outside.
 
-    vertices: #V, on the body [m]. layout: #V, in the plane [m], or none.
+    vertices: #V, on the body [m].
     offset: #V+1, where each vertex's place in `neighbor` begins. degree: #V, number of entries used.
     neighbor: #N, vertices.
     """
 
     vertices: wp.array(dtype=wp.vec3d)
-    layout: wp.array(dtype=wp.vec2d)
     offset: wp.array(dtype=wp.int32)
     degree: wp.array(dtype=wp.int32)
     neighbor: wp.array(dtype=wp.int32)
@@ -176,27 +174,6 @@ def worst_after(v: int, j: int, normal: wp.vec3d, ring: Ring):
 
 
 @wp.func
-def mirrors_none(v: int, j: int, ring: Ring):
-    """Return whether no triangle is (nearly) mirrored in the plane when v collapses into its j-th neighbour."""
-    if ring.layout.shape[0] == 0:
-        return True
-    u = ring.layout[at(ring, v, j)]
-    a = at(ring, v, j + 1)
-    for i in range(j + 2, j + ring.degree[v]):
-        b = at(ring, v, i)
-        if a >= 0 and b >= 0:
-            ua = ring.layout[a] - u
-            ub = ring.layout[b] - u
-            sides = wp.dot(ua, ua) + wp.dot(ub, ub) - wp.dot(ua, ub)
-            if _EQUILATERAL * (ua[0] * ub[1] - ua[1] * ub[0]) < LEAST_FLAT_QUALITY * wp.max(
-                sides, wp.float64(1.0e-300)
-            ):
-                return False
-        a = b
-    return True
-
-
-@wp.func
 def keeps_topology(v: int, j: int, ring: Ring):
     """Return whether v may collapse into its j-th neighbour.
 
@@ -253,7 +230,7 @@ def find_target(v: int, ring: Ring, least: wp.float64):
                 best_j = j
             j += step
         bar = best
-        if best_j < 0 or (keeps_topology(v, best_j, ring) and mirrors_none(v, best_j, ring)):
+        if best_j < 0 or keeps_topology(v, best_j, ring):
             break
     return best_j, best
 
@@ -394,3 +371,59 @@ def locate(
                     parent[v] = wp.vec3i(u, a, b)
                     weight[v] = w / (w[0] + w[1] + w[2])
         i += 1
+
+
+@wp.kernel
+def compose_rows(
+    gone: wp.array(dtype=wp.int32),
+    parent: wp.array(dtype=wp.vec3i),
+    weight: wp.array(dtype=wp.vec3d),
+    passes: int,
+    # outputs
+    row: wp.array(dtype=wp.int32),
+    offset: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=wp.float64),
+):
+    """Compose the weights of each vertex from those of the kept ones; for one thread.
+
+    Vertices that collapsed last come first, since parents stay longer.
+
+    gone, parent, weight: #V, as `collapse` and `locate` have them; passes: their number. row: #V, the row of each
+    vertex, those that are kept first, in their order. offset: #V+1, where rows begin; the last stays 0 if there was not
+    room for all. column, value: vertices kept, by their numbers, and their weights.
+    """
+    rows = int(0)
+    end = int(0)
+    for back in range(passes + 1):
+        number = wp.where(back == 0, 0, passes + 1 - back)
+        for v in range(gone.shape[0]):
+            if gone[v] == number:
+                if number == 0:
+                    column[end] = rows
+                    value[end] = wp.float64(1.0)
+                    end += 1
+                else:
+                    begin = int(end)
+                    for k in range(3):
+                        if weight[v][k] != wp.float64(0.0):
+                            of = row[parent[v][k]]
+                            e = natural(offset[of])
+                            e_end = offset[of + 1]
+                            while e < e_end:
+                                to = int(begin)
+                                while to < end and column[to] != column[e]:
+                                    to += 1
+                                if to == end:
+                                    if end == column.shape[0]:
+                                        return
+                                    column[end] = column[e]
+                                    value[end] = wp.float64(0.0)
+                                    end += 1
+                                value[to] = value[to] + weight[v][k] * value[e]
+                                e += 1
+                row[v] = rows
+                rows += 1
+                if rows < gone.shape[0]:
+                    offset[rows] = end
+    offset[gone.shape[0]] = end

@@ -1,8 +1,7 @@
 """Approximate implicit integration, paper eqs. (4)-(10) with spring-wise stiffness: two gathers per step, no matrix.
 
-The step is also a smoother: without viscosity, and with factors of the velocity and of its change that vary from step
-to step (`warpflat.solver.smoother`). `coefficients`, an array of one vec3d, holds the factors of the viscosity (0 or
-1), of the velocity and of its change; with three ones it is the paper's step.
+`coefficients`, an array of one vec3d, holds the factors of the viscosity (0 or 1), of the velocity and of its change; with three ones it
+is the paper's step.
 """
 
 import warp as wp
@@ -223,39 +222,6 @@ def stop(
     """Set velocities, and the results of `gather_forces`, to those of the state at rest. Arguments as there, all #V."""
     i = natural(wp.tid() + first)
     stop_vertex(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
-
-
-@wp.kernel
-def stop_braked(
-    piece: wp.array(dtype=wp.int32),
-    power: wp.array(dtype=wp.float64),
-    mass: wp.array(dtype=wp.float64),
-    force: wp.array(dtype=wp.vec2d),
-    stiffness: wp.array(dtype=wp.float64),
-    time_step: wp.float64,
-    first: int,
-    # outputs
-    velocity: wp.array(dtype=wp.vec2d),
-    driving_force: wp.array(dtype=wp.vec2d),
-    first_guess: wp.array(dtype=wp.vec2d),
-):
-    """Apply `stop` to pieces whose power (#P) is negative. piece: #V, the piece of each vertex."""
-    i = natural(wp.tid() + first)
-    if power[piece[i]] < wp.float64(0.0):
-        stop_vertex(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
-
-
-@wp.kernel
-def count_braked(
-    power: wp.array(dtype=wp.float64),
-    first: int,
-    # outputs
-    count: wp.array(dtype=wp.int32),
-):
-    """Count how often each piece was stopped: add one where its power is negative. All #P."""
-    p = natural(wp.tid() + first)
-    if power[p] < wp.float64(0.0):
-        count[p] = count[p] + 1
 
 
 @wp.kernel

@@ -20,7 +20,7 @@ from warpflat.fabric.library import find_fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.shapes import bodice
 
 
@@ -52,17 +52,18 @@ def steps_of(threads: int, *, triangles: bool) -> dict[str, np.ndarray]:
     start = develop(surface, surface.lines["centre"]).positions
     network = SpringNetwork.build(surface, find_fabric("denim"), start, device="cpu")
     state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
-    assert len(state._buffers.advance.commands) == threads
-    state.sweep(20)
+    assert len(state._advance.commands) == threads
+    for _ in range(20):
+        state.step()
     return {
         "position": state.position.numpy().copy(),
         "velocity": state.velocity.numpy().copy(),
         "force": state.force.numpy().copy(),
         # Of corners of faces that act; nobody reads those of the others.
         "face force": np.where(
-            np.repeat(state._buffers.face_acting.numpy(), 4)[:, None] != 0, state._buffers.face_force.numpy(), 0.0
+            np.repeat(state._cell_forces.acting.numpy(), 4)[:, None] != 0, state._cell_forces.force.numpy(), 0.0
         )[(surface.faces >= 0).ravel()],
-        "energies": state.potentials(),
+        "energies": np.array([state.energies().spring, state.energies().guard]),
     }
 
 

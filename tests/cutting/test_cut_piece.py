@@ -26,7 +26,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.scene.cut_tables import CutTable
 from warpflat.scene.cuts import plan_cuts
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface import half_edges as mesh_half_edges
 from warpflat.surface.cells import face_creases, make_cells
 from warpflat.surface.cut.cut_mesh import cut_along
@@ -261,8 +261,8 @@ def test_the_relaxation_goes_on_from_the_present_layout(bodice: Flattening):
     result = cut(bodice, paper_cuts()[0], callback=watch)
     assert np.array_equal(first[0], bodice.positions[result.vertex_origin])
     assert seen[0].model_energy == pytest.approx(bodice.stages[-1].model_energy_j, rel=1e-9)
-    assert {progress.stage for progress in seen} == {"cut:bust"}
-    assert [stage.name for stage in result.stages] == ["develop", "relax", "cut:bust"]
+    assert {progress.stage for progress in seen} == {"steps", "cut:bust"}
+    assert [stage.name for stage in result.stages] == ["develop", "steps", "relax", "steps", "cut:bust"]
 
 
 def test_cuts_may_meet_and_follow_one_another(bodice: Flattening, bust_cut: Flattening):

@@ -23,11 +23,8 @@ from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
 from warpflat.model.wear import Wear
-from warpflat.solver.multigrid.levels import Levels
-from warpflat.solver.multigrid.solve import _CycledPieces, _progress_of, multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relax import relax
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
@@ -75,20 +72,21 @@ def check(surfaces: Sequence[Surface], **options: object) -> list[Flattening]:
         assert piece.flipped_faces == 0
         assert potential(piece) == pytest.approx(potential(alone), rel=1e-3)
         assert outline_difference(piece, alone) < 1e-4
-        assert [stage.name for stage in piece.stages] == ["develop", "relax"]
+        steps = [] if piece.options.solver == "paper" else ["steps"]
+        assert [stage.name for stage in piece.stages] == ["develop", *steps, "relax"]
         assert piece.stages[0].model_energy_j == pytest.approx(alone.stages[0].model_energy_j, rel=1e-12)
         assert piece.stages[0].strain_energy_j == pytest.approx(alone.stages[0].strain_energy_j, rel=1e-12)
-        assert piece.stages[1].strain_energy_j == pytest.approx(piece.worn.energy.sum(), rel=1e-12)
-        options, left = RelaxOptions(), piece.stages[1].left
+        assert piece.stages[-1].strain_energy_j == pytest.approx(piece.worn.energy.sum(), rel=1e-12)
+        options, left = RelaxOptions(), piece.stages[-1].left
         if left is None:
-            assert piece.stages[1].residual <= options.residual_tolerance
+            assert piece.stages[-1].residual <= options.residual_tolerance
         else:
             assert left.energy_share <= options.energy_left
             assert left.outline_mm <= options.outline_left_mm
         np.testing.assert_allclose(
-            piece.history[-1, 1:3], [piece.stages[1].model_energy_j, piece.stages[1].guard_energy_j]
+            piece.history[-1, 1:3], [piece.stages[-1].model_energy_j, piece.stages[-1].guard_energy_j]
         )
-        assert piece.history[-1, 0] == piece.stages[1].steps
+        assert piece.history[-1, 0] == sum(stage.steps for stage in piece.stages)
         assert piece.notes == alone.notes
         assert piece.measures["length_error"] == pytest.approx(alone.measures["length_error"], rel=1e-2)
     return batch
@@ -113,17 +111,15 @@ def test_pieces_of_unlike_sizes_and_meshes():
     )
 
 
-def test_pieces_for_which_levels_do_not_pay():
+def test_soft_cloth_on_quads_and_triangles():
     pieces = [shape("dome", 17, triangles=True), shape("bodice", 15, triangles=True), shape("bodice", 17)]
-    batch = check(pieces, fabric="woven")
-    assert [multigrid_pays(piece.network) for piece in batch] == [False, False, True]
+    check(pieces, fabric="woven")
 
 
 def test_plain_steps():
     batch = check(
-        [shape("dome", 15), shape("bodice", 15), shape("dome", 15, size=1.2)], relax=RelaxOptions(solver="plain")
+        [shape("dome", 15), shape("bodice", 15), shape("dome", 15, size=1.2)], relax=RelaxOptions(solver="paper")
     )
-    # Each is stepped until it has come to rest itself, or until it is worth while to go on without it.
     assert batch[0].stages[-1].steps < batch[1].stages[-1].steps
 
 
@@ -175,12 +171,12 @@ def test_what_is_told_on_the_way():
     for number, piece in enumerate(batch):
         assert told[number][0].stage == "develop"
         assert told[number][0].step == 0
-        assert {progress.stage for progress in told[number][1:]} == {"relax"}
+        assert {progress.stage for progress in told[number][1:]} == {"steps", "relax"}
         assert told[number][0].surface is surfaces[number]
         np.testing.assert_array_equal(layouts[number][0], piece.development.positions)
         assert layouts[number][-1].shape == piece.positions.shape
         assert told[number][0].model_energy == piece.stages[0].model_energy_j
-        assert told[number][-1].step == piece.stages[-1].steps
+        assert told[number][-1].step == sum(stage.steps for stage in piece.stages)
 
 
 def test_a_work_limit_is_told_of_those_that_met_it():
@@ -275,94 +271,13 @@ def test_a_joined_network_has_the_energies_and_forces_of_its_parts(model: str, s
     joined = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
     alone = [Relaxation(part, RelaxOptions(), start=start) for part, start in zip(parts, starts, strict=True)]
     forces = joined.forces()
-    for piece, state in enumerate(alone):
-        np.testing.assert_array_equal(forces[joined.vertex_ranges[piece]], state.forces())
-        np.testing.assert_allclose(joined.piece_energies()[piece], state.piece_energies()[0], rtol=1e-12)
-        np.testing.assert_allclose(joined.residuals()[piece], state.residuals()[0], rtol=1e-12)
+    first = np.cumsum([0, *(len(start) for start in starts)])
+    for begin, end, state in zip(first[:-1], first[1:], alone, strict=True):
+        np.testing.assert_array_equal(forces[begin:end], state.forces())
+    each = [state.energies() for state in alone]
+    assert joined.energies().spring == pytest.approx(sum(of.spring for of in each), rel=1e-12)
+    assert joined.energies().guard == pytest.approx(sum(of.guard for of in each), rel=1e-12)
     if model == "springs":
         # Between triangles threads are held by less, by each mesh's own measure.
         assert len({tuple(row) for row in joined.network.cells.onset.numpy().tolist()}) == 3
         assert min(state.energies().guard for state in alone) > 0.0
-
-
-def test_pieces_brake_each_on_its_own():
-    """Steps of a joined network are those of its parts, whose velocities are set to zero at other steps."""
-    surfaces = [shape("dome", 9), shape("bodice", 11), shape("saddle", 9)]
-    parts, starts = [], []
-    for surface in surfaces:
-        starts.append(1.1 * flatten(surface, fabric=CLOTH, datum="centre", device=DEVICE).development.positions)
-        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device=DEVICE))
-    joined = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
-    alone = [Relaxation(part, RelaxOptions(), start=start) for part, start in zip(parts, starts, strict=True)]
-    joined.sweep(60)
-    for piece, state in enumerate(alone):
-        state.sweep(60)
-        np.testing.assert_allclose(joined.positions()[joined.vertex_ranges[piece]], state.positions(), atol=1e-14)
-    assert len({state.restarts for state in alone}) > 1
-
-
-def test_levels_of_unlike_pieces_are_joined():
-    surfaces = [shape("dome", 33), shape("dome", 9), shape("bodice", 21)]
-    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device=DEVICE) for each in surfaces]
-    start = np.concatenate([each.vertices[:, :2] for each in surfaces])
-    levels = Levels(Relaxation(join_networks(parts), RelaxOptions(), start=start))
-    # The dome of 9 by 9 has none, and stays, as the bodice's of 11 by 11 does.
-    assert levels.sizes == [33**2 + 9**2 + 21**2, 17**2 + 9**2 + 11**2, 9**2 + 9**2 + 11**2]
-
-
-def test_pieces_that_leave_are_given_back():
-    surfaces = [shape("dome", 13), shape("bodice", 15)]
-    parts, starts = [], []
-    for surface in surfaces:
-        starts.append(flatten(surface, fabric=CLOTH, datum="centre", device=DEVICE).development.positions)
-        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device=DEVICE))
-    whole = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
-    outcome = relax(whole)
-    assert outcome.converged
-    assert whole.status.at_rest.all()
-    assert len(set(whole.status.steps.tolist())) == 2
-    for piece, (part, start) in enumerate(zip(parts, starts, strict=True)):
-        state = Relaxation(part, RelaxOptions(), start=start)
-        alone = relax(state)
-        assert whole.status.steps[piece] == alone.steps
-        assert whole.status.residual[piece] == pytest.approx(alone.residual, rel=1e-9)
-        np.testing.assert_allclose(whole.positions()[whole.vertex_ranges[piece]], state.positions(), atol=1e-12)
-    kept = whole.extract([1])
-    np.testing.assert_array_equal(kept.positions(), whole.positions()[whole.vertex_ranges[1]])
-    assert kept.piece_numbers == [1]
-    assert kept.status.total == whole.status.select([1]).total
-
-
-def test_pieces_that_are_done_are_cycled_no_more():
-    surfaces = [shape("dome", 13), shape("bodice", 13), shape("saddle", 13), shape("dome", 13, size=0.8)]
-    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device=DEVICE) for each in surfaces]
-    start = np.concatenate([each.vertices[:, :2] for each in surfaces])
-    state = Relaxation(join_networks(parts), RelaxOptions(), start=start)
-    state.check_start()
-    cycles = _CycledPieces(state=state, levels=Levels(state), progress=_progress_of(parts))
-    assert cycles.without_finished() is None
-    cycles.progress[1].gains_little = cycles.progress[2].gains_little = True
-    left = cycles.without_finished()
-    assert list(left.state.piece_numbers) == [0, 3]
-    assert left.progress == [cycles.progress[0], cycles.progress[3]]
-    assert left.levels.sizes[0] == left.state.network.vertex_count == 2 * 13**2
-    np.testing.assert_array_equal(left.state.positions(), start.reshape(4, -1, 2)[[0, 3]].reshape(-1, 2))
-
-
-def test_what_is_cycled_apart_comes_to_the_same_minimum(monkeypatch: pytest.MonkeyPatch):
-    surfaces = [shape("bodice", 33), shape("dome", 17), shape("bodice", 17, size=1.2)]
-    starts = [flatten(each, fabric="woven", datum="centre", device=DEVICE).development.positions for each in surfaces]
-    parts = [
-        SpringNetwork.build(each, find_fabric("woven"), start, device=DEVICE)
-        for each, start in zip(surfaces, starts, strict=True)
-    ]
-    energies = []
-    for share in (0.01, 2.0):  # leave as soon as they can, and never
-        monkeypatch.setattr("warpflat.solver.relaxation._REMOVED_SHARE", share)
-        state = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
-        outcome = relax_multilevel(state)
-        assert outcome.converged
-        assert len(set(state.status.steps.tolist())) == (1 if share > 1.0 else 3)
-        np.testing.assert_allclose(state.status.energies, state.piece_energies(), atol=1e-9)
-        energies.append(state.status.potential)
-    np.testing.assert_allclose(*energies, rtol=1e-5)

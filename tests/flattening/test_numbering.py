@@ -138,14 +138,3 @@ def test_an_isotropic_sheet_does_not_feel_its_grain(kind: str, model: str) -> No
             energy, wished = getattr(result.stages[-1], name), getattr(results[0].stages[-1], name)
             assert energy == pytest.approx(wished, rel=1e-6), name
         assert np.abs(outline - outlines[0]).max() < 1e-6
-
-
-def test_a_fall_back_to_plain_steps_has_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Coarser levels that are mirrored, as those of quads wound the other way once were."""
-    monkeypatch.setattr("warpflat.surface.laplacian._MOST_OF_QUADS", 0)
-    monkeypatch.setattr("warpflat.solver.multigrid.levels.make_coarse_levels", lambda *given, **named: [])
-    result = flattened(WHOLE.vertices, WHOLE.faces, WHOLE.lines["centre"], "isotropic")
-    assert [note for note in result.notes if note.startswith("relaxed by plain steps alone: ")]
-    monkeypatch.undo()
-    result = flattened(WHOLE.vertices, WHOLE.faces, WHOLE.lines["centre"], "isotropic")
-    assert not [note for note in result.notes if "plain steps" in note]

@@ -66,7 +66,7 @@ KINDS = (*MESHES, "scene", "fabric", "pattern", "metrics", "scan")
 COMMANDS = (
     ("flatten", "cloth.obj", "--units", "cm", "--fabric", "denim", "--out", "out", *BARE),
     ("flatten", "cloth.obj", "--units", "m", "--name", "front", "--datum", "0,3", "--model", "membrane", *BARE),
-    ("flatten", "cloth.obj", "--units", "m", "--solver", "plain", "--max-steps", "50", "--stretch-warp", "0.1", *BARE),
+    ("flatten", "cloth.obj", "--units", "m", "--solver", "paper", "--max-steps", "50", "--stretch-warp", "0.1", *BARE),
     (
         "flatten",
         "cloth.obj",

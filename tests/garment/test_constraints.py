@@ -18,7 +18,7 @@ from warpflat.garment.sewing import sew
 from warpflat.garment.sewn import Sewn
 from warpflat.model.constraint_equations import smooth_equations
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.shapes import make_shape
 
 FINE = RelaxOptions(energy_tolerance=1e-9, residual_tolerance=2e-4)

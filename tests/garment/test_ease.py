@@ -19,7 +19,7 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.membrane import Model
 from warpflat.pattern.draft import draft_garment
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.shapes import make_shape
 
 

@@ -338,12 +338,12 @@ def test_cuts_are_tried_with_the_options_of_the_run(monkeypatch: pytest.MonkeyPa
         return cut(piece, plan, relax=relax)
 
     monkeypatch.setattr("warpflat.cutting.cut_piece.cut", noted)
-    options = RelaxOptions(solver="plain", check_every=7, energy_tolerance=1e-5)
+    options = RelaxOptions(solver="paper", check_every=7, energy_tolerance=1e-5)
     front = flatten(make_shape("bodice", resolution=13), fabric="denim", datum="centre", wear=Wear(), relax=options)
     assert not given
     assert front.measures["wear"]["would_help"] == []
     assert advise(front).measures["wear"]["would_help"]
-    assert {(one.solver, one.check_every) for one in given} == {("plain", 7)}
+    assert {(one.solver, one.check_every) for one in given} == {("paper", 7)}
     assert all(one.energy_tolerance == pytest.approx(2e-4) for one in given)
 
 

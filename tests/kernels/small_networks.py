@@ -25,7 +25,7 @@ from warpflat.kernels.springs import compute_spring_energy, compute_spring_tensi
 
 from warpflat.fabric.fabric import Fabric
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.smoother import IMPLICIT_STEP
+from warpflat.solver.steps import IMPLICIT_STEP
 from warpflat.surface.repair.validate import make_surface
 
 CLOTH = Fabric(

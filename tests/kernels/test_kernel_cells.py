@@ -11,7 +11,7 @@ from small_networks import CLOTH, DEVICE, Launched, corner_vertices, shaken, sma
 
 from warpflat.fabric.fabric import grain_axes
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.smoother import IMPLICIT_STEP, IMPLICIT_STEP_AT_REST
+from warpflat.solver.steps import IMPLICIT_STEP, IMPLICIT_STEP_AT_REST
 from warpflat.surface.repair.validate import make_surface
 
 # How the patch, seen from the front, is made larger or smaller along weft and warp.

@@ -19,7 +19,7 @@ from warpflat.model.membrane import MODELS, Model
 from warpflat.model.network import SpringNetwork, _repeated
 from warpflat.model.springs import quad_stiffness, springs_of
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.cells import make_cells
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface

@@ -64,7 +64,7 @@ def test_no_frame_moves_a_vertex_by_more_than_a_twentieth_of_its_stage(tmp_path:
         "relax",
         "relax",
         "cut:slit",
-        "cut:slit",
+        "steps",
         "sew",
     ]
     tags = [prim.GetAttribute("warpflat:interpolated").Get(at) for at in range(1, 61)]
@@ -103,7 +103,7 @@ def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
 
     settings = {
         "surface": {"shape": "dome", "resolution": 9},
-        "relax": {"solver": "plain", "max_steps": 40},
+        "relax": {"solver": "paper", "max_steps": 40},
         "output": {"frame_every": 5, "picture": False},
         "pattern": {"formats": []},
     }

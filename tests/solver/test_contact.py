@@ -10,9 +10,9 @@ from warpflat.fabric.library import find_fabric
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier, open_cracks, relax_with_contact
-from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.grain import GrainAlignment
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.injective import certify, is_injective
 from warpflat.surface.mesh import Surface

@@ -269,7 +269,7 @@ def test_stop_keeps_what_has_been_reached_and_frames_come_ten_a_second(tmp_path:
     frames = list[PieceFrame]()
     runner = AtOnce()
     scene = make_scene(
-        {"surface": {"shape": "bodice", "resolution": 33}, "relax": {"solver": "plain"}},
+        {"surface": {"shape": "bodice", "resolution": 33}, "relax": {"solver": "paper"}},
         name="trial", folder=tmp_path, where="trial",
     )  # fmt: skip
 

@@ -9,12 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from surface_meshes import numbered_grid as grid
 
-from warpflat.solver.multigrid.coarsen import coarsen, coarsenings_of
-from warpflat.solver.multigrid.cubic_interpolation import LatticeProlongation
-from warpflat.surface.connectivity import border_loops, components, euler_characteristic
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import Lattice, cut_lattice, find_lattice, rows_and_columns
-from warpflat.surface.half_edges import non_manifold_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -124,31 +121,6 @@ def test_what_lies_on_no_lattice(surface: Surface) -> None:
     assert rows_and_columns(surface) is None
 
 
-@pytest.mark.parametrize("name", ["L", "hole", "crack", "slit", "crooked crack"])
-def test_a_coarser_lattice_has_the_same_border_and_half_the_rows(name: str) -> None:
-    fine = PIECES[name]
-    step = coarsen(fine)
-    assert step is not None
-    coarse = step.surface
-    assert coarse.is_quad.all()
-    assert len(step.kept) < 0.4 * len(fine.vertices)
-    np.testing.assert_array_equal(coarse.vertices, fine.vertices[step.kept])
-    assert not len(non_manifold_edges(coarse.faces))
-    assert components(coarse.faces).max() == 0
-    assert euler_characteristic(coarse.faces) == euler_characteristic(fine.faces)
-    # A flat piece has the area and the length of border that it had.
-    for measure in (area, border_length):
-        assert measure(coarse) == pytest.approx(measure(fine))
-    lattice = find_lattice(fine)
-    assert lattice is not None
-    assert lattice.bends[step.kept].sum() == lattice.bends.sum()
-    # One of the faces of the finer level that lie in it.
-    inside = fine.vertices[fine.faces[step.face_of]].mean(axis=1)
-    quad = coarse.vertices[coarse.faces]
-    assert ((inside > quad.min(axis=1) - 1e-9) & (inside < quad.max(axis=1) + 1e-9)).all()
-    np.testing.assert_allclose(step.prolongation @ coarse.vertices, fine.vertices, atol=1e-15)
-
-
 def area(surface: Surface) -> float:
     p = surface.vertices[surface.faces]
     return float(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])[:, 2].sum())
@@ -159,71 +131,6 @@ def border_length(surface: Surface) -> float:
     return sum(
         float(np.linalg.norm(np.diff(surface.vertices[[*loop, loop[0]]], axis=0), axis=1).sum()) for loop in loops
     )
-
-
-@pytest.mark.parametrize("name", ["L", "hole", "crack", "slit", "crooked crack"])
-def test_cubics_are_carried_up_whole(name: str) -> None:
-    fine = PIECES[name]
-    step = coarsen(fine)
-    assert step is not None
-    assert isinstance(step.smooth_interpolation, LatticeProlongation)
-    x, y = 10.0 * fine.vertices[:, 0], 10.0 * fine.vertices[:, 1]
-    layout = np.column_stack([x**3 - x * y + 0.5, x * x * y**2 - y**3 + x])
-    lattice = find_lattice(fine)
-    assert lattice is not None
-    exact = np.ones(len(layout), dtype=bool)
-    if name in ("L", "hole", "crooked crack"):
-        # Between two lines that stay there may be fewer than four.
-        exact = np.abs(step.smooth_interpolation(layout[step.kept]) - layout).max(axis=1) < 1e-12
-        assert exact.mean() > 0.6
-    np.testing.assert_allclose(step.smooth_interpolation(layout[step.kept])[exact], layout[exact], atol=1e-12)
-    straight = np.column_stack([1.0 + 2.0 * x - y, 0.5 * y])
-    np.testing.assert_allclose(step.smooth_interpolation(straight[step.kept]), straight, atol=1e-12)
-
-
-def test_nothing_is_carried_across_a_crack() -> None:
-    fine = PIECES["crack"]
-    step = coarsen(fine)
-    assert step is not None
-    assert step.smooth_interpolation is not None
-    x, y = fine.vertices[:, 0], fine.vertices[:, 1]
-    at_crack = np.isclose(x, 0.08) & (y < 0.1299)
-    # Of the two sides of the crack, which belongs to faces on the right.
-    face_x = fine.vertices[fine.faces].mean(axis=1)[:, 0]
-    of_right = np.zeros(len(x), dtype=bool)
-    of_right[fine.faces[face_x > 0.08]] = True
-    right = ((x > 0.0801) | (at_crack & of_right)) & (y < 0.1199)
-    opened = np.where(right[:, None], 1.0, 0.0) * np.ones(2)
-    carried = step.smooth_interpolation(opened[step.kept])
-    left = ((x < 0.0799) | (at_crack & ~of_right)) & (y < 0.1201)
-    assert np.count_nonzero(left) > 100
-    np.testing.assert_array_equal(carried[left], 0.0)
-    np.testing.assert_allclose(carried[right & (y < 0.06)], 1.0, atol=1e-12)
-
-
-def test_a_narrow_strip_keeps_its_lines_and_the_rest_is_thinned() -> None:
-    """A crack three columns from the border: with a single quad between them a coarser lattice would bend too stiffly there."""
-    surface = piece(np.ones((20, 24), dtype=bool), crack=[(row, 3) for row in range(13)])
-    step = coarsen(surface)
-    assert step is not None
-    x, y = (np.unique(np.rint(100.0 * step.surface.vertices[:, k])) for k in range(2))
-    np.testing.assert_array_equal(x, [0, 1, 2, 3, *range(6, 25, 2)])
-    np.testing.assert_array_equal(y, range(0, 21, 2))
-
-
-def test_a_piece_with_narrow_strips_stays_a_lattice_down_to_its_coarsest_level() -> None:
-    """Neck, shoulder and armhole of a bodice are steps in its border, a few quads from one another."""
-    solid = np.ones((90, 40), dtype=bool)
-    solid[76:, :6] = solid[76:, 34:] = False
-    solid[86:, 16:24] = False
-    steps = coarsenings_of(piece(solid))
-    assert len(steps) >= 3
-    for step in steps:
-        assert step.surface.is_quad.all()
-        lattice = find_lattice(step.surface)
-        assert lattice is not None
-        for line in (lattice.row, lattice.column):
-            assert np.diff(np.unique(line[lattice.bends])).min() >= 2
 
 
 def walked(surface: Surface) -> Lattice | None:
@@ -237,15 +144,6 @@ def assert_same(ours: Lattice | None, theirs: Lattice | None) -> None:
     for field in fields(Lattice):
         assert getattr(ours, field.name).dtype == getattr(theirs, field.name).dtype, field.name
         np.testing.assert_array_equal(getattr(ours, field.name), getattr(theirs, field.name), err_msg=field.name)
-
-
-@pytest.mark.parametrize("name", PIECES)
-def test_coarser_lattices_are_known_from_the_finer_ones(name: str) -> None:
-    steps = coarsenings_of(PIECES[name])
-    lattices = [step for step in steps if step.surface.is_quad.all()]
-    assert len(lattices) > 0
-    for step in lattices:
-        assert_same(find_lattice(step.surface), walked(step.surface))
 
 
 @pytest.mark.parametrize("name", ["rectangle", "L", "hole", "numbered"])

@@ -54,8 +54,8 @@ __all__ = ["flatten"]
 @click.option("--pressure", type=float, metavar="PA", help="On the skin; sets the stretch that runs around the body.")
 @click.option(
     "--solver",
-    type=click.Choice(["multilevel", "plain"]),
-    help="Plain: the paper's steps alone.  [default: multilevel]",
+    type=click.Choice(["auto", "paper", "multilevel", "plain"]),
+    help="Paper: the paper's steps alone.  [default: auto]",
 )
 @click.option("--max-steps", type=int, metavar="N", help="Give up after the work of so many steps.")
 @click.option("--time-step", type=float, metavar="SECONDS", help="Of the approximate implicit integration.")

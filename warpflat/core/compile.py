@@ -43,11 +43,7 @@ _COMMON_MODULES = (
     "implicit",
     "unfold",
     "curvature",
-    "cubic_interpolation",
-    "line_solve",
     "raster",
-    "prolongation",
-    "reduce",
     "springs",
 )
 # Each thread first reads Warp's own headers, so that more threads gain nothing.

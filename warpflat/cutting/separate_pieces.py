@@ -15,7 +15,7 @@ from warpflat.flattening.datum import choose_datum
 from warpflat.flattening.result import Flattening
 from warpflat.model.strain import strain_energy
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.cut.cut_mesh import Seam
 from warpflat.surface.cut.pieces import Piece, split_pieces
 from warpflat.surface.mesh import Surface

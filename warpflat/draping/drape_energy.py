@@ -21,7 +21,8 @@ from warpflat.kernels.drape_contact import anchor_friction, carry_contact, find_
 from warpflat.kernels.drape_stiffness import stiffen_cloth, stiffen_contact
 from warpflat.kernels.membrane_cell import Cloth
 from warpflat.model.membrane import make_cloth
-from warpflat.solver.quasi_newton import Point, Solve
+from warpflat.solver.energy import Point
+from warpflat.solver.metric import Solve
 
 __all__ = ["DrapeEnergy"]
 

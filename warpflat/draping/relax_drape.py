@@ -29,7 +29,7 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.kernels.drape_steps import advance_drape, watch_power
 from warpflat.kernels.reduce import sum_blocks
-from warpflat.solver.quasi_newton import Descent
+from warpflat.solver.minimise import Descent
 
 __all__ = ["DrapedCloth", "relax_drape"]
 

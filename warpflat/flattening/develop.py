@@ -18,7 +18,7 @@ from warpflat.core.launch import launch_each
 from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
 from warpflat.kernels.grid_lists import lay_profiles
-from warpflat.solver.multigrid.coarsen import Coarsening, coarsenings_of
+from warpflat.solver.collapse import Coarsening, iterate_coarsenings
 from warpflat.surface.cells import CellArrays, make_cells
 from warpflat.surface.connectivity import border_of, coincident_vertices, euler_characteristic, non_manifold_vertices
 from warpflat.surface.grid import rows_and_columns
@@ -159,7 +159,7 @@ def _smoother(surface: Surface, positions: FloatArray) -> Iterator[FloatArray]:
     yield positions
     if len(surface.vertices) > _LARGE:
         kept, steps = positions, list[Coarsening]()
-        for step in coarsenings_of(surface):
+        for step in iterate_coarsenings(surface):
             kept = kept[step.kept]
             steps.insert(0, step)
             smooth = kept

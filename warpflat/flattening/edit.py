@@ -20,10 +20,9 @@ from warpflat.flattening.applied_cut import AppliedCut, cut_sides
 from warpflat.flattening.datum import datum_extent
 from warpflat.flattening.keep_apart import keep_apart
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.relax_pieces import relax_pieces
+from warpflat.flattening.relax_piece import relax_piece
 from warpflat.flattening.relaxation_task import RelaxationTask
 from warpflat.flattening.result import Flattening
-from warpflat.solver.multigrid.coarsen import inherit_levels
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.cells import inherit_cells
 from warpflat.surface.mesh import Surface
@@ -106,7 +105,6 @@ def change_surface(
             input_vertices=surface.input_vertices,
             input_index=surface.input_index[origin],
         )
-    inherit_levels(moved, cut)
     task = _continuation_task(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
     relaxed = _continue(result, task, result.positions)
@@ -247,9 +245,7 @@ def _continuation_task(
 
 def _continue(result: Flattening, task: RelaxationTask, positions: FloatArray) -> Flattening:
     """Relax a task from a layout (#V by 2 [m]), and return the result with its history continued."""
-    (end,) = relax_pieces(
-        [task], [task.build_network(positions)], [positions], direction_updates=[task.max_direction_updates()]
-    )
+    end = relax_piece(task, task.build_network(positions), positions, direction_updates=task.max_direction_updates())
     apart, stages = keep_apart(task, end, positions, cut_sides(result.cuts))
     return replace(
         result,

@@ -1,4 +1,4 @@
-"""`flatten_all`: many surfaces of one fabric are relaxed side by side in one set of launches."""
+"""`flatten_all`: many surfaces of one fabric, one after the other."""
 
 from __future__ import annotations
 
@@ -35,12 +35,9 @@ def flatten_all(
     callback: Callable[[int, Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> list[Flattening]:
-    """Flatten several pieces at once, say all of a garment or one in ten sizes: the patterns that :func:`warpflat.flatten` gives of
-    each, within the tolerances, in less time where the pieces are small.
+    """Flatten several pieces, say all of a garment or one in ten sizes: the patterns that :func:`warpflat.flatten` gives of each.
 
-    Each piece is developed and measured on its own, and comes to its own minimum; only their steps are taken together. A piece that has
-    come to rest is stepped on with the others while it would not pay to leave it out, so that it may get a few steps more than alone.
-    The seconds in the "relax" stage of a piece are those of all pieces that were relaxed with it.
+    All are developed before the first is relaxed, so that a piece that cannot be flattened is refused at once.
 
     Args:
         surfaces: a `Surface`, or the path of a mesh file, for each piece.
@@ -76,4 +73,4 @@ def flatten_all(
             named = repr(own.name) in str(error)
             raise InputError(str(error) if named else f"piece {own.name!r} (surface {number}): {error}") from None
 
-    return relax_developed([develop(number, surface) for number, surface in enumerate(surfaces)])
+    return [relax_developed(piece) for piece in [develop(number, surface) for number, surface in enumerate(surfaces)]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -22,18 +21,16 @@ from warpflat.flattening.develop import Development
 from warpflat.flattening.keep_apart import keep_apart
 from warpflat.flattening.nearly_closed import nearly_closed_notes
 from warpflat.flattening.progress import Progress, Stage
-from warpflat.flattening.relax_pieces import relax_pieces
-from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
+from warpflat.flattening.relax_piece import relax_piece
+from warpflat.flattening.relaxation_task import RelaxationTask
 from warpflat.flattening.result import Flattening
 from warpflat.flattening.start import choose_start, given_start
 from warpflat.model.membrane import Model, check_model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, unused_stretch
-from warpflat.solver.multigrid.coarsen import hierarchy_in_background
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.io.read import read_surface
-from warpflat.surface.laplacian import factor_pays
 from warpflat.surface.mesh import Surface
 
 __all__ = ["flatten"]
@@ -54,6 +51,10 @@ def flatten(
     device: str | None = None,
 ) -> Flattening:
     """Flatten one piece: develop it from its datum line, then relax its mass-spring model to the minimum of its energy.
+
+    By default the relaxation begins with the paper's approximate implicit steps, eqs. (4) to (10), which end where by eq. (11) they gain
+    little (`RelaxOptions.first_steps_gain`); L-BFGS over one factor takes the rest. The stages "steps" and "relax" tell both. With
+    `RelaxOptions(solver="paper")` the steps go on alone. Strain energies are eqs. (1) to (3).
 
     Args:
         surface: a `Surface`, or the path of a mesh file.
@@ -78,7 +79,7 @@ def flatten(
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
     developed = develop_piece(surface, datum, settings, callback, start)
     _refuse_unused_stretch(developed)
-    return relax_developed([developed])[0]
+    return relax_developed(developed)
 
 
 def _refuse_unused_stretch(piece: DevelopedPiece) -> None:
@@ -191,11 +192,9 @@ def develop_piece(
         model=settings.model,
         wear=settings.wear,
     )
-    has_levels = settings.options.solver == "multilevel" and not factor_pays(surface)
-    with hierarchy_in_background(surface) if has_levels else nullcontext():
-        development = choose_start(surface, line) if start is None else given_start(surface, line, start)
-        development = task.shrink_to_rest(development)
-        network = task.build_network(development.positions)
+    development = choose_start(surface, line) if start is None else given_start(surface, line, start)
+    development = task.shrink_to_rest(development)
+    network = task.build_network(development.positions)
     return DevelopedPiece(
         task=task,
         datum_name=line_name,
@@ -206,20 +205,17 @@ def develop_piece(
     )
 
 
-def relax_developed(pieces: Sequence[DevelopedPiece]) -> list[Flattening]:
-    """Relax developed pieces of the same settings side by side: the second half of `flatten`."""
-    relaxed = relax_pieces(
-        [piece.task for piece in pieces],
-        [piece.network for piece in pieces],
-        [piece.development.positions for piece in pieces],
-        direction_updates=[piece.task.max_direction_updates(mended=piece.development.mended) for piece in pieces],
-        needs_isotropic_start=[piece.task.needs_isotropic_start(piece.development) for piece in pieces],
-    )
-    return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
-
-
-def _flattening(piece: DevelopedPiece, end: RelaxedPiece) -> Flattening:
+def relax_developed(piece: DevelopedPiece) -> Flattening:
+    """Relax a developed piece: the second half of `flatten`."""
     task, development = piece.task, piece.development
+    end = relax_piece(
+        task,
+        piece.network,
+        development.positions,
+        direction_updates=task.max_direction_updates(mended=development.mended),
+        needs_isotropic_start=task.needs_isotropic_start(development),
+        from_coarse=development.method != "given",
+    )
     developed = Stage(
         name="develop",
         model_energy_j=end.begin.potential,

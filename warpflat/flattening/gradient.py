@@ -25,7 +25,7 @@ from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import spring_geometry, springs_of
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.cells import make_cells
 
 __all__ = ["Gradient", "gradient"]
@@ -298,7 +298,7 @@ def _exact_minimum(pattern: Flattening, around: _Neighbours, chord: tuple[int, i
 
     def energy(layout: FloatArray) -> float:
         state.position.assign(layout)
-        return float(state.potentials().sum())
+        return float(state.energies().potential)
 
     for _ in range(_MOST_STEPS):
         state.position.assign(positions)

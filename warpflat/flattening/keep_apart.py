@@ -8,9 +8,9 @@ from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.flattening.progress import CONTACT, Stage
 from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
 from warpflat.solver.contact import open_cracks, relax_with_contact, swirl
-from warpflat.solver.convergence import Outcome
-from warpflat.solver.grain_alignment import grain_alignments
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.grain import grain_alignments
+from warpflat.solver.steps import Relaxation
+from warpflat.solver.stop import Outcome
 from warpflat.surface.connectivity import components_of
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.laplacian import factor_pays
@@ -38,13 +38,14 @@ def keep_apart(
         cut_sides: the vertices on the sides of its cuts; a cut whose sides lie over each other is left as it is.
 
     Returns:
-        The layout, #V by 2 [m], and the stages: that of the relaxation, and "contact" if there was one that succeeded.
+        The layout, #V by 2 [m], and the stages: those of the relaxation, and "contact" if there was one that succeeded.
     """
     surface, network, free = end.network.surface, end.network, end.positions
-    relaxed = task.make_stage(network, free, end.outcome)
+    stages = task.make_stages(network, free, end.outcome)
+    relaxed = stages[-1]
     overlap = overlap_area(surface, free, cut_sides) if task.options.gap_mm and not task.stopped else 0.0
     if overlap == 0.0:
-        return free, (relaxed,)
+        return free, stages
     words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
     alignments = grain_alignments(surface, task.datum, free)
     starts = [lambda: open_cracks(surface, start)]
@@ -63,14 +64,14 @@ def keep_apart(
             after = outcome.energies.potential
             share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
             task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
-            return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
+            return state.positions(), (*stages, task.make_stage(network, state.positions(), outcome, name=CONTACT))
         if outcome is not None and len(surface.vertices) > _MOST_SWIRLED:
             task.notes.append(
                 f"{words}, and contact could not part it in {outcome.steps:,} iterations: cut it apart there, or make the mesh coarser"
             )
-            return free, (relaxed,)
+            return free, stages
     task.notes.append(f"{words}, and contact could not part it: cut it apart there")
-    return free, (relaxed,)
+    return free, stages
 
 
 def _swirled(state: Relaxation, outcome: Outcome) -> tuple[Relaxation, Outcome]:

@@ -8,15 +8,16 @@ from typing import Any
 from warpflat.core.arrays import FloatArray
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import WornStrain, worn_strain
-from warpflat.solver.convergence import Energies
-from warpflat.solver.relaxation import Relaxation
-from warpflat.solver.remainder import Remainder
+from warpflat.solver.steps import Relaxation
+from warpflat.solver.stop import Remainder
 from warpflat.surface.mesh import Surface
 
-__all__ = ["CONTACT", "Progress", "Stage"]
+__all__ = ["CONTACT", "STEPS", "Progress", "Stage"]
 
 #: Name of the stage in which a piece that would lie over itself is kept from it.
 CONTACT = "contact"
+#: Name of the stage of the paper's steps with which a relaxation begins.
+STEPS = "steps"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,15 +25,15 @@ class Stage:
     """An entry of a piece's history: its energies at the end of a stage, and what the stage took.
 
     Attributes:
-        name: "develop", "relax", "contact", "cut:NAME" and so on.
+        name: "develop", "steps" (the paper's, with which a relaxation begins), "relax", "contact", "cut:NAME" and so on.
         model_energy_j: what is minimised: springs and guard, or membrane and guard [J].
         guard_energy_j: the part of it that keeps faces unfolded [J].
         strain_energy_j: strain energy of the cloth as worn, eq. (3) of the paper [J].
-        steps: approximate implicit steps on the piece's own mesh.
+        steps: approximate implicit steps, or iterations of L-BFGS.
         work_units: all work, in approximate implicit steps over all vertices.
         seconds: wall time.
         converged: False if it ended at its step limit.
-        residual: largest force on a vertex over the mean spring force; None if there was no relaxation.
+        residual: largest force on a vertex over the mean spring force; None if there was no relaxation to the end.
         left: the estimate of what was still to be relaxed; None where there is none.
     """
 
@@ -53,12 +54,12 @@ class Stage:
 
 
 class Progress:
-    """The progress of a relaxation, which a callback gets after every step and after every multigrid cycle.
+    """The progress of a relaxation, which a callback gets after every step and every iteration of L-BFGS.
 
     Attributes:
-        stage: "develop", before the first step, then "relax"; "cut:NAME" and "close:NAME" where darts open and close, "fabric:NAME" and
-            "surface:NAME" after a change of these, "refine" on a mesh with a path drawn for a cut.
-        step: approximate implicit steps so far, on the piece's own mesh.
+        stage: "develop", before the first step, "steps" during the paper's steps, then "relax"; "cut:NAME" and "close:NAME" where darts
+            open and close, "fabric:NAME" and "surface:NAME" after a change of these, "refine" on a mesh with a path drawn for a cut.
+        step: approximate implicit steps and iterations of L-BFGS so far.
         work_units: all work so far, in such steps.
         max_steps: at most so many.
         model_energy: springs and guard, or membrane and guard, at the last convergence check (see `RelaxOptions.check_every`) [J].
@@ -66,19 +67,16 @@ class Progress:
         residual: largest force over mean spring force, at the same check.
     """
 
-    def __init__(
-        self, stage: str, state: Relaxation, *, energies: Energies, residual: float, max_steps: int, piece: int = 0
-    ) -> None:
-        """Refer to a piece of the running relaxation; its layout is copied when it is asked for."""
+    def __init__(self, stage: str, state: Relaxation, *, max_steps: int) -> None:
+        """Refer to the running relaxation; its layout is copied when it is asked for."""
         self.stage = stage
         self.step = state.steps
         self.work_units = state.work_units
         self.max_steps = max_steps
-        self.model_energy = energies.potential
-        self.guard_energy = energies.guard
-        self.residual = residual
+        self.model_energy = state.status.energies.potential
+        self.guard_energy = state.status.energies.guard
+        self.residual = state.status.residual
         self._state = state
-        self._piece = piece
 
     @property
     def surface(self) -> Surface:
@@ -87,7 +85,7 @@ class Progress:
 
     def positions(self) -> FloatArray:
         """Return a copy of the layout, #V by 2 [m]."""
-        return self._state.positions()[self._state.vertex_ranges[self._piece]]
+        return self._state.positions()
 
     def worn_strain(self) -> WornStrain:
         """Return worn strain, stress and strain energy per face."""
@@ -99,4 +97,4 @@ class Progress:
 
     @property
     def _network(self) -> SpringNetwork:
-        return self._state.network.pieces[self._piece]
+        return self._state.network

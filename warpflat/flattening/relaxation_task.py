@@ -12,14 +12,14 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric, grain_axes
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.develop import Development
-from warpflat.flattening.progress import Progress, Stage
+from warpflat.flattening.progress import STEPS, Progress, Stage
 from warpflat.model.membrane import Model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, intended_stretch
-from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
+from warpflat.solver.stop import Energies, Outcome
 from warpflat.surface.mesh import Surface
 
 __all__ = ["RelaxationTask", "RelaxedPiece"]
@@ -127,21 +127,18 @@ class RelaxationTask:
         alike = self.fabric.is_isotropic or bool(self.surface.is_quad.all())
         return _MAX_UPDATES if self._is_tight or (self.model == "springs" and not alike) else int(mended or not alike)
 
-    def report_progress(self, stage: str, state: Relaxation, piece: int) -> None:
-        """Call the callback with the state of this piece at the last convergence check; it may stop the relaxation."""
+    def report_progress(self, stage: str, state: Relaxation) -> None:
+        """Call the callback with the state at the last convergence check; it may stop the relaxation."""
         if self.callback is not None:
-            check = state.status
-            answer = self.callback(
-                Progress(
-                    stage,
-                    state,
-                    energies=Energies(*check.energies[piece].tolist()),
-                    residual=float(check.residual[piece]),
-                    max_steps=self.options.max_steps,
-                    piece=piece,
-                )
-            )
+            answer = self.callback(Progress(stage, state, max_steps=self.options.max_steps))
             self.stopped = self.stopped or answer is True
+
+    def make_stages(self, network: SpringNetwork, positions: FloatArray, outcome: Outcome) -> tuple[Stage, ...]:
+        """Make the entries of the history for a relaxation: of the paper's first steps, if there were any, and its own."""
+        relaxed = self.make_stage(network, positions, outcome)
+        if outcome.first_steps is None or outcome.first_layout is None:
+            return (relaxed,)
+        return self.make_stage(network, outcome.first_layout, outcome.first_steps, name=STEPS), relaxed
 
     def make_stage(
         self, network: SpringNetwork, positions: FloatArray, outcome: Outcome, *, name: str | None = None
@@ -156,7 +153,7 @@ class RelaxationTask:
             work_units=outcome.work_units,
             seconds=outcome.seconds,
             converged=outcome.converged,
-            residual=outcome.residual,
+            residual=None if np.isnan(outcome.residual) else outcome.residual,
             left=outcome.left,
         )
 
@@ -169,7 +166,7 @@ class RelaxedPiece:
         network: with directions as they were measured last.
         positions: #V by 2, the layout [m].
         begin: energies at the start.
-        outcome: how it ended; the seconds are those of all pieces that were relaxed with it.
+        outcome: how it ended.
     """
 
     network: SpringNetwork

@@ -16,9 +16,9 @@ from warpflat.flattening.flatten_piece import as_surface, check_settings, develo
 from warpflat.model.membrane import Model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import worn_strain
-from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.grain import GrainAlignment
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.mesh import Surface
 
 __all__ = ["RelaxationStep", "relaxation"]
@@ -67,7 +67,7 @@ def relaxation(
 ) -> Iterator[RelaxationStep]:
     """Iterate over the plain steps of a relaxation, from the development until it is at rest or the step limit is reached.
 
-    Multigrid, repeated measuring of directions and contact are left to :func:`warpflat.flatten`, which is faster.
+    L-BFGS, repeated measuring of directions and contact are left to :func:`warpflat.flatten`, which is faster.
 
     Args:
         surface, fabric, datum, grain_angle, units, model, relax, device: as `flatten` takes them.
@@ -90,8 +90,8 @@ def _steps(
     state = Relaxation(network, options, start=start, alignments=[grain])
     status = state.check_start()
     yield _snapshot(state, measured=True)
-    while not status.at_rest.all() and state.steps < options.max_steps:
-        state.sweep(1)
+    while not status.at_rest and state.steps < options.max_steps:
+        state.step()
         state.hold_grain()
         measured = state.steps % energy_every == 0 or state.steps == options.max_steps
         if measured:
@@ -105,8 +105,8 @@ def _snapshot(state: Relaxation, *, measured: bool) -> RelaxationStep:
     return RelaxationStep(
         step=state.steps,
         positions=positions,
-        model_energy_j=status.total.potential if measured else None,
-        residual=status.worst_residual if measured and state.steps else None,
-        converged=bool(status.at_rest.all()) if measured else False,
+        model_energy_j=status.energies.potential if measured else None,
+        residual=status.residual if measured and state.steps else None,
+        converged=status.at_rest if measured else False,
         network=state.network,
     )

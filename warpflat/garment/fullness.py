@@ -16,17 +16,16 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.fabric.fabric import grain_axes
-from warpflat.flattening.progress import Stage
+from warpflat.flattening.progress import STEPS, Stage
 from warpflat.flattening.result import Flattening
 from warpflat.model.membrane import step_matrix
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import SpringArrays, springs_of, with_stiffness
 from warpflat.model.strain import strain_energy
-from warpflat.solver.augmented_lagrangian import factor_pays, relax_under_equations
-from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.equations import relax_under_equations
+from warpflat.solver.grain import GrainAlignment
 from warpflat.solver.options import RelaxOptions, given_options
-from warpflat.solver.relax import relax
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.cells import CellArrays, first_of_faces
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.falloff import falloff_weights
@@ -76,27 +75,33 @@ def give_fullness(
     widening = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
     alignment = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
     state = Relaxation(network, options, start=piece.positions @ widening, alignments=[alignment])
-    outcome = relax_under_equations(state).outcome if factor_pays(network, options) else relax(state)
+    outcome = relax_under_equations(state).outcome
     positions = state.positions()
-    stage = Stage(
-        name="fullness",
-        model_energy_j=outcome.energies.potential,
-        guard_energy_j=outcome.energies.guard,
-        strain_energy_j=strain_energy(network, positions),
-        steps=outcome.steps,
-        work_units=outcome.work_units,
-        seconds=outcome.seconds,
-        converged=outcome.converged,
-        residual=outcome.residual,
-    )
+    ends = [("fullness", positions, outcome)]
+    if outcome.first_steps is not None and outcome.first_layout is not None:
+        ends.insert(0, (STEPS, outcome.first_layout, outcome.first_steps))
+    stages = [
+        Stage(
+            name=name,
+            model_energy_j=end.energies.potential,
+            guard_energy_j=end.energies.guard,
+            strain_energy_j=strain_energy(network, layout),
+            steps=end.steps,
+            work_units=end.work_units,
+            seconds=end.seconds,
+            converged=end.converged,
+            residual=None if np.isnan(end.residual) else end.residual,
+        )
+        for name, layout, end in ends
+    ]
     most = max(edge.factor for edge in edges)
     note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
-    notes = (*piece.notes, note, *_slant_note(network, piece.stages[-1], stage))
+    notes = (*piece.notes, note, *_slant_note(network, piece.stages[-1], stages[-1]))
     return replace(
         piece,
         network=network,
         positions=positions,
-        stages=(*piece.stages, stage),
+        stages=(*piece.stages, *stages),
         notes=notes,
         unsewn=piece.unsewn or piece,
     )

@@ -3,7 +3,7 @@
 Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0, with r the wished
 ratio (1, or with ease). Constraints on borders and lines (`warpflat.garment.constraints`) are equations of the same
 kind. Each equation c = 0 is held by 1/2 k (c + o)^2 with a finite stiffness k. After each round the offset o grows by the
-residual c (`warpflat.solver.augmented_lagrangian`), until all residuals are within their tolerances.
+residual c (`warpflat.solver.equations`), until all residuals are within their tolerances.
 
 **Costs.** The cost of a seam or a constraint, in joules, is half the work of its forces on the way from where the
 pieces lay on their own: 1/2 sum k (c + o) c_unsewn. Were the energy quadratic and the equations linear, these would add
@@ -13,7 +13,7 @@ up to the energy that all constraints together have cost; `Sewn.cost` is that en
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,10 +38,9 @@ from warpflat.model.constraint_equations import (
     stretch_equations,
 )
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.augmented_lagrangian import ConstrainedOutcome, factor_pays, relax_under_equations, stagnates
+from warpflat.solver.equations import ConstrainedOutcome, factor_pays, relax_under_equations
 from warpflat.solver.options import RelaxOptions, given_options
-from warpflat.solver.relax import relax
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation
 from warpflat.surface.falloff import falloff_weights
 from warpflat.surface.injective import is_injective
 
@@ -50,13 +49,6 @@ __all__ = ["sew"]
 
 # Stiffness of an equation over the median spring of the cloth: with a factor of all stiffnesses, and for plain steps.
 _RELATIVE_STIFFNESS, _STIFFNESS_FOR_STEPS = 100.0, 4.0
-# Steps of a round at most: the residuals of a whole seam take a dozen rounds, whether the cloth has come to rest before
-# the offsets grow or only begun to. After every few rounds the next ones become a quarter longer: offsets that follow
-# cloth that still swings keep it swinging.
-_STEPS_PER_ROUND = 40
-_ROUNDS_UNTIL_LONGER = 5
-# Equations contradict each other if their violation has come down by less than a tenth over this many rounds.
-_PATIENCE = 20
 
 
 def sew(
@@ -116,19 +108,15 @@ def sew(
     ended = _relax(state, equations)
     seconds = time.perf_counter() - start_time
     converged = ended.outcome.converged and ended.satisfied
-    sewn = joined.split(state, converged=converged, seconds=seconds, residual=ended.outcome.residual)
+    first = ended.outcome.first_steps
+    own_seconds = seconds - (0.0 if first is None else first.seconds)
+    sewn = joined.split(state, replace(ended.outcome, converged=converged, seconds=own_seconds))
     overlaps = joined.overlaps(state.positions()) if options.gap_mm else {}
     if overlaps:
         parted = _part(state, start, equations)
         if parted is not None:
             state, ended = parted
-            apart = SewingNetwork(sewn).split(
-                state,
-                converged=True,
-                seconds=ended.outcome.seconds,
-                residual=ended.outcome.residual,
-                stage_name=CONTACT,
-            )
+            apart = SewingNetwork(sewn).split(state, replace(ended.outcome, converged=True), stage_name=CONTACT)
             sewn, converged, seconds = apart, True, time.perf_counter() - start_time
         sewn = {name: _with_overlap_note(piece, overlaps.get(name, 0.0)) for name, piece in sewn.items()}
     return Sewn(
@@ -275,39 +263,7 @@ def _relax(state: Relaxation, equations: ConstraintEquations, gap: float = 0.0) 
         farthest = np.abs(residuals[corrected]).max(initial=0.0)
         report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
 
-    if factor_pays(state.network, state.options):
-        return relax_under_equations(state, correction, equations.violation, on_round=on_round, gap=gap)
-    if not len(equations):
-        return ConstrainedOutcome(outcome=relax(state), residuals=np.zeros(0), satisfied=True, contradictory=False)
-    return _relax_by_steps(state, correction, equations.violation, on_round)
-
-
-def _relax_by_steps(
-    state: Relaxation,
-    correction: Callable[[FloatArray], FloatArray],
-    violation: Callable[[FloatArray], float],
-    on_round: Callable[[FloatArray], None],
-) -> ConstrainedOutcome:
-    """Relax by the paper's steps alone, let the offsets grow, and repeat until all is at rest and the equations hold in two rounds running.
-
-    See `relax_under_equations` for the arguments. Two rounds, since within the tolerances the energy may still change.
-    """
-    seams, options, violations = state.network.seams, state.options, list[float]()
-    assert seams is not None
-    while True:
-        steps = _STEPS_PER_ROUND + len(violations) // _ROUNDS_UNTIL_LONGER * _STEPS_PER_ROUND // 4
-        state.options = replace(options, max_steps=min(options.max_steps, state.steps + steps))
-        outcome, residuals = relax(state), _residuals(state)
-        violations.append(violation(residuals))
-        on_round(residuals)
-        done = outcome.converged and len(violations) > 1 and max(violations[-2:]) <= 1.0
-        contradictory = not done and stagnates(violations, _PATIENCE)
-        if done or contradictory or state.steps >= options.max_steps:
-            satisfied = violations[-1] <= 1.0
-            return ConstrainedOutcome(
-                outcome=outcome, residuals=residuals, satisfied=satisfied, contradictory=contradictory
-            )
-        seams.offset.assign(seams.offset.numpy() + correction(residuals))
+    return relax_under_equations(state, correction, equations.violation, on_round=on_round, gap=gap)
 
 
 def _constraint_results(

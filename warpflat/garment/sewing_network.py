@@ -10,13 +10,14 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import range_offsets
 from warpflat.flattening.applied_cut import cut_sides
-from warpflat.flattening.progress import Stage
+from warpflat.flattening.progress import STEPS, Stage
 from warpflat.flattening.result import Flattening
 from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
-from warpflat.solver.grain_alignment import grain_alignments
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.grain import grain_alignments
+from warpflat.solver.steps import Relaxation
+from warpflat.solver.stop import Outcome
 from warpflat.surface.injective import overlap_area
 
 __all__ = ["SewingNetwork"]
@@ -66,24 +67,29 @@ class SewingNetwork:
         }
         return {name: area for name, area in areas.items() if area}
 
-    def split(
-        self, state: Relaxation, *, converged: bool, seconds: float, residual: float, stage_name: str = "sew"
-    ) -> dict[str, Flattening]:
-        """Return each piece with its part of the layout, and a stage in its history."""
-        layout, sewn = state.positions(), {}
+    def split(self, state: Relaxation, outcome: Outcome, *, stage_name: str = "sew") -> dict[str, Flattening]:
+        """Return each piece with its part of the layout, and in its history the stages of a relaxation with this outcome."""
+        first, layout, sewn = outcome.first_steps, state.positions(), {}
+        ends = [(stage_name, layout, outcome)]
+        if first is not None and outcome.first_layout is not None:
+            ends.insert(0, (STEPS, outcome.first_layout, first))
         for name, piece in self.pieces.items():
-            own = layout[self.first[name] : self.first[name] + len(piece.positions)]
-            energies = Relaxation(piece.network, state.options, start=own).energies()
-            stage = Stage(
-                name=stage_name,
-                model_energy_j=energies.potential,
-                guard_energy_j=energies.guard,
-                strain_energy_j=strain_energy(piece.network, own),
-                steps=state.steps,
-                work_units=state.work_units,
-                seconds=seconds,
-                converged=converged,
-                residual=residual,
-            )
-            sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage), unsewn=piece.unsewn or piece)
+            own = slice(self.first[name], self.first[name] + len(piece.positions))
+            stages = list(piece.stages)
+            for stage, place, end in ends:
+                energies = Relaxation(piece.network, state.options, start=place[own]).energies()
+                stages.append(
+                    Stage(
+                        name=stage,
+                        model_energy_j=energies.potential,
+                        guard_energy_j=energies.guard,
+                        strain_energy_j=strain_energy(piece.network, place[own]),
+                        steps=end.steps,
+                        work_units=end.work_units,
+                        seconds=end.seconds,
+                        converged=end.converged,
+                        residual=None if np.isnan(end.residual) else end.residual,
+                    )
+                )
+            sewn[name] = replace(piece, positions=layout[own], stages=tuple(stages), unsewn=piece.unsewn or piece)
         return sewn

@@ -47,7 +47,6 @@ from warpflat.kernels.cells import Cells
 from warpflat.kernels.constraints import Seams, compute_seam_residuals
 from warpflat.kernels.guard import ThreadGuard, compute_guard_energy, evaluate_guard, evaluate_guard_potential
 from warpflat.kernels.implicit import Bonds
-from warpflat.kernels.line_solve import ThreadLines
 from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane, evaluate_membrane_potential
 from warpflat.kernels.membrane_cell import Cloth
 from warpflat.kernels.springs import Springs
@@ -62,7 +61,6 @@ from warpflat.model.springs import (
     with_stiffness,
 )
 from warpflat.surface.cells import CellArrays, make_cells
-from warpflat.surface.grid_lines import LineArrays, join_lines, lines_of
 from warpflat.surface.mesh import Surface
 
 __all__ = ["SpringNetwork"]
@@ -72,10 +70,6 @@ __all__ = ["SpringNetwork"]
 # needle), the mode in which its two ends move against each other would get no correction. This share of the stiffest
 # spring, added to the sum around a vertex, restores it. On a regular grid it costs a few per cent of the steps.
 _PAIR_SHARE = 0.5
-# K/G from which smoothing on a lattice uses line relaxation, and K/G up to which a layout interpolated from a coarser
-# grid has only rough errors.
-_SOFT = 12.0
-_STIFF = 5.0
 
 
 class CellModel(NamedTuple):
@@ -267,16 +261,6 @@ class SpringNetwork:
         return self.parts or (self,)
 
     @property
-    def uses_line_relaxation(self) -> bool:
-        """True if smoothing uses line relaxation on lattices."""
-        return self.model == "springs" and self.fabric.softness >= _SOFT
-
-    @property
-    def is_stiff(self) -> bool:
-        """True if smoothing alone brings a layout to rest that was interpolated from a relaxed coarser grid."""
-        return self.model == "springs" and self.fabric.softness < _STIFF
-
-    @property
     def vertex_count(self) -> int:
         """The number of vertices, #V."""
         return len(self.surface.vertices)
@@ -295,28 +279,6 @@ class SpringNetwork:
     def seam_count(self) -> int:
         """The number of seam and constraint equations, #P."""
         return 0 if self.seams is None else len(self.seams.ends)
-
-    @cached_property
-    def line_arrays(self) -> LineArrays | None:
-        """The rows and columns of pieces on a lattice along which line relaxation may go.
-
-        None if no piece lies on a lattice, or if threads run across the lines.
-        """
-        if not self.parts:
-            return lines_of(self.surface) if self.spring_arrays.aligned else None
-        return join_lines([net.line_arrays for net in self.parts], [net.vertex_count for net in self.parts])
-
-    @cached_property
-    def lines(self) -> ThreadLines | None:
-        """The lines of `line_arrays` on the device; None without lines."""
-        arrays = self.line_arrays
-        if arrays is None:
-            return None
-        lines = ThreadLines()
-        lines.offset = _on(self.device, arrays.offset, wp.int32)
-        lines.vertex = _on(self.device, arrays.vertex, wp.int32)
-        lines.rows = arrays.rows
-        return lines
 
     def sew(
         self,

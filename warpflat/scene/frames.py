@@ -188,7 +188,7 @@ class Film:
         self, writer: FrameWriter, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool
     ) -> None:
         measures = {
-            "stage": stage.name,
+            "stage": _STEPS if 0 < frame.measures.get("step", 0) <= stage.last_first_step else stage.name,
             "stage_number": number,
             "interpolated": frame.face_energy_density is None,
             **_counts_whole(frame.measures),
@@ -208,6 +208,10 @@ class Film:
 def _counts_whole(measures: Mapping[str, float]) -> dict[str, float | int]:
     """Return measures with counts as whole numbers."""
     return {key: round(value) if key in _COUNTS else value for key, value in measures.items()}
+
+
+#: Stage of the paper's steps with which a relaxation begins (`warpflat.flattening.progress`, which loads the solver).
+_STEPS = "steps"
 
 
 class FrameRecorder:
@@ -235,6 +239,8 @@ class FrameRecorder:
         """Keep the layout if the schedule asks for it, and if the piece has moved."""
         with self._recording() as keeps:
             begins = self._ended or progress.surface.faces is not self._faces
+            if keeps and progress.stage == _STEPS and not begins:
+                self.stages[-1].last_first_step = progress.step
             if not keeps or (not begins and not self._schedule.is_due(progress.step, progress.max_steps)):
                 return
             positions = progress.positions()
@@ -261,7 +267,7 @@ class FrameRecorder:
             self._keep(
                 result.positions,
                 result.face_energy_density,
-                {"step": result.stages[-1].steps, **result.layout_measures},
+                {"step": self.stages[-1].last_first_step + result.stages[-1].steps, **result.layout_measures},
             )
             self._ended, self._end_density = True, result.face_energy_density
 

@@ -68,6 +68,7 @@ class FilmStage:
         topology: what the first frame of the stage changes: faces, lines, cuts; nothing if the topology goes on.
         keys: the computed layouts, the first and the last of the stage among them.
         still: whether it only shows its one layout.
+        last_first_step: number of the last of the paper's steps with which it begins; 0 without them.
     """
 
     name: str
@@ -76,6 +77,7 @@ class FilmStage:
     topology: Mapping[str, IntArray | Mapping[str, Any] | Mapping[str, Polylines] | None]
     keys: list[Key] = field(default_factory=list)
     still: bool = False
+    last_first_step: int = 0
 
 
 class KeyFile:

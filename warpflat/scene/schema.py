@@ -25,7 +25,7 @@ from warpflat.fabric.file import FabricTable
 from warpflat.mannequin.table import MannequinTable
 from warpflat.scene.cut_tables import AutoCutTable, CutTable, PlaneTable, Point, PointOrVertex, Vertex
 from warpflat.scene.making_up_tables import ClothTable, FinishingTable, MarkerTable, OpeningTable, PocketTable
-from warpflat.solver.options import RelaxOptions
+from warpflat.solver.options import FORMER_SOLVERS, RelaxOptions, Solver
 
 __all__ = [
     "BorderTable",
@@ -243,9 +243,15 @@ class PatternTable(Table):
     """More sizes of a mannequin's garment, flattened too and laid upon each other as a graded nest."""
 
 
+def _as_solver(value: object) -> object:
+    """Read the names of earlier versions."""
+    return FORMER_SOLVERS.get(value, value) if isinstance(value, str) else value
+
+
 _RELAX_FIELDS: dict[str, Any] = {
     field.name: (get_type_hints(RelaxOptions)[field.name] | None, None) for field in dataclasses.fields(RelaxOptions)
 }
+_RELAX_FIELDS["solver"] = (Annotated[Solver | None, BeforeValidator(_as_solver)], None)
 if TYPE_CHECKING:
     RelaxTable = Table
 else:

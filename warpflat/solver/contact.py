@@ -4,7 +4,7 @@ The model energy is minimised together with a barrier between border vertices an
 Li et al. 2020, and Smith and Schaefer 2015): b(r) = -k (r - g)^2 ln(r / g) below a gap g, where r is their distance. The gap is
 g = d min(1, s / s0), s the way along the border on the body, so that the sides of a notch may meet at its tip.
 
-The minimiser is that of `warpflat.solver.quasi_newton`, to whose metric the stiffness of the contacts is added exactly by Woodbury's
+The minimiser is that of `warpflat.solver.minimise`, to whose metric the stiffness of the contacts is added exactly by Woodbury's
 formula. A step is halved until the energy falls and the border is simple. The energy of the guard is infinite where a face is mirrored.
 Hence every layout on the way is injective, and the last one is certified.
 """
@@ -12,22 +12,23 @@ Hence every layout on the way is injective, and the last one is certified.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IndexArray, IntArray
+from warpflat.core.arrays import FloatArray, IndexArray
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.convergence import Outcome
-from warpflat.solver.grain_alignment import align_grain, remove_rotation
-from warpflat.solver.quasi_newton import Descent, Metric, Point, Solve
-from warpflat.solver.relaxation import Relaxation
-from warpflat.solver.remainder import Remainder, RemainderEstimate
+from warpflat.solver.energy import NO_CONTACTS, Contacts, Energy, Point
+from warpflat.solver.grain import align_grain, remove_rotation
+from warpflat.solver.metric import LaplacianFactor, Metric, Solve
+from warpflat.solver.minimise import Descent
+from warpflat.solver.steps import Relaxation
+from warpflat.solver.stop import Outcome, Remainder, RemainderEstimate
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.surface.mesh import Surface
 
-__all__ = ["Barrier", "ContactPoint", "Contacts", "evaluate_with_contact", "open_cracks", "relax_with_contact", "swirl"]
+__all__ = ["Barrier", "open_cracks", "relax_with_contact", "swirl"]
 
 # Two places of the border have the whole gap between them if the way between them along the border is at least this [m],
 _FULL_GAP_WAY = 0.025
@@ -74,40 +75,6 @@ def swirl(positions: FloatArray, turn: float) -> FloatArray:
     return middle + np.stack([place.real, place.imag], axis=1)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Contacts:
-    """The contacts of a layout.
-
-    Attributes:
-        energy: of the barrier [J]; infinite where the border is not simple.
-        vertices: #C by 3, a vertex and the two ends of the edge near it.
-        lever: #C by 3 by 2, derivative of the distance by the places of these vertices.
-        slope, bend: #C, first and second derivative of the barrier by the distance [N], [N/m].
-    """
-
-    energy: float
-    vertices: IntArray
-    lever: FloatArray
-    slope: FloatArray
-    bend: FloatArray
-
-    def add_gradient(self, gradient: FloatArray) -> None:
-        """Add the gradient of the barrier to #V by 2 [N], in place."""
-        np.add.at(gradient, self.vertices.ravel(), (self.slope[:, None, None] * self.lever).reshape(-1, 2))
-
-    @property
-    def rows(self) -> FloatArray:
-        """The rows J of the barrier's stiffness J^T J where it is convex, #C by 3 by 2 [(N/m)^1/2]."""
-        return np.asarray(np.sqrt(np.maximum(self.bend, 0.0))[:, None, None] * self.lever)
-
-
-NO_CONTACTS = Contacts(
-    energy=0.0,
-    vertices=np.empty((0, 3), dtype=np.int32),
-    lever=np.empty((0, 3, 2)),
-    slope=np.empty(0),
-    bend=np.empty(0),
-)
 _CROSSED = replace(NO_CONTACTS, energy=np.inf)
 
 
@@ -184,44 +151,23 @@ def _closest(v: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, F
     return distance, t, away / np.maximum(distance, 1e-300)[:, None]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ContactPoint(Point):
-    """A layout (#V by 2 [m]), the energy there with contacts [J], its gradient (#V by 2 [N]), and the contacts."""
-
-    touch: Contacts
-
-
-def evaluate_with_contact(state: Relaxation, barrier: Barrier | None, positions: FloatArray) -> ContactPoint:
-    """Evaluate a layout (#V by 2 [m]): the cloth, unless the border crosses itself, its seams, and the barrier."""
-    touch = NO_CONTACTS if barrier is None else barrier(positions)
-    if not np.isfinite(touch.energy):
-        return ContactPoint(positions=positions, energy=np.inf, gradient=np.zeros_like(positions), touch=touch)
-    state.place(positions)
-    energies, force = state.evaluate_potential()
-    energy, gradient = touch.energy + float(energies.sum()), -force
-    if np.isfinite(energy):
-        energy += state.network.seam_energy(state.position)
-    touch.add_gradient(gradient)
-    return ContactPoint(positions=positions, energy=energy, gradient=gradient, touch=touch)
-
-
 class _Problem:
     """The energy that is minimised: cloth and barrier."""
 
     def __init__(self, state: Relaxation, gap: float) -> None:
         self.state = state
-        self._barrier = Barrier.of(state.network, gap)
-        self._metric = Metric(state.network, state.alignments)
+        self._energy = Energy(state, Barrier.of(state.network, gap))
+        self._metric = Metric(LaplacianFactor(state.network), state.alignments)
 
-    def at(self, positions: FloatArray) -> ContactPoint:
+    def at(self, positions: FloatArray) -> Point:
         """Evaluate a layout."""
-        return evaluate_with_contact(self.state, self._barrier, positions)
+        return self._energy.at(positions)
 
-    def solver(self, point: ContactPoint) -> Solve:
+    def solver(self, point: Point) -> Solve:
         """Return the solution by the metric at a point."""
         return self._metric.solver(point.touch.vertices, point.touch.rows)
 
-    def residual(self, point: ContactPoint) -> float:
+    def residual(self, point: Point) -> float:
         """Return the largest force on a vertex over the mean force of the springs."""
         springs, force = self.state.network.spring_arrays, -point.gradient
         a, b = (point.positions[springs.ends[:, k]] for k in range(2))

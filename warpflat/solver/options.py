@@ -8,10 +8,12 @@ from typing import Literal
 
 from warpflat.core.errors import InputError, expect, is_number, nearest
 
-__all__ = ["SOLVERS", "RelaxOptions", "Solver", "given_options"]
+__all__ = ["FORMER_SOLVERS", "SOLVERS", "RelaxOptions", "Solver", "given_options"]
 
-Solver = Literal["multilevel", "plain"]
-SOLVERS: tuple[Solver, ...] = ("multilevel", "plain")
+Solver = Literal["auto", "paper"]
+SOLVERS: tuple[Solver, ...] = ("auto", "paper")
+#: Names of earlier versions, and what they are read as.
+FORMER_SOLVERS: dict[str, Solver] = {"multilevel": "auto", "plain": "paper"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,21 +21,21 @@ class RelaxOptions:
     """Options of a relaxation: the time step, the tolerances, the solver, the gap.
 
     Attributes:
-        time_step: h [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
-        energy_left, outline_left_mm: L-BFGS, with or without contact, and cycles on triangles end when by estimate
-            (`warpflat.solver.remainder`) at most this share of the energy is still to be released, and no point of the outline will move by
-            more than so many millimetres. With 0, or where one of the tolerances below is stricter than its default, they end by the
+        time_step: h of eqs. (4) to (10) [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
+        first_steps_gain: a relaxation begins with the paper's steps. They end once a step changes the energy by no more than this share,
+            epsilon of eq. (11). With 1 there are none.
+        energy_left, outline_left_mm: L-BFGS, with or without contact, ends when by estimate
+            (`warpflat.solver.stop`) at most this share of the energy is still to be released, and no point of the outline will move by
+            more than so many millimetres. With 0, or where one of the tolerances below is stricter than its default, it ends by the
             tolerances alone.
         energy_tolerance: eq. (11): relative change of the energy per step.
-        residual_tolerance: largest force on a vertex over the mean force of the springs. After Gauss-Newton steps
-            (`warpflat.solver.gauss_newton`) a piece also counts as at rest when its forces could release next to no
-            energy.
-        max_steps: a state that has taken so many steps is not stepped further, and reports `converged = False`. With
-            coarser levels their work counts in steps of the piece's own mesh, and a cycle that has begun is completed.
+        residual_tolerance: largest force on a vertex over the mean force of the springs.
+        max_steps: a state that has taken so many steps is not stepped further, and reports `converged = False`. An iteration of L-BFGS
+            counts by its work, in steps.
         check_every: steps between two convergence checks.
         kinetic_damping: set velocities to zero when the forces begin to brake the motion.
-        solver: "multilevel" (see `warpflat.flattening.relax_pieces`), or
-            "plain", the paper's steps alone.
+        solver: "auto", the paper's steps while they gain, then L-BFGS over one factor, from coarse to fine on meshes too large to factor;
+            or "paper", the paper's steps alone.
         gap_mm: a flat piece that would lie over itself is parted by contact (`warpflat.solver.contact`), which acts where its border
             comes nearer to itself than this [mm]; 0 leaves the piece as it lies.
         contact_share: where contact costs more than this share of the model energy, it also starts from its layout swirled, and a note
@@ -41,6 +43,7 @@ class RelaxOptions:
     """
 
     time_step: float = 0.01
+    first_steps_gain: float = 0.05
     energy_left: float = 1e-3
     outline_left_mm: float = 0.2
     energy_tolerance: float = 1e-6
@@ -48,14 +51,19 @@ class RelaxOptions:
     max_steps: int = 20_000
     check_every: int = 10
     kinetic_damping: bool = True
-    solver: Solver = "multilevel"
+    solver: Solver = "auto"
     gap_mm: float = 0.5
     contact_share: float = 0.05
+
+    def __post_init__(self) -> None:
+        if isinstance(self.solver, str):
+            object.__setattr__(self, "solver", FORMER_SOLVERS.get(self.solver, self.solver))
 
     def validate(self) -> None:
         """Raise InputError, with its name, for a value out of its bounds."""
         for key, low, high in (
             ("time_step", 1e-9, 1e9),
+            ("first_steps_gain", 0.0, 1.0),
             ("energy_left", 0.0, 1.0),
             ("outline_left_mm", 0.0, 1e3),
             ("energy_tolerance", 0.0, 1.0),

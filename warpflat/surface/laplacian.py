@@ -17,14 +17,11 @@ from warpflat.core.sparse import factor_symmetric
 from warpflat.surface.cells import make_cells
 from warpflat.surface.mesh import Surface, once_per_surface
 
-__all__ = ["Laplacian", "factor_pays", "laplacian_of", "laplacian_solver", "stiffness_matrix"]
+__all__ = ["Laplacian", "factor_pays", "held_laplacian", "laplacian_of", "laplacian_solver", "stiffness_matrix"]
 
-# The most vertices of a surface that is factored. A factor takes 0.3 to 0.7 KB a vertex. L-BFGS over it is as fast as multigrid cycles in
-# isotropic cloth up to 200,000 vertices, and in stiff cloth and on ragged pieces much faster; but beyond this the estimate of what is left
-# leaves more than it says on split grids.
+# The most vertices of a surface that is factored: a factor takes 0.3 to 0.7 KB a vertex. L-BFGS over it is as fast as multigrid cycles on
+# isotropic grids of up to 10,000 vertices, and in other cloth, on triangles and on ragged pieces up to ten times as fast.
 _MOST_VERTICES = 100_000
-# The same for meshes of quads alone: on larger ones multigrid cycles are as fast, and on grids faster.
-_MOST_OF_QUADS = 4_000
 
 # A cell counts as at least so high, over its length.
 _LEAST_HEIGHT = 1e-4
@@ -66,7 +63,7 @@ class Laplacian:
 
 def factor_pays(surface: Surface) -> bool:
     """Return whether a surface has so few vertices that it is worth while to factor its Laplacian."""
-    return len(surface.vertices) <= (_MOST_OF_QUADS if surface.is_quad.all() else _MOST_VERTICES)
+    return len(surface.vertices) <= _MOST_VERTICES
 
 
 def laplacian_of(surface: Surface) -> Laplacian:
@@ -86,16 +83,20 @@ def laplacian_of(surface: Surface) -> Laplacian:
 def laplacian_solver(surface: Surface) -> Solve:
     """Return the solution by the Laplacian for right sides of #V or #V by #N, computed once.
 
-    A spring at one vertex holds the piece as a whole: forces whose sum is zero do not feel it. The factor is in single precision, which
-    takes half of the memory; steps of a minimisation are not the worse for it.
+    The factor is in single precision, which takes half of the memory; steps of a minimisation are not the worse for it.
     """
+    return factor_symmetric(held_laplacian(surface), dtype=np.float32)
+
+
+def held_laplacian(surface: Surface) -> csc_array:
+    """Return the Laplacian with a spring at one vertex that holds the piece as a whole: forces whose sum is zero do not feel it."""
     matrix = stiffness_matrix(surface)
     diagonal = matrix.diagonal()
     mean = diagonal.mean()
     diagonal += _REGULARISATION * mean
     diagonal[0] += mean
     matrix.setdiag(diagonal)
-    return factor_symmetric(matrix, dtype=np.float32)
+    return matrix
 
 
 def stiffness_matrix(surface: Surface) -> csc_array:

@@ -1,30 +1,81 @@
-"""An estimate of what a relaxation has still to do: the energy that it would release, and how far the outline would move."""
+"""The one rule by which a minimisation ends, and its report: energies, eq. (11), and what is left in energy and in the outline.
+
+Eq. (11) of the paper compares the energies of two steps, |U(t+h) - U(t)| / U(t) <= epsilon. On its own it stops too early where progress is
+slow. A residual force alone stops far too late. So a relaxation ends when by estimate at most a small share of the energy is still to be
+released and no point of the outline still moves by much, or when eq. (11) and the residual force are both within their tolerances.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.solver.options import RelaxOptions
 
-__all__ = ["CycleRemainder", "Remainder", "RemainderEstimate", "looked_back"]
+__all__ = ["Energies", "Outcome", "Remainder", "RemainderEstimate", "Status", "looked_back", "relative_change"]
 
 # The last share of all iterations is looked back upon, and no fewer than so many: where convergence is slow, a few iterations move little
 # though much is left. What follows releases at most so many times their energy, and moves the outline at most so many times as far. The
 # factors were chosen on draped meshes and forms; `benchmarks/stopping.py` measures on others what they are worth.
 _SHARE, _FEWEST = 0.15, 4
 _ENERGY_FACTOR, _OUTLINE_FACTOR = 1.0, 2.75
-# Multigrid cycles reduce what is left by about the same factor each: by no less than the first, and by no more than the second is assumed.
-# The sum of all that follow the last one, times this, is the estimate. On the irregular bodice of 200,000 vertices the energy that was
-# left after each cycle but the first was at most 0.45 of what that cycle had released; the estimate is three times or more.
-_CYCLE_FACTOR_BOUNDS = (0.5, 0.98)
-_CYCLE_SAFETY = 3.0
 # No estimate is smaller: a share of the energy, and a distance [m].
 _LEAST_SHARE, _LEAST_DISTANCE = 1e-4, 5e-5
+
+
+def relative_change(before: float, after: float, steps: float = 1.0) -> float:
+    """Return eq. (11), |U(t+h) - U(t)| / U(t), from two energies [J] and the steps between them."""
+    if not math.isfinite(before):
+        return math.inf
+    return abs(before - after) / (max(steps, 1.0) * max(after, 1e-300))
+
+
+@dataclass(frozen=True)
+class Energies:
+    """The energies of a state [J].
+
+    Attributes:
+        spring: of the springs, or of the membrane where that is the model.
+        guard: of the guard (see `warpflat.model.network`).
+        kinetic: of the motion.
+    """
+
+    spring: float
+    guard: float
+    kinetic: float
+
+    @property
+    def potential(self) -> float:
+        """The energy that is minimised: springs and guard."""
+        return self.spring + self.guard
+
+    @property
+    def total(self) -> float:
+        """Potential and kinetic energy."""
+        return self.spring + self.guard + self.kinetic
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """The result of a check.
+
+    Attributes:
+        energies: at the check.
+        residual: largest force on a vertex over the mean force of the springs; infinite before the first evaluation.
+        gain: the potential energy released since the last check [J].
+        change: eq. (11), per step.
+        at_rest: whether it may end.
+    """
+
+    energies: Energies
+    residual: float = math.inf
+    gain: float = math.inf
+    change: float = math.inf
+    at_rest: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,45 +152,34 @@ class RemainderEstimate:
         )
 
 
-class CycleRemainder:
-    """The gains and the ways of the last two multigrid cycles, and the estimate that follows from their ratio (Aitken)."""
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """The outcome of a relaxation.
 
-    def __init__(self, border: IntArray) -> None:
-        """Start without a cycle.
+    Attributes:
+        converged: false if it ran into its step limit.
+        steps: approximate implicit steps, or iterations of L-BFGS.
+        work_units: all work, in approximate implicit steps over all vertices.
+        restarts: how often the velocities were set to zero.
+        energy_change: eq. (11) for the last step.
+        residual: largest force on a vertex over the mean spring force; not a number after first steps.
+        energies: at the end [J].
+        seconds: wall clock.
+        notes: what was chosen or is worth a warning, one sentence each.
+        left: the estimate of what was still to be relaxed, where there is one.
+        first_steps: of the paper's steps with which it began; None where it did not.
+        first_layout: #V by 2, the layout after these [m].
+    """
 
-        Args:
-            border: the vertices of the outline.
-        """
-        self._border = border
-        self._gain = self._way = np.inf
-        self._outline: FloatArray | None = None
-
-    def begin(self, positions: FloatArray) -> None:
-        """Keep the outline before a cycle; `positions` are #V by 2 [m], upright."""
-        self._outline = positions[self._border]
-
-    def add(self, gain: float, energy: float, positions: FloatArray) -> Remainder:
-        """Return what is left after a cycle; infinite after the first.
-
-        Args:
-            gain: the energy that it has released [J]; negative where the energy has risen.
-            energy: at its end [J].
-            positions: at its end, #V by 2 [m], upright.
-        """
-        assert self._outline is not None
-        moved = positions[self._border] - self._outline
-        moved -= moved.mean(axis=0)
-        way = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
-        left = Remainder(
-            energy_share=max(_sum_of_rest(abs(gain), self._gain) / max(energy, 1e-300), _LEAST_SHARE),
-            outline_mm=1e3 * max(_sum_of_rest(way, self._way), _LEAST_DISTANCE),
-        )
-        known = np.isfinite(self._gain)
-        self._gain, self._way = abs(gain), way
-        return left if known else Remainder()
-
-
-def _sum_of_rest(last: float, before: float) -> float:
-    """Return the sum of the steps that follow the last two, each smaller by their ratio, with a margin."""
-    ratio = float(np.clip(last / max(before, 1e-300), *_CYCLE_FACTOR_BOUNDS))
-    return _CYCLE_SAFETY * last * ratio / (1.0 - ratio)
+    converged: bool
+    steps: int
+    work_units: float
+    restarts: int
+    energy_change: float
+    residual: float
+    energies: Energies
+    seconds: float
+    notes: tuple[str, ...] = ()
+    left: Remainder | None = None
+    first_steps: Outcome | None = None
+    first_layout: FloatArray | None = field(default=None, repr=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.solver.grain_alignment import GrainAlignment, hold_grain, remove_rotation
+from warpflat.solver.grain import GrainAlignment, hold_grain, remove_rotation
 
 
 def two_pieces() -> tuple[list[GrainAlignment], dict[str, np.ndarray]]:

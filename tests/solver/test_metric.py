@@ -1,4 +1,4 @@
-"""Gauss-Newton steps: their matrix against finite differences, and soft cloth on triangles, which they bring to rest."""
+"""The metric: its matrix against finite differences, and soft cloth on triangles, which comes to rest."""
 
 from __future__ import annotations
 
@@ -10,18 +10,14 @@ from devices import DEVICE
 from numpy.typing import NDArray
 
 from warpflat.fabric.fabric import Fabric
-from warpflat.fabric.library import find_fabric
 from warpflat.flattening.develop import develop
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
-from warpflat.model.join import join_networks
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.gauss_newton import GaussNewtonSteps, gauss_newton_pays, relax_gauss_newton
-from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.multigrid.solve import relax_multilevel
+from warpflat.solver.grain import GrainAlignment
+from warpflat.solver.metric import stiffness_matrix
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relax import relax
-from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.steps import Relaxation, relax_by_steps
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -66,7 +62,7 @@ def test_the_matrix_is_the_stiffness_of_stretched_springs():
     def forces(at: FloatArray) -> FloatArray:
         return Relaxation(network, RelaxOptions(), start=at).forces()
 
-    found = GaussNewtonSteps(network, []).matrix(positions).toarray()
+    found = stiffness_matrix(network, positions).toarray()
     np.testing.assert_allclose(found, differences(forces, positions), atol=1e-4 * np.abs(found).max())
 
 
@@ -100,7 +96,7 @@ def test_the_matrix_holds_worn_threads_along_and_across():
         row = np.zeros(6)
         row[2 * i : 2 * i + 2], row[2 * j : 2 * j + 2] = -d / np.linalg.norm(d), d / np.linalg.norm(d)
         expected += k * np.outer(row, row)
-    found = GaussNewtonSteps(network, []).matrix(positions).toarray()
+    found = stiffness_matrix(network, positions).toarray()
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
@@ -111,72 +107,12 @@ def test_soft_cloth_between_triangles_comes_to_rest(name: str, fabric: str):
     assert flat.flipped_faces == 0
     # Ten thousands of the paper's steps would take next to nothing more away.
     state = Relaxation(flat.network, RelaxOptions(max_steps=3000), start=flat.positions, alignments=held(flat))
-    before = state.piece_energies()[:, :2].sum()
-    relax(state)
-    after = state.piece_energies()[:, :2].sum()
+    before = state.energies().potential
+    relax_by_steps(state)
+    after = state.energies().potential
     assert after > (1.0 - 1e-3) * before
 
 
 def held(flat: Flattening) -> list[GrainAlignment]:
     line = flat.network.surface.lines["centre"]
     return [GrainAlignment(lower=int(line[0]), upper=int(line[-1]))]
-
-
-def test_they_reach_what_cycles_reach(monkeypatch: pytest.MonkeyPatch):
-    surface = triangles("dome", 41)
-    network, start = developed(surface, find_fabric("woven"))
-    assert gauss_newton_pays(network)
-    energies = []
-    for patience in (0.0, np.inf):
-        monkeypatch.setattr("warpflat.solver.multigrid.solve._PATIENCE", patience)
-        state = Relaxation(network, RelaxOptions(), start=start)
-        assert relax_multilevel(state).converged
-        energies.append(state.energies().potential)
-    np.testing.assert_allclose(*energies, rtol=1e-3)
-
-
-def test_pieces_side_by_side_come_where_they_come_alone():
-    surfaces = [triangles("bodice", 13), triangles("dome", 17), triangles("saddle", 15)]
-    satin = find_fabric("satin")
-    parts, starts = zip(*(developed(surface, satin) for surface in surfaces), strict=True)
-    together = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
-    assert relax_gauss_newton(together).converged
-    alone = []
-    for part, start in zip(parts, starts, strict=True):
-        state = Relaxation(part, RelaxOptions(), start=start)
-        assert relax_gauss_newton(state).converged
-        alone.append(state.status.potential[0])
-    np.testing.assert_allclose(together.status.potential, alone, rtol=5e-3)
-
-
-def test_the_chord_of_the_datum_stays_upright_and_what_is_at_rest_stays():
-    surface = triangles("bodice", 17)
-    network, start = developed(surface, find_fabric("silk"))
-    line = surface.lines["centre"]
-    alignments = [GrainAlignment(lower=int(line[0]), upper=int(line[-1]))]
-    state = Relaxation(network, RelaxOptions(), start=start, alignments=alignments)
-    assert relax_gauss_newton(state).converged
-    chord = state.positions()[line[-1]] - state.positions()[line[0]]
-    assert abs(chord[0]) < 1e-9 * chord[1]
-    before = state.positions()
-    again = relax_gauss_newton(state)
-    assert again.steps == 0
-    np.testing.assert_allclose(state.positions(), before, atol=1e-15)
-
-
-def test_work_is_limited():
-    network, start = developed(triangles("bodice", 17), find_fabric("silk"))
-    state = Relaxation(network, RelaxOptions(max_steps=200), start=start)
-    outcome = relax_gauss_newton(state)
-    assert not outcome.converged
-    assert 200 <= outcome.work_units < 400
-
-
-def test_they_are_for_springs_of_soft_cloth_between_triangles():
-    flat = triangles("dome", 5)
-    positions = flat.vertices[:, :2]
-    assert gauss_newton_pays(network_of(flat, positions))
-    assert not gauss_newton_pays(network_of(flat, positions, find_fabric("interlock")))
-    assert not gauss_newton_pays(SpringNetwork.build(flat, SOFT, positions, device=DEVICE, model="membrane"))
-    quads = make_shape("dome", resolution=5)
-    assert not gauss_newton_pays(network_of(quads, quads.vertices[:, :2]))

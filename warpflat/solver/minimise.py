@@ -1,36 +1,35 @@
-"""Quasi-Newton relaxation: L-BFGS over one sparse factor (Liu et al. 2017), for meshes small enough to be factored.
+"""Minimisation by L-BFGS over a metric: one loop, one line search.
 
-The metric is the Laplacian of the surface times the cloth's stiffness (`warpflat.surface.laplacian`): the same factor gives the
-as-rigid start. The memory of L-BFGS learns what the metric does not say, as the difference between shear and stretch. A step is halved
-until the energy falls; it is infinite where a face is mirrored, so that none ever is. The chord of the datum stays exactly upright.
+The metric (`warpflat.solver.metric`) is one sparse factor. The memory of L-BFGS learns what it does not say, as the difference between
+shear and stretch (Liu et al. 2017; Nocedal and Wright, chapter 7). A step is halved until the energy falls; it is infinite where a face is
+mirrored or the border crosses itself, so that neither ever is. The chord of the datum stays exactly upright.
 
-Contact (`warpflat.solver.contact`) adds its barrier to the energy and its stiffness to the metric, and takes the same steps.
+`relax` is the relaxation of a piece: the paper's steps while they gain, then `Descent` to the minimum. Contact, seams and the drape
+minimise their own energies by the same `Descent`.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.sums import dot
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.convergence import Outcome
-from warpflat.solver.grain_alignment import GrainAlignment, align_grain
+from warpflat.solver.energy import Energy, Point
+from warpflat.solver.grain import align_grain
+from warpflat.solver.metric import LaplacianFactor, Metric, Solve
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.relax import Watch
-from warpflat.solver.relaxation import Relaxation
-from warpflat.solver.remainder import Remainder, RemainderEstimate, looked_back
+from warpflat.solver.steps import Relaxation, Watch, relax_by_steps, take_first_steps
+from warpflat.solver.stop import Outcome, Remainder, RemainderEstimate, Status, looked_back, relative_change
 from warpflat.surface.connectivity import border_of
-from warpflat.surface.laplacian import factor_pays, laplacian_solver
 
-__all__ = ["Descent", "Measure", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
+__all__ = ["Descent", "Measure", "Problem", "relax"]
 
 # Corrections that L-BFGS remembers.
 _MEMORY = 8
@@ -43,8 +42,6 @@ _SMALLER = 0.3
 # The first step that is tried is longer than the last one taken by at most this factor.
 _LONGER = 4.0
 _LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
-# Rounding of the metric's solution, in single precision.
-_ROUNDING = 1e-6
 # Work units of an iteration: two evaluations of the forces and the solution; and of each layout that is tried.
 _WORK, _TRIAL_WORK = 3.0, 0.5
 
@@ -55,23 +52,6 @@ _RISE = 1e-4
 
 Measure = Callable[[FloatArray, FloatArray], Relaxation]
 """Returns the state to go on with from a layout, with directions measured in another one, each #V by 2 [m]."""
-
-Solve = Callable[[FloatArray], FloatArray]
-
-
-def quasi_newton_pays(network: SpringNetwork) -> bool:
-    """Return whether L-BFGS may be the fastest: for one piece of few vertices, nothing sewn."""
-    return network.seams is None and factor_pays(network.surface)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Point:
-    """A layout (#V by 2 [m]), the energy there [J], infinite where it is not allowed, and its gradient (#V by 2 [N])."""
-
-    positions: FloatArray
-    energy: float
-    gradient: FloatArray
-
 
 P = TypeVar("P", bound=Point)
 
@@ -84,73 +64,6 @@ class Problem(Protocol[P]):
 
     def solver(self, point: P) -> Solve:
         """Return the solution by the metric at a point."""
-
-
-class Metric:
-    """The Laplacian of a piece times its stiffness, with the chord of the datum held upright, plus stiffnesses of rank one."""
-
-    def __init__(self, network: SpringNetwork, alignments: Sequence[GrainAlignment]) -> None:
-        fabric = network.fabric
-        self._stiffness = max(fabric.stiffness_warp, fabric.stiffness_weft)
-        self._solve = laplacian_solver(network.surface)
-        self._chords = np.array([[each.upper, each.lower, each.lower] for each in alignments]).reshape(-1, 3)
-        self._across = np.array([[each.direction[1], -each.direction[0]] for each in alignments]).reshape(-1, 2)
-        # The inverse's columns at vertices that have touched; most of the border never does.
-        self._column: dict[int, FloatArray] = {}
-        self._count = network.vertex_count
-
-    def _columns(self, vertices: IntArray) -> FloatArray:
-        new = [vertex for vertex in vertices.tolist() if vertex not in self._column]
-        if new:
-            unit = np.zeros((self._count, len(new)))
-            unit[new, np.arange(len(new))] = 1.0 / self._stiffness
-            self._column |= zip(new, self._solve(unit).T, strict=True)
-        return np.stack([self._column[vertex] for vertex in vertices.tolist()])
-
-    def solver(self, vertices: IntArray | None = None, lever: FloatArray | None = None) -> Solve:
-        """Return the solution by the metric plus a row J^T J for each contact; it does not move chords sideways.
-
-        Args:
-            vertices: #C by 3, of contacts, if any.
-            lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
-        """
-        chord = np.zeros((len(self._chords), 3, 2))
-        chord[:, 0], chord[:, 1] = self._across, -self._across
-        rigid, contacts = (
-            np.arange(len(chord)),
-            np.arange(len(chord), len(chord) + (0 if lever is None else len(lever))),
-        )
-        vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
-        lever = chord if lever is None else np.concatenate([chord, lever])
-        if len(vertices) == 0:
-            return lambda force: self._solve(force) / self._stiffness
-        own, at = np.unique(vertices, return_inverse=True)
-        rows = np.zeros((2, len(vertices), len(own)))
-        number = np.repeat(np.arange(len(vertices)), 3)
-        for axis in range(2):
-            np.add.at(rows[axis], (number, at.ravel()), lever[:, :, axis].ravel())
-        columns = self._columns(own)
-        table = columns[:, own]
-        # By Woodbury's formula; a chord is a row of infinite stiffness.
-        inner = np.eye(len(vertices))
-        inner[rigid, rigid] = 0.0
-        inner += sum(row @ table @ row.T for row in rows)
-        # Contacts so stiff that 1 is lost beside them would leave it singular.
-        inner[contacts, contacts] *= 1.0 + _ROUNDING
-
-        def solve(force: FloatArray) -> FloatArray:
-            step = self._solve(force) / self._stiffness
-            pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
-            for axis in range(2):
-                step[:, axis] -= (rows[axis].T @ pull) @ columns
-            for (upper, lower, _), across in zip(self._chords, self._across, strict=True):
-                # What is left is rounding, which would add up over the steps.
-                half = 0.5 * across * (across @ (step[upper] - step[lower]))
-                step[upper] -= half
-                step[lower] += half
-            return step
-
-        return solve
 
 
 class _Memory:
@@ -245,7 +158,7 @@ class Descent(Generic[P]):
     @property
     def change(self) -> float:
         """Eq. (11) for the last iteration."""
-        return (self.history[-2] - self.history[-1]) / max(self.history[-1], 1e-300) if len(self.history) > 1 else 0.0
+        return relative_change(*self.history[-2:]) if len(self.history) > 1 else 0.0
 
     def is_at_rest(self, options: RelaxOptions, share: float = 1.0) -> bool:
         """Return whether the last iterations have released next to nothing, and the next could release no more than a share of that."""
@@ -293,22 +206,10 @@ class Descent(Generic[P]):
         return None
 
 
-class _Cloth:
-    """The energy of a network alone."""
-
-    def __init__(self, state: Relaxation) -> None:
-        self.state = state
-        self._solve = Metric(state.network, state.alignments).solver()
-
-    def at(self, positions: FloatArray) -> Point:
-        """Evaluate a layout."""
-        self.state.place(positions)
-        energies, force = self.state.evaluate_potential()
-        return Point(positions=positions, energy=float(energies.sum()), gradient=-force)
-
-    def solver(self, point: Point) -> Solve:
-        """Return the solution by the metric, which is the same everywhere."""
-        return self._solve
+def _continued(new: Relaxation, state: Relaxation) -> Relaxation:
+    """Return a state whose directions have been measured anew, with the counts and the last check of the one before."""
+    new.steps, new.restarts, new.work_units, new.status = state.steps, state.restarts, state.work_units, state.status
+    return new
 
 
 class _Directions:
@@ -330,38 +231,66 @@ class _Directions:
         """Return the state to go on with from a point, reached after so many iterations."""
         self._measured = iterations
         self._layout = self._layout + self._share * (point.positions - self._layout)
-        new = self._measure(point.positions, self._layout)
-        new.steps, new.restarts, new.work_units = state.steps, state.restarts, state.work_units
-        new.has_status, new.status = True, state.status
-        energy = float(new.potentials().sum())
+        new = _continued(self._measure(point.positions, self._layout), state)
+        energy = new.energies().potential
         if energy > (1.0 + _RISE) * self._energy:
             self._share *= 0.5
         self._energy = energy
         return new
 
 
-def relax_quasi_newton(
+class _Cloth:
+    """The energy of a network alone, and the metric that is the same in all layouts."""
+
+    def __init__(self, state: Relaxation) -> None:
+        self.energy = Energy(state)
+        self._solve = Metric(LaplacianFactor(state.network), state.alignments).solver()
+
+    def at(self, positions: FloatArray) -> Point:
+        """Evaluate a layout."""
+        return self.energy.at(positions)
+
+    def solver(self, point: Point) -> Solve:
+        """Return the solution by the metric."""
+        return self._solve
+
+
+def relax(
     state: Relaxation,
     *,
     measure: Measure | None = None,
     least_gain: float | None = None,
+    first_steps: bool = True,
     watch: Watch | None = None,
     each_step: Watch | None = None,
 ) -> Outcome:
     """Minimise the energy of one piece until it is at rest, or the step limit is reached.
 
+    It begins with the paper's steps, eqs. (4) to (10), which end where by eq. (11) they gain little. L-BFGS over one factor goes on to
+    the minimum. With `solver = "paper"` the steps go on alone.
+
     Args:
         state: where to start, no cell mirrored; holds the relaxed layout afterwards.
         measure: measures the springs' directions anew, if the energy depends on them.
         least_gain: stop, at rest or not, once some iterations release no more than this share of the energy; if given.
-        watch: called every few iterations with the state, its energies and the residual.
-        each_step: called after every iteration, with the energies and the residual of the last check.
+        first_steps: whether to begin with the paper's steps.
+        watch: called every few iterations with the state after a check.
+        each_step: called after every step and iteration.
     """
-    began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
-    if state.check_start().at_rest.all():
-        return state.make_outcome(steps_before, work_before, began_at=began_at)
+    if state.options.solver == "paper":
+        return relax_by_steps(state, watch=watch, each_step=each_step)
+    if state.check_start().at_rest:
+        return state.make_outcome(state.steps, state.work_units, began_at=time.perf_counter())
     start = state.positions()
     align_grain(state.alignments, start)
+    state.place(start)
+    first = take_first_steps(state, each_step=each_step) if first_steps else None
+    began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
+    start = state.positions()
+    layout = None if first is None else start
+    align_grain(state.alignments, start)
+    if measure is not None and first is not None:
+        state = _continued(measure(start, start), state)
     problem = _Cloth(state)
     point = problem.at(start)
     if not np.isfinite(point.energy):
@@ -376,21 +305,23 @@ def relax_quasi_newton(
         state.steps += moved
         state.work_units = work_before + descent.work_units
         if moved and each_step is not None:
-            each_step(state, state.status.total, state.status.worst_residual)
+            each_step(state)
         left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         near = left.is_small(options) or descent.is_at_rest(options)
         done = not moved or state.work_units - work_before >= options.max_steps
         done |= least_gain is not None and descent.gain <= least_gain * descent.point.energy
         if done or near or descent.iterations % options.check_every == 0:
             _check(state, descent, near, left)
-            done |= bool(state.status.at_rest.all())
+            done |= state.status.at_rest
             if watch is not None:
-                watch(state, state.status.total, state.status.worst_residual)
+                watch(state)
         if not done and directions is not None and directions.is_due(descent.iterations):
-            problem.state = state = directions.renew(state, descent.point, descent.iterations)
+            state = directions.renew(state, descent.point, descent.iterations)
+            problem.energy = Energy(state)
             descent.renew()
     outcome = state.make_outcome(steps_before, work_before, began_at=began_at)
-    return replace(outcome, left=left if np.isfinite(left.outline_mm) else None)
+    left_to_do = left if np.isfinite(left.outline_mm) else None
+    return replace(outcome, left=left_to_do, first_steps=first, first_layout=layout)
 
 
 def _check(state: Relaxation, descent: Descent[Point], near: bool, left: Remainder) -> None:
@@ -404,16 +335,19 @@ def _check(state: Relaxation, descent: Descent[Point], near: bool, left: Remaind
     """
     state.place(descent.point.positions)
     state.evaluate_at_rest()
-    status, options = state.check_convergence(1.0), state.options
-    residual = status.residual * _without_reaction(state)
+    energies, options = state.energies(), state.options
+    residual = state.residual() * _without_reaction(state)
     small = left.is_small(options) or residual <= options.residual_tolerance or descent.is_at_rest(options, _SMALLER)
     free = descent.point.energy <= state.negligible_energy
-    state.status = replace(status, residual=residual, at_rest=(near & small) | free, change=np.array([descent.change]))
+    gain = state.status.energies.potential - energies.potential
+    state.status = Status(
+        energies=energies, residual=residual, gain=gain, change=descent.change, at_rest=(near and small) or free
+    )
 
 
 def _without_reaction(state: Relaxation) -> float:
     """Return the largest force without that which keeps the chord upright, over the largest one without that which turns the piece."""
-    force, (largest,) = state.cloth_force(), state.piece_sums.largest_forces(state.alignments)
+    force, largest = state.cloth_force(), state.largest_force()
     for each in state.alignments:
         across = np.array([each.direction[1], -each.direction[0]])
         reaction = 0.5 * across * (across @ (force[each.upper] - force[each.lower]))

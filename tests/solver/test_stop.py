@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.remainder import Remainder, RemainderEstimate
+from warpflat.solver.stop import Remainder, RemainderEstimate
 
 
 @pytest.mark.parametrize("ratio", [0.7, 0.9, 0.98])

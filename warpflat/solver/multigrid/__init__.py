@@ -1,1 +1,0 @@
-"""The multigrid solver: a hierarchy of coarser levels and cycles through them."""
