@@ -419,8 +419,11 @@ def main() -> None:
                 flush=True,
             )
     if not chosen.record:
-        left_out = [name for name in golden if name not in names]
-        print(f"{len(names)} cases, {faults} with faults; not run: {', '.join(left_out) or 'none'}")
+        absent = [name for name in golden if name not in cases]
+        print(
+            f"{len(names)} cases, {faults} with faults"
+            + (f"; cannot be run here: {', '.join(absent)}" if absent else "")
+        )
         sys.exit(faults > 0)
 
 
