@@ -72,7 +72,7 @@ def test_a_misfit_names_the_cut_that_may_take_it_up(worn: warpflat.Drape):
 
 def test_a_drape_writes_worn_pieces_and_a_picture(worn: warpflat.Drape, tmp_path: Path):
     names = warpflat.save_drape(worn, tmp_path, frames=True)
-    assert names == ["front.draped.obj", "back.draped.obj", "drape.png", "drape.webp"]
+    assert names == ["front.draped.obj", "back.draped.obj", "drape.png", "frames.usdc", "drape.webp"]
     rows = [line.split() for line in (tmp_path / names[0]).read_text().splitlines()]
     space = np.array([row[1:] for row in rows if row[0] == "v"], dtype=float)
     np.testing.assert_array_equal(space, worn.positions[worn.cloth.welded[worn.cloth.piece_vertices["front"]]])

@@ -15,7 +15,7 @@ from typing import Any
 
 from warpflat.core.own_files import seal_of
 
-from .mutations import WORDS, _damaged_json, _damaged_toml, damaged_bytes
+from .mutations import WORDS, damaged_bytes, damaged_json, damaged_toml
 from .promise import Case
 
 __all__ = ["packed", "random_folder", "unpacked"]
@@ -54,7 +54,7 @@ def random_folder(kind: str, random: Random) -> Case:
     """A damaged batch file, or a folder of results one of whose members is not as warpflat has left it; and a command."""
     files = _beside(kind)
     if kind == "batch":
-        content = _damaged_toml(random, random.choice(BATCHES))
+        content = damaged_toml(random, random.choice(BATCHES))
         return Case(kind, {**files, "b.toml": content}, BATCH, subject="b.toml", seconds=60.0)
     files |= _folder(kind)
     member = random.choice(sorted(file for file in files if file.startswith("out/")))
@@ -64,7 +64,7 @@ def random_folder(kind: str, random: Random) -> Case:
         links[member] = random.choice(TARGETS)
         del files[member]
     elif how == 1 and member.endswith(".json"):
-        data = _damaged_json(random, json.loads(files[member]))
+        data = damaged_json(random, json.loads(files[member]))
         files[member] = _sealed(data) if random.randrange(2) else data
     elif how == 2:
         files[member] = random.choice((b"", b"mine", b"\x00\xff", random.choice(WORDS).encode(errors="replace")))

@@ -151,7 +151,7 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
     body = re.search(r"<body[^>]*>", shown)
     assert body
     assert 'data-fetch="refused"' in body[0]
-    assert re.search(r'data-label="relax · frame 2 of \d+ · (interpolated|computed)"', body[0])
+    assert re.search(r'data-label="(steps|relax) · frame 2 of \d+ · (interpolated|computed)"', body[0])
     blend = re.search(r'data-blend="([^"]+)"', body[0])
     first = re.search(r'data-first="\[([^\]]+)\]"', body[0])
     assert blend

@@ -60,6 +60,7 @@ FORMATS: Mapping[str, FileFormat] = {
     "SVG": FileFormat("an SVG pattern", 20 * _MEGABYTE, "export it again as plain SVG, outlines as closed paths"),
     "mesh": FileFormat("a mesh", 500 * _MEGABYTE, "export it again with vertices and faces alone"),
     "piece": FileFormat("a piece of a run", 500 * _MEGABYTE, "run the scene again"),
+    "picture": FileFormat("a picture of a run", 200 * _MEGABYTE, "run the scene again"),
     "film": FileFormat("the film of a run", 4000 * _MEGABYTE, "run the scene again"),
     "start": FileFormat("a start", 500 * _MEGABYTE, "give an OBJ file with texture coordinates"),
 }
@@ -124,8 +125,10 @@ def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator
         yield place
     except InputError as error:
         told = str(error)
+        # An error that names a file already, this one or one beside it, is not told of another.
+        named = str(file), f"{file.parent}{os.sep}"
         for before in (place.at, str(file)):
-            told = told if told.startswith((before, str(file))) else f"{before}: {told}"
+            told = told if told.startswith((before, *named)) else f"{before}: {told}"
         raise InputError(told) from error
     except FileNotFoundError as error:
         if error.filename is not None and Path(error.filename) != file:

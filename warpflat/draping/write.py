@@ -18,9 +18,12 @@ __all__ = ["save_drape", "write_drape_files"]
 
 
 def save_drape(drape: Drape, folder: str | Path, *, picture: bool = True, frames: bool = False) -> list[str]:
-    """Write `NAME.draped.obj` per piece, `drape.png` and, for frames, `drape.webp`, all of them or none, and return their names.
+    """Write `NAME.draped.obj` per piece, `drape.png` and, for frames, `drape.webp`, all of them or none.
 
     With frames the way to rest is added to the folder's `frames.usdc`, too, or a new one is written.
+
+    Returns:
+        The names of the files, without those of pictures and film that had to be left out.
 
     Raises:
         InputError: the folder cannot be written.

@@ -220,7 +220,7 @@ def _image(path: Path) -> str:
     wide, high = struct.unpack(">II", best[16:24]) if best[:8] == _PNG and len(best) >= 24 else (0, 0)
     if not 0 < wide * high <= _MOST_PIXELS:
         raise InputError(f"{path}: is no PNG of at most {_MOST_PIXELS:,} pixels; run the scene again")
-    with Image.open(io.BytesIO(best), formats=["PNG"]) as picture:
+    with guarded(path, "picture"), Image.open(io.BytesIO(best), formats=["PNG"]) as picture:
         if max(picture.size) < 65_000:
             # WebP has half the bytes, and takes ten times as long.
             picture.convert("RGB").save(small, "JPEG", quality=_QUALITY)

@@ -140,7 +140,7 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
             with optional_file(to / "compare-drape.png", files) as path:
                 write_compared_drapes(path, comparison.drapes)
         write_report(to / "compare.json", comparison.as_dict(), name="compare", files=files)
-    return ["compare.json", *files]
+    return [file for file in compared_files(drape=True) if file in ("compare.json", *files)]
 
 
 def comparison_table(comparison: Comparison) -> str:

@@ -21,7 +21,6 @@ from warpflat.core.text import format_count
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.mesh_lines import checked_line, renumber_lines
 from warpflat.surface.repair.polygons import (
     distinct_corners,
@@ -303,6 +302,8 @@ def _drop_double_layers(mesh: _Mesh) -> None:
     count = int(mesh.part.max()) + 1
     if count == 1:
         return
+    from warpflat.surface.repair.layers import Layer, doubled_layers
+
     layers = []
     for number in range(count):
         faces = mesh.faces[mesh.part == number]
