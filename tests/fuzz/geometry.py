@@ -83,13 +83,13 @@ def garment_meshes() -> dict[str, bytes]:
 
 def geometry_case(kind: str, random: Random) -> Case:
     """A damaged scene or mesh of a kind, and the command that reads it."""
-    from .mutations import _MUCH_WORK, _damaged_toml, damaged_bytes
+    from .mutations import _MUCH_WORK, damaged_toml, damaged_bytes
     from .seeds import BARE
 
     meshes = garment_meshes()
     if kind in ("form", "tables"):
         content = _MUCH_WORK.sub(
-            rb"\g<1>5", _damaged_toml(random, random.choice(_FORMS if kind == "form" else _SURFACES))
+            rb"\g<1>5", damaged_toml(random, random.choice(_FORMS if kind == "form" else _SURFACES))
         )
         files = {**meshes, "odd.scene.toml": content}
         seconds = 120.0 if b"mannequin" in content else 40.0
