@@ -77,7 +77,7 @@ PARTS = {
     "drape": ("scene.drape:write_drape",),
     "film for the page": ("review.page:pack_frames",),
     "review": ("review.page:write_review", "review.page:pack_pictures"),
-    "metrics, hashes": ("core.manifest:remove_stale",),
+    "metrics, hashes": ("core.output:remove_stale",),
     "waiting": ("core.beside:Beside.result",),
     "report": ("cli.run:report_run",),
 }  # fmt: skip

@@ -17,10 +17,9 @@ import pytest
 
 import warpflat
 from warpflat.cli.main import main
-from warpflat.core import hidden_files
-from warpflat.core.atomic_files import atomic_path, output_folder, prepare_folder, remove_file
+from warpflat.core import output
 from warpflat.core.errors import InputError
-from warpflat.core.json_file import write_json
+from warpflat.core.output import atomic_path, output_folder, prepare_folder, remove_file, write_json
 from warpflat.export.usd import FrameWriter
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.mannequin.mannequin import Mannequin
@@ -228,7 +227,7 @@ def _no_links(*_: object, **__: object) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from warpflat.core.atomic_files import atomic_path, output_folder, remove_file
+from warpflat.core.output import atomic_path, output_folder, remove_file
 folder, number, links = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "True"
 replace = os.replace
 def fatal(source, target):
@@ -281,7 +280,7 @@ def test_a_folder_that_takes_the_place_of_a_file_meanwhile_stays(tmp_path: Path)
 def test_what_a_hidden_folder_lists_of_other_places_is_left_alone(tmp_path: Path, listed: str):
     out = _filled(tmp_path / "out")
     (tmp_path / "users.txt").write_text("mine")
-    left = out / f".run-warpflat-{hidden_files._machine()}-4194999-01234567"
+    left = out / f".run-warpflat-{output._machine()}-4194999-01234567"
     (left / "aside").mkdir(parents=True)
     (left / "fresh.json").write_text(listed)
     prepare_folder(out)
@@ -290,7 +289,7 @@ def test_what_a_hidden_folder_lists_of_other_places_is_left_alone(tmp_path: Path
 
 # --- an interruption at every line
 
-_WATCHED = ("/atomic_files.py", "/hidden_files.py", "contextlib.py")
+_WATCHED = ("/core/output.py", "contextlib.py")
 
 
 def _interrupted(action: Callable[[], None], at: int, watched: tuple[str, ...]) -> bool:
@@ -343,18 +342,18 @@ def test_an_interruption_anywhere_leaves_nothing_behind(
         if not _interrupted(lambda: action(_filled(out)), number, watched):
             break
         gc.collect()
-        hidden_files._clear_all()  # as at the end of the process
+        output._clear_all()  # as at the end of the process
         left = files(out)
         assert left in (BEFORE, AFTER) or set(left) == {*BEFORE, "frames.usdc"}, number
         assert set(os.listdir(out)) == set(left), number
-        assert not hidden_files._unfinished
+        assert not output._unfinished
     assert number > 100
     # A folder that was made for it goes, too.
     fresh = tmp_path / "other" / "out"
     for number in range(0, 200, 5):
         if _interrupted(lambda: _change_fresh(fresh), number, _WATCHED):
             gc.collect()
-            hidden_files._clear_all()
+            output._clear_all()
             assert not (tmp_path / "other").exists(), number
 
 

@@ -17,7 +17,7 @@ import pytest
 
 from warpflat.batch.plan import load_batch
 from warpflat.cli.main import main
-from warpflat.core.own_files import seal_of
+from warpflat.core.output import seal_of
 
 SCENE = "[surface]\nshape = 'dome'\nresolution = 9\n[output]\nframes = 4\n[pattern]\nformats = ['svg', 'json']\n"
 PLAIN = "[surface]\nshape = 'dome'\nresolution = 7\n[output]\nframes = 0\npicture = false\n[pattern]\nformats = []\n"

@@ -13,9 +13,8 @@ import pytest
 from export_meshes import dome
 
 import warpflat
-from warpflat.core.atomic_files import atomic_path, output_folder, prepare_folder
 from warpflat.core.errors import InputError
-from warpflat.core.json_file import write_json
+from warpflat.core.output import atomic_path, output_folder, prepare_folder, write_json
 from warpflat.export.obj import write_obj
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.usd import FrameWriter
@@ -51,7 +50,7 @@ def test_failure_leaves_what_was_there(tmp_path: Path) -> None:
 
 KILLED = """
 import os, signal, sys
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 with atomic_path(sys.argv[1]) as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from warpflat.core.activity import activity_listener
-from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.beside import Beside, work_beside
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import note_read
+from warpflat.core.output import atomic_path, output_folder
 
 
 @pytest.fixture(autouse=True)

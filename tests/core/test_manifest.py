@@ -10,7 +10,7 @@ import pytest
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.core.manifest import remove_stale
+from warpflat.core.output import remove_stale
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.pattern_files import export_patterns
 from warpflat.scene.load import make_scene

@@ -7,7 +7,7 @@ import pytest
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import FORMATS, reading
+from warpflat.core.input_files import FORMATS, file_digest, read_json, read_result, reading
 
 
 def deeper(count: int) -> int:
@@ -106,3 +106,32 @@ def test_a_source_date_that_is_no_number_is_one_line(monkeypatch, capsys, given)
     monkeypatch.setenv("SOURCE_DATE_EPOCH", given)
     assert main(["fabrics"]) == 2
     assert "whole seconds since 1970" in capsys.readouterr().err
+
+
+def test_a_pipe_that_takes_the_place_of_a_file_is_not_waited_for(tmp_path, monkeypatch):
+    file = tmp_path / "a.json"
+    opened = os.open
+
+    def replaced(path, flags, *more, **options):
+        file.unlink()
+        os.mkfifo(file)
+        return opened(path, flags, *more, **options)
+
+    for read in (read_json, read_result, file_digest):
+        file.unlink(missing_ok=True)
+        file.write_text("{}")
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "open", replaced)
+            with pytest.raises(InputError, match=r"a\.json: is a pipe or a device"):
+                read(file)
+
+
+def test_a_link_is_followed_to_a_file_of_others_and_not_in_a_folder_of_results(tmp_path):
+    (tmp_path / "there.json").write_text('{"a": 1}')
+    link = tmp_path / "a.json"
+    link.symlink_to("there.json")
+    assert read_json(link) == {"a": 1}
+    assert file_digest(link, "named") == file_digest(tmp_path / "there.json")
+    for read in (read_result, file_digest):
+        with pytest.raises(InputError, match=r"a\.json: is a link"):
+            read(link)

@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from warpflat.core.own_files import seal_of
+from warpflat.core.output import seal_of
 
 from .mutations import WORDS, damaged_bytes, damaged_json, damaged_toml
 from .promise import Case

@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.own_files import seal_of
+from warpflat.core.output import seal_of
 
 from .promise import Case
 

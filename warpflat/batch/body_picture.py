@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.batch.body_statistics import BODY_GIRTHS, MEASURES, BodyPattern, fit_trend
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_png import save_png
 

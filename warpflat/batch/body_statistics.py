@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.batch.task import AT_REST, NOT_AT_REST, Row
-from warpflat.core.own_files import has_seal, read_result
+from warpflat.core.input_files import read_result
+from warpflat.core.output import has_seal
 
 __all__ = [
     "BODY_GIRTHS",

@@ -7,7 +7,6 @@ import hashlib
 import itertools
 import json
 import math
-import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from pydantic import Field, model_validator
 
 from warpflat._version import __version__
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import file_digest
 from warpflat.core.text import quote_value
 from warpflat.core.toml_file import Table, check_table, read_toml
 from warpflat.mannequin.table import MannequinTable
@@ -30,8 +30,6 @@ _KEY_DIGITS = 16
 _LONGEST_LABEL = 80
 # Tasks of a batch: each is held in memory, and has a row in the index.
 _MOST_TASKS = 100_000
-# The largest file that a scene names [bytes].
-_MOST_BYTES = 4_000_000_000
 
 Names = Annotated[list[Annotated[str, Field(min_length=1)]], Field(min_length=1)]
 
@@ -152,7 +150,9 @@ def load_batch(path: str | Path) -> list[Task]:
     if table.count > _MOST_TASKS:
         raise InputError(f"{path}: has {table.count:,} tasks; a batch has at most {_MOST_TASKS:,}: make several of it")
     read = functools.lru_cache(maxsize=None)(_read_scene)
-    digest = functools.lru_cache(maxsize=None)(_digest)
+    digest = functools.lru_cache(maxsize=None)(
+        lambda file: file_digest(file, "named", missing="cannot be read: no such file")
+    )
     tasks: dict[str, Task] = {}
     told = table.overrides is None or len(table.overrides) > 1  # one for all tells none apart
     for entry in table.all_tasks():
@@ -213,25 +213,6 @@ def _key(scene: Scene, data: Mapping[str, Any], digest: Callable[[Path], str]) -
     named = _map_paths(scene.settings.model_dump(mode="json"), lambda file: digest(Path(file)))
     text = json.dumps([__version__, scene.name, named], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS]
-
-
-def _digest(file: Path) -> str:
-    digest = hashlib.sha256()
-    try:
-        found = file.stat()
-        if not stat.S_ISREG(found.st_mode):
-            raise InputError(f"{file}: is a folder, a pipe or a device; give a regular file")
-        if found.st_size > _MOST_BYTES:
-            raise InputError(f"{file}: has {found.st_size:,} bytes; at most {_MOST_BYTES:,} are read")
-        with file.open("rb") as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
-        return digest.hexdigest()
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = (getattr(error, "strerror", None) or str(error)).lower()
-        raise InputError(f"{file}: cannot be read: {reason}") from None
 
 
 def _read_scene(file: Path) -> dict[str, Any]:

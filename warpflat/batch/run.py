@@ -10,8 +10,7 @@ from warpflat.batch.body_statistics import bodies_table, read_body_patterns
 from warpflat.batch.index import BatchIndex
 from warpflat.batch.plan import Task
 from warpflat.batch.task import Row, forget_starts, read_row, run_task
-from warpflat.core.atomic_files import atomic_path, output_folder
-from warpflat.core.optional_files import optional_file
+from warpflat.core.output import atomic_path, optional_file, output_folder
 
 __all__ = ["run_batch"]
 

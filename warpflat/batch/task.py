@@ -15,11 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.batch.plan import Task
-from warpflat.core.atomic_files import output_folder
 from warpflat.core.errors import InputError, is_number
-from warpflat.core.hidden_files import remove_unfinished
-from warpflat.core.manifest import write_sealed
-from warpflat.core.own_files import NotOursError, open_result, read_result, refuse_to_replace_others
+from warpflat.core.input_files import open_file, read_result
+from warpflat.core.output import NotOursError, output_folder, refuse_to_replace_others, remove_unfinished, write_sealed
 from warpflat.core.text import one_line
 
 __all__ = [
@@ -135,7 +133,7 @@ def _starts(task: Task, out: Path) -> list[str]:
     if not os.path.lexists(path):
         return []
     try:
-        with open_result(path, most=1_000_000) as stream:
+        with open_file(path, most=1_000_000) as stream:
             lines = stream.read().decode(errors="replace").splitlines()
     except InputError:
         lines = [""]

@@ -47,7 +47,7 @@ def compare(
     """
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.cli.tables import warnings_of
-    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.output import output_folder
     from warpflat.scene.compare import compare_fabrics, compared_files, comparison_table, save_comparison
     from warpflat.scene.load import load_scene
 

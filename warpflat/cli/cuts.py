@@ -98,9 +98,7 @@ def _compare(
 ) -> tuple[Ledger | FormLedger, Path, SceneResult | None]:
     """Write the ledger of a scene, and run it with one of its cuts on demand."""
     from warpflat.cli.progress_bar import ProgressBar
-    from warpflat.core.atomic_files import output_folder
-    from warpflat.core.manifest import write_report
-    from warpflat.core.optional_files import optional_file
+    from warpflat.core.output import optional_file, output_folder, write_report
     from warpflat.core.toml_file import tables_as_toml
     from warpflat.cutting.ledger_picture import write_ledger_picture
     from warpflat.scene.cuts import cuts_of_entry
@@ -148,7 +146,7 @@ def _print_ledger(ledger: Ledger | FormLedger, folder: Path) -> None:
 
 
 def _write_toml(folder: Path, words: str, tables: Sequence[str]) -> None:
-    from warpflat.core.atomic_files import atomic_path
+    from warpflat.core.output import atomic_path
 
     with atomic_path(folder / "cuts.toml") as temporary:
         temporary.write_text("\n".join([f"# {words}\n", *tables]), encoding="utf-8")
@@ -166,8 +164,7 @@ def _edit(
 ) -> int:
     """Edit a dart, compare the garment before and after, and write `edit.json` and `cuts.toml`."""
     from warpflat.cli.tables import edit_table
-    from warpflat.core.atomic_files import output_folder
-    from warpflat.core.manifest import write_report
+    from warpflat.core.output import output_folder, write_report
     from warpflat.scene.form_edits import edit_dart
 
     (how, (dart, aim)), *more = [(how, edit) for how, edit in edits.items() if edit]

@@ -27,9 +27,9 @@ from warpflat.cli.review import review
 from warpflat.cli.run import run
 from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.cli.studio import studio
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, system_reason
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
-from warpflat.core.optional_files import listening_to_left_out
+from warpflat.core.output import listening_to_left_out
 from warpflat.core.source_date import source_date
 from warpflat.core.text import one_line
 
@@ -118,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _fail(f"not enough memory: {_memory_words(error)}; use a coarser mesh, or give it more memory")
         if not isinstance(error, OSError):
             return report_internal_error(error, sys.argv[1:] if arguments is None else arguments)
-        reason = (error.strerror or str(error)).lower()
+        reason = system_reason(error)
         if error.filename is None and _was_printing(error):
             _discard_output()
             return _fail(f"cannot write to standard output: {reason}")

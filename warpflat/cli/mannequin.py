@@ -54,7 +54,7 @@ def mannequin(
       warpflat mannequin --scan body.obj --units m --out body
     """
     from warpflat.cli.tables import mannequin_table, measures_table
-    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.output import output_folder
     from warpflat.core.toml_file import check_table
     from warpflat.mannequin.output import MANNEQUIN_FILES, write_mannequin
     from warpflat.mannequin.table import MannequinTable, mannequin_from_table

@@ -25,7 +25,7 @@ def review(folder: Path, film: bool, sheet: bool, quiet: bool) -> int:
       warpflat review out/dress --film --sheet
     """
     from warpflat.cli.run import start_warp_silently
-    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.output import output_folder
     from warpflat.review.moving_picture import write_moving_pictures
     from warpflat.review.page import read_run, review_folder
 

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from warpflat.core.activity import activity_listener, report_activity
-from warpflat.core.atomic_files import adopt_files, files_written
 from warpflat.core.input_files import listening_to_reads, note_read
-from warpflat.core.optional_files import leave_out, listening_to_left_out
+from warpflat.core.output import leave_out, listening_to_left_out
 from warpflat.core.threads import thread_count
 
 __all__ = ["Beside", "work_beside"]
@@ -103,8 +102,7 @@ class Beside(Generic[Result]):
         self._wait()
         if not parts:
             return self._function()
-        good, value, files, read, left_out = pickle.loads(b"".join(parts))
-        adopt_files(files)
+        good, value, read, left_out = pickle.loads(b"".join(parts))
         for path in read:
             note_read(path)
         for path, note in left_out:
@@ -141,7 +139,7 @@ def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
         _die_with(parent)
-        before, read, left_out = files_written(), list[Path](), list[tuple[Path, str]]()
+        read, left_out = list[Path](), list[tuple[Path, str]]()
         try:
             with (
                 activity_listener(lambda activity: None),
@@ -151,8 +149,7 @@ def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
                 answer: tuple[bool, Any] = True, function()
         except Exception as error:
             answer = False, error
-        new = [(folder, name) for folder, name in files_written() if (folder, name) not in before]
-        content = memoryview(_pickled(*answer, new, read, left_out))
+        content = memoryview(_pickled(*answer, read, left_out))
         while content:
             content = content[os.write(pipe, content) :]
     finally:

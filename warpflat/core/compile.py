@@ -17,7 +17,7 @@ from typing import Any
 import warp as wp
 
 from warpflat.core.activity import report_activity
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, system_reason
 from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.native_output import native_errors
 from warpflat.core.threads import thread_count
@@ -155,7 +155,7 @@ def kernel_cache_errors() -> Iterator[None]:
         if is_out_of_memory(error):
             raise
         folder = wp.config.kernel_cache_dir or "of Warp"
-        reason = (error.strerror or str(error)).lower()
+        reason = system_reason(error)
         raise InputError(
             f"kernel cache {folder} cannot be written: {reason}; "
             f"set WARP_CACHE_PATH to a folder that can, with {_REQUIRED_BYTES >> 20} MB free"

@@ -9,7 +9,16 @@ from typing import TypeGuard
 
 from warpflat.core.text import one_line, quote_value
 
-__all__ = ["CannotWriteError", "InputError", "expect", "expect_callback", "expect_each", "is_number", "nearest"]
+__all__ = [
+    "CannotWriteError",
+    "InputError",
+    "expect",
+    "expect_callback",
+    "expect_each",
+    "is_number",
+    "nearest",
+    "system_reason",
+]
 
 
 #: Valid words that a message lists at most.
@@ -31,6 +40,11 @@ class InputError(ValueError):
 
 class CannotWriteError(InputError):
     """A file cannot be written: its place, the disk, or a file of the user's there is what the user must see to."""
+
+
+def system_reason(error: OSError) -> str:
+    """Return what the system says of an error, such as "no space left on device", to be part of a sentence."""
+    return (error.strerror or str(error)).lower()
 
 
 def expect(value: object, kind: type | tuple[type, ...], name: str, right: str) -> None:

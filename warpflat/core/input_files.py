@@ -1,18 +1,23 @@
-"""The door for files that others made: each is recorded, so that a run never replaces it, bounded, and read under one guard."""
+"""The door for all that is read: each file is recorded, so that a run never replaces it, bounded, and read under one guard.
+
+What is read of a run's folder is a regular file, too: links, pipes and devices are refused there.
+"""
 
 from __future__ import annotations
 
 import difflib
+import hashlib
+import json
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from warpflat.core.errors import CannotWriteError, InputError
+from warpflat.core.errors import InputError, system_reason
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
 from warpflat.core.text import control_in, one_line, quote_value
 
@@ -24,13 +29,15 @@ __all__ = [
     "Place",
     "check_regular",
     "check_values",
+    "file_digest",
     "guarded",
-    "is_among",
     "listening_to_reads",
     "note_read",
     "noting_resolver",
+    "open_file",
+    "read_json",
+    "read_result",
     "reading",
-    "refuse_to_replace",
 ]
 
 Listener = Callable[[Path], object]
@@ -44,11 +51,13 @@ class FileFormat:
         name: as messages have it, with its article.
         most: the size of a file [bytes], at most; what it is read into takes some five times as much.
         right: what would be right, where a file cannot be read.
+        links: whether it may be a link; in a folder of a run none may.
     """
 
     name: str
     most: int
     right: str
+    links: bool = True
 
 
 _MEGABYTE = 1_000_000
@@ -63,6 +72,9 @@ FORMATS: Mapping[str, FileFormat] = {
     "picture": FileFormat("a picture of a run", 200 * _MEGABYTE, "run the scene again"),
     "film": FileFormat("the film of a run", 4000 * _MEGABYTE, "run the scene again"),
     "start": FileFormat("a start", 500 * _MEGABYTE, "give an OBJ file with texture coordinates"),
+    "named": FileFormat("a file that a scene names", 4000 * _MEGABYTE, "give a regular file"),
+    "report": FileFormat("JSON", 200 * _MEGABYTE, "run the scene again", links=False),
+    "output": FileFormat("a file of a run", 4000 * _MEGABYTE, "run the scene again", links=False),
 }
 #: No coordinate of a surface or a pattern is larger [m].
 FARTHEST = 1e4
@@ -109,7 +121,7 @@ def reading(
     if noted:
         note_read(file)
     with guarded(file, kind, missing=missing) as place:
-        check_regular(file, FORMATS[kind].most)
+        check_regular(file, FORMATS[kind].most, links=FORMATS[kind].links)
         yield place
 
 
@@ -140,7 +152,7 @@ def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator
             told = ", ".join(filter(None, ["not enough memory to read it", memory_limit()]))
             raise InputError(f"{file}: {at}{told}; give a smaller file, or more memory") from error
         if isinstance(error, OSError):
-            raise InputError(f"{file}: {at}cannot be read: {(error.strerror or str(error)).lower()}") from error
+            raise InputError(f"{file}: {at}cannot be read: {system_reason(error)}") from error
         raise InputError(f"{file}: {at}cannot be read as {form.name} ({_reason(error)}); {form.right}") from error
 
 
@@ -153,21 +165,24 @@ def _reason(error: Exception) -> str:
     return f"{type(error).__name__} {words}".strip() if isinstance(error, LookupError) or not words else words
 
 
-def check_regular(path: Path, most: int) -> None:
+def check_regular(path: Path | int, most: int, *, links: bool = True) -> None:
     """Check that a path is that of a regular file of bounded size: a pipe would be waited for, and a device never ends.
 
     Args:
-        path: of the file.
+        path: of the file, or the number of one that is open.
         most: bytes that it may have.
+        links: whether it may be a link to such a file.
 
     Raises:
         InputError: without the file's name: it is something else, or larger.
         OSError: there is no such file.
     """
     try:
-        found = path.stat()
+        found = os.stat(path, follow_symlinks=links)
     except ValueError as error:  # a name with NUL in it
         raise InputError(f"cannot be read: {error}") from None
+    if not links and not stat.S_ISREG(found.st_mode):
+        raise InputError("is a link, a folder, a pipe or a device; a run leaves regular files, put one in its place")
     if stat.S_ISDIR(found.st_mode):
         raise InputError("is a directory; give the name of a file")
     if not stat.S_ISREG(found.st_mode):
@@ -176,6 +191,71 @@ def check_regular(path: Path, most: int) -> None:
         raise InputError(
             f"has {found.st_size / _MEGABYTE:,.0f} MB; at most {most / _MEGABYTE:,.0f} MB are read of this kind of file"
         )
+
+
+def open_file(path: Path, kind: str = "output", *, most: int | None = None, missing: str = "no such file") -> BinaryIO:
+    """Open a file as :func:`check_regular` asks, whatever takes its place meanwhile; it is not reported as read.
+
+    Args:
+        path: of the file.
+        kind: a key of `FORMATS`.
+        most: bytes that it may have, if not those of its format.
+        missing: what is said where there is no such file.
+
+    Raises:
+        InputError: it is missing, something else, larger, or cannot be read.
+    """
+    form = FORMATS[kind]
+    most = form.most if most is None else most
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with guarded(path, kind, missing=missing):
+        check_regular(path, most, links=form.links)
+        stream = os.fdopen(os.open(path, flags if form.links else flags | getattr(os, "O_NOFOLLOW", 0)), "rb")
+        try:
+            check_regular(stream.fileno(), most)
+        except InputError:
+            stream.close()
+            raise
+        return stream
+
+
+def file_digest(path: Path, kind: str = "output", *, missing: str = "no such file") -> str:
+    """Return the SHA-256 of a file.
+
+    Raises:
+        InputError: as :func:`open_file`.
+    """
+    digest = hashlib.sha256()
+    with open_file(path, kind, missing=missing) as stream, guarded(path, kind):
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def read_json(path: Path, *, missing: str = "no such file") -> Any:
+    """Read the data of a file in JSON, which is reported as by :func:`note_read`.
+
+    Raises:
+        InputError: as :func:`open_file`, or it is no JSON, or is nested too deeply.
+    """
+    note_read(path)
+    return _parse_json(path, "JSON", missing)
+
+
+def read_result(path: Path) -> Any:
+    """Read a file in JSON of a folder of results, which is not reported: the next run may replace it.
+
+    Raises:
+        InputError: as :func:`read_json`, or it is a link.
+    """
+    return _parse_json(path, "report", "no such file; give the folder of a run")
+
+
+def _parse_json(path: Path, kind: str, missing: str) -> Any:
+    with open_file(path, kind, missing=missing) as stream, guarded(path, kind):
+        data = json.loads(stream.read().decode("utf-8-sig"))
+        check_values(data, depth_only=True)
+    return data
 
 
 def _similar_file(path: Path) -> str:
@@ -256,27 +336,3 @@ def noting_resolver(file: Path) -> Any:
             return bytes(super().get(name))
 
     return Noting(str(file))
-
-
-def is_among(path: Path, files: Iterable[Path]) -> bool:
-    """Return whether a path is one of these files, also by another link or, where the file system ignores it, other case."""
-    return any(_is_same(path, file) for file in files)
-
-
-def refuse_to_replace(final: Path, files: Iterable[Path]) -> None:
-    """Refuse to write a file that was read.
-
-    Raises:
-        InputError: it is.
-    """
-    if is_among(final, files):
-        raise CannotWriteError(
-            f"{final} is read by this run, which would replace it; choose another output folder (--out) or another name"
-        )
-
-
-def _is_same(one: Path, other: Path) -> bool:
-    try:
-        return os.path.samefile(one, other)
-    except (OSError, ValueError):
-        return False  # one of them does not exist

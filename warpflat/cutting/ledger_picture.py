@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.export.colours import energy_colours, energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters

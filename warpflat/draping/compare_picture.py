@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.draping.picture import body_around, draw_scale, seen_from
 from warpflat.draping.result import Drape
 from warpflat.export.colours import on_cloth

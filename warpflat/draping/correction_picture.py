@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export.geometry import outline_edges
 from warpflat.export.letters import all_letters

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path, latest_file
+from warpflat.core.output import atomic_path, latest_file
 from warpflat.core.sums import weighted_percentile
 from warpflat.draping.result import Drape
 from warpflat.export.colours import energy_colours, linear_rgb

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.core.sums import weighted_percentile
 from warpflat.draping.result import Drape
 from warpflat.export.colours import on_cloth

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core.atomic_files import file_in, latest_file, output_folder
-from warpflat.core.optional_files import optional_file
+from warpflat.core.output import file_in, latest_file, optional_file, output_folder
 from warpflat.draping.frames import write_drape_film, write_drape_frames
 from warpflat.draping.picture import write_drape_picture
 from warpflat.draping.result import Drape
@@ -34,7 +33,7 @@ def save_drape(drape: Drape, folder: str | Path, *, picture: bool = True, frames
 
 
 def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True, frames: bool = False) -> list[str]:
-    """Write the files into a folder in a block of :func:`warpflat.core.atomic_files.output_folder`.
+    """Write the files into a folder in a block of :func:`warpflat.core.output.output_folder`.
 
     Returns:
         Their names, without those of pictures and film that had to be left out.

@@ -16,8 +16,8 @@ import numpy as np
 
 from warpflat._version import __version__
 from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.output import atomic_path
 from warpflat.core.polyline import turning_angles
 from warpflat.core.source_date import source_date
 from warpflat.core.text import control_in, plain_letters

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat._version import __version__
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic_core import to_json
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.surface.mesh import Surface
 
 __all__ = ["write_obj"]

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic_core import to_json
 
 from warpflat._version import __version__
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.pattern.cut_list import cut_list
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.pieces import SeamSide

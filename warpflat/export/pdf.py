@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.optional_files import optional_file
+from warpflat.core.output import atomic_path, optional_file
 from warpflat.export.pdf_guide import guide_pages
 from warpflat.export.pdf_legend import draw_legend, legend_page
 from warpflat.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, Paper, Tiling, make_tiling

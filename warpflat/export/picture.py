@@ -12,7 +12,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles

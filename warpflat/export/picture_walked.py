@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_packing import pack_boxes
 from warpflat.export.picture_png import save_png

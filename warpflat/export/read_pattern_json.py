@@ -11,8 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import guarded
-from warpflat.core.json_file import read_json
+from warpflat.core.input_files import guarded, read_json
 from warpflat.core.text import quote_value
 from warpflat.core.toml_file import check_table
 from warpflat.export.pattern_json import SCHEMA

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.core.text import control_in, format_count, size_words
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.drafted import DraftedGarment

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
-from warpflat.core.atomic_files import atomic_path, hidden_file, require_writable
 from warpflat.core.errors import InputError
+from warpflat.core.output import atomic_path, hidden_file, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import area_vectors, face_areas, polylines_of, vertex_normals
 from warpflat.export.usd_colours import VertexColours

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import CannotWriteError
+from warpflat.core.output import atomic_path
 from warpflat.export.geometry import Polylines
 
 __all__ = [

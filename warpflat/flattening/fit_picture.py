@@ -12,7 +12,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.core.sums import weighted_percentile
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_png import save_png

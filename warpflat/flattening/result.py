@@ -257,19 +257,18 @@ class Flattening:
         Raises:
             InputError: the folder cannot be written, or the surface was read from a file there that would be replaced.
         """
-        from warpflat.core.atomic_files import output_folder
-        from warpflat.core.manifest import require_own_metrics, write_metrics
+        from warpflat.core.output import output_folder, require_own_metrics, write_report
 
         others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
         with output_folder(folder, others, sources=self.surface.sources, guard=True) as to:
             require_own_metrics(to)
             files = write_files([self], to, picture=picture, frames=frames)
-            write_metrics(to, self.metrics(), name=self.surface.name, files=files)
+            write_report(to / "metrics.json", self.metrics(), name=self.surface.name, files=files)
         return [*files, "metrics.json"]
 
     def write_obj(self, folder: Path) -> str:
         """Write `NAME.obj` and return its name."""
-        from warpflat.core.atomic_files import file_in
+        from warpflat.core.output import file_in
         from warpflat.export.obj import write_obj
 
         file = file_in(folder, self.surface.name, ".obj")
@@ -323,7 +322,7 @@ def write_files(
 
     Args:
         results: the pieces, of different names.
-        folder: an existing one, in a block of :func:`warpflat.core.atomic_files.output_folder`.
+        folder: an existing one, in a block of :func:`warpflat.core.output.output_folder`.
         picture: whether to draw one.
         frames: whether to write a USD file with the development and the pattern.
         body: on which the picture shows them first; none if not given.
@@ -331,7 +330,7 @@ def write_files(
     Raises:
         InputError: the folder cannot be written.
     """
-    from warpflat.core.optional_files import optional_file
+    from warpflat.core.output import optional_file
 
     files = [result.write_obj(folder) for result in results]
     if frames:

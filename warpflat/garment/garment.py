@@ -207,14 +207,13 @@ class Garment:
         Raises:
             InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
         """
-        from warpflat.core.atomic_files import output_folder
-        from warpflat.core.manifest import require_own_metrics, write_metrics
+        from warpflat.core.output import output_folder, require_own_metrics, write_report
 
         others = [*(["picture.png"] if picture else []), "metrics.json"]
         with output_folder(folder, others, sources=self.mannequin.sources, guard=True) as to:
             require_own_metrics(to)
             files = self.write_files(to, picture=picture)
-            write_metrics(to, self.metrics(), name=self.name, files=files)
+            write_report(to / "metrics.json", self.metrics(), name=self.name, files=files)
         return [*files, "metrics.json"]
 
     def write_files(self, folder: Path, *, picture: bool) -> list[str]:

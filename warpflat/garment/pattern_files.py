@@ -172,8 +172,7 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder
             cannot be written.
     """
-    from warpflat.core.atomic_files import file_in, output_folder
-    from warpflat.core.manifest import record_file
+    from warpflat.core.output import file_in, output_folder, record_file
     from warpflat.export.read_pattern_json import read_pattern_json
 
     for format in formats:
@@ -204,7 +203,7 @@ def _write_pattern(
     """Make, draft and write a pattern; geometry that defeats it becomes a note, and `not_drawn` in the metrics."""
     from shapely.errors import ShapelyError
 
-    from warpflat.core.atomic_files import file_in, output_folder
+    from warpflat.core.output import file_in, output_folder
     from warpflat.pattern.walked import walk_seams
 
     if not options.formats and options.cloth is None:
@@ -322,7 +321,7 @@ def _write(
     sizes: Sequence[str] | None = None,
 ) -> str:
     """Write one file and return its name."""
-    from warpflat.core.atomic_files import file_in
+    from warpflat.core.output import file_in
     from warpflat.export.dxf import write_dxf
     from warpflat.export.pattern_json import write_pattern_json
     from warpflat.export.pdf import write_pdf
@@ -345,8 +344,7 @@ def _marker(
     drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
 ) -> tuple[list[str], tuple[str, ...], dict[str, Any]]:
     """Write `NAME.marker.svg` and `NAME.marker.json`, one garment of each size; return names, notes and metrics."""
-    from warpflat.core.atomic_files import file_in
-    from warpflat.core.json_file import write_json
+    from warpflat.core.output import file_in, write_json
     from warpflat.export.svg import write_marker_svg
     from warpflat.pattern.cut_list import cloths_of
     from warpflat.pattern.marker import make_marker

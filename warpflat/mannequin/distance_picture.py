@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.export.letters import all_letters
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.normals import face_normals

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
-from warpflat.core.atomic_files import atomic_path, output_folder
-from warpflat.core.manifest import require_own_metrics, write_metrics
-from warpflat.core.optional_files import optional_file
+from warpflat.core.output import atomic_path, optional_file, output_folder, require_own_metrics, write_report
 from warpflat.mannequin.distance_picture import write_distance_picture
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
@@ -57,7 +55,7 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
         files = {kind: path for kind, path in files.items() if path.suffix != ".png" or path.name in drawn}
         written = [path.name for path in files.values()]
         metrics = {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()}
-        write_metrics(place, metrics, name="mannequin", files=written)
+        write_report(place / "metrics.json", metrics, name="mannequin", files=written)
     return files
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.export.letters import all_letters
 from warpflat.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.mannequin.normals import face_normals, vertex_normals

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.atomic_files import require_writable
+from warpflat.core.output import require_writable
 from warpflat.export.usd_prims import bounding_box, export_stage, usd_errors, valid_name
 from warpflat.mannequin.normals import vertex_normals
 

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import reading
-from warpflat.core.manifest import record_file
+from warpflat.core.output import atomic_path, output_folder, record_file
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours
 from warpflat.export.geometry import outline_edges
 from warpflat.export.raster import rasterise, shade

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
-from warpflat.core.atomic_files import atomic_path, latest_file
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import guarded
-from warpflat.core.own_files import open_result, read_result, recorded_files
+from warpflat.core.input_files import guarded, open_file, read_result
+from warpflat.core.output import atomic_path, latest_file, recorded_files
 from warpflat.export.colours import SMALLEST_SCALE
 from warpflat.review.film import open_film, pack_film, pack_foreign_film
 from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
@@ -49,7 +48,7 @@ def read_run(folder: Path) -> tuple[dict[str, Any], list[str], str]:
     name = next(reversed(runs), folder.resolve().name)
     listed = [file for file in runs.get(name, {}) if os.path.lexists(folder / file)]
     for file in listed:
-        open_result(folder / file).close()
+        open_file(folder / file).close()
     return metrics, listed, name
 
 
@@ -59,8 +58,7 @@ def review_folder(folder: str | Path) -> Path:
     Raises:
         InputError: the folder holds no run, a file of it cannot be read, or the page cannot be written.
     """
-    from warpflat.core.atomic_files import output_folder
-    from warpflat.core.manifest import record_file
+    from warpflat.core.output import output_folder, record_file
 
     folder = Path(folder)
     metrics, files, name = read_run(folder)
@@ -230,7 +228,7 @@ def _image(path: Path) -> str:
 
 
 def _bytes(path: Path) -> bytes:
-    with open_result(path, most=_MOST_BYTES) as stream:
+    with open_file(path, most=_MOST_BYTES) as stream:
         return stream.read()
 
 

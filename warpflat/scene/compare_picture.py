@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.output import atomic_path
 from warpflat.export.letters import all_letters
 from warpflat.scene.comparison import Comparison, outline
 

@@ -56,7 +56,7 @@ def _write_correction(
     scene: Scene, garment: Garment | Flattening, draped: Drape, folder: Path
 ) -> tuple[dict[str, Any], list[str]]:
     """Correct the pattern, and write it beside the first."""
-    from warpflat.core.optional_files import optional_file
+    from warpflat.core.output import optional_file
     from warpflat.draping.correct_pattern import correct_pattern
     from warpflat.fabric.library import find_fabric
     from warpflat.garment.garment import Garment

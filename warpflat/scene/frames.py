@@ -14,7 +14,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.optional_files import optional_file
+from warpflat.core.output import optional_file
 from warpflat.scene.frames_keys import FilmStage, Frame, Key, KeyFile
 from warpflat.scene.schema import OutputTable
 from warpflat.surface.half_edges import half_edges
@@ -53,7 +53,7 @@ class Film:
     """Records the layouts of several pieces while they relax, and writes `frames.usdc` at the end of its ``with`` block.
 
     All pieces have the same frames: a stage takes as many as the piece that needs the most, and a piece without that stage stands still.
-    A film that cannot be made is left out; see :func:`warpflat.core.optional_files.optional_file`.
+    A film that cannot be made is left out; see :func:`warpflat.core.output.optional_file`.
 
     Attributes:
         files: after the block: the names of the files that it has written.

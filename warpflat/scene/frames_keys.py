@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import CannotWriteError
+from warpflat.core.errors import CannotWriteError, system_reason
 from warpflat.export.geometry import Polylines
 
 __all__ = ["FilmStage", "Frame", "Key", "KeyFile"]
@@ -118,7 +118,7 @@ class KeyFile:
                     written = self._file.write(left)
                     self._end, left = self._end + written, left[written:]
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
+            reason = system_reason(error)
             raise CannotWriteError(f"cannot write {self.film}: {reason}") from error
         return key
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
-from warpflat.core.json_file import read_json
+from warpflat.core.input_files import read_json
 from warpflat.core.toml_file import Table, check_table, read_toml
 from warpflat.mannequin.table import MannequinTable, mannequin_from_table
 from warpflat.scene.load import errors_named, expand_variables
@@ -269,8 +269,7 @@ def drape_outside(
     import warp as wp
 
     from warpflat.core.activity import report_activity
-    from warpflat.core.atomic_files import output_folder
-    from warpflat.core.manifest import remove_stale, require_own_metrics
+    from warpflat.core.output import output_folder, remove_stale, require_own_metrics
     from warpflat.draping.drape_pattern import Placement, drape_pattern
     from warpflat.draping.options import DrapeOptions
     from warpflat.draping.write import write_drape_files

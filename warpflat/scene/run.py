@@ -60,7 +60,7 @@ def run_scene(
 
     Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see
     `warpflat.garment.pattern_files`). Files that an earlier run has left there and this one does not make are removed at the
-    end (see `warpflat.core.manifest`). All of that happens together; a run that fails leaves the folder
+    end (see `warpflat.core.output`). All of that happens together; a run that fails leaves the folder
     as it was, and no run replaces a file that it has read.
 
     Args:
@@ -75,8 +75,7 @@ def run_scene(
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
             is made from would be replaced.
     """
-    from warpflat.core.atomic_files import output_folder
-    from warpflat.core.manifest import require_own_metrics
+    from warpflat.core.output import output_folder, require_own_metrics
 
     sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
     with output_folder(out, files_of_run(scene), sources=sources, guard=True) as folder:

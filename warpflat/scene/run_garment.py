@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
-from warpflat.core.atomic_files import files_written
 from warpflat.core.beside import Beside
-from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
-from warpflat.core.optional_files import optional_file
+from warpflat.core.output import latest_file, optional_file, remove_stale
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
@@ -186,7 +184,7 @@ def _run_plan(
     Raises:
         ClosedDarts: some darts of the scene's shape do not open.
     """
-    from warpflat.core.atomic_files import expect_files
+    from warpflat.core.output import expect_files
 
     scene = plan.scene
     expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
@@ -350,7 +348,7 @@ def _finish(
     files += [*review_files(scene, measured, out, tuple(files), film, images)]
     drape = settings.drape is not None
     # The body belongs to the film.
-    known = [*files, *([MANNEQUIN] if any(name == MANNEQUIN for _, name in files_written()) else [])]
+    known = [*files, *([MANNEQUIN] if latest_file(out / MANNEQUIN) != out / MANNEQUIN else [])]
     metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=known, drape=drape)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *written.notes, *name_notes, *manifest_notes)

@@ -62,8 +62,7 @@ def measure_fit(
         InputError: the folder cannot be written.
     """
     from warpflat.core.activity import report_activity
-    from warpflat.core.atomic_files import file_in
-    from warpflat.core.optional_files import optional_file
+    from warpflat.core.output import file_in, optional_file
     from warpflat.cutting.remedies import advise
 
     report_activity("measuring how it fits")
@@ -105,7 +104,7 @@ def write_surface(
     Raises:
         InputError: the folder cannot be written.
     """
-    from warpflat.core.manifest import remove_stale
+    from warpflat.core.output import remove_stale
     from warpflat.export.letters import note_on_names
     from warpflat.flattening.result import run_metrics
 
@@ -131,7 +130,7 @@ def packed_film(scene: Scene, folder: Path, files: Sequence[str]) -> Mapping[str
 
     It is None if the scene wants no such page, or the film is too large for one, or cannot be packed, which is a note.
     """
-    from warpflat.core.optional_files import optional_file
+    from warpflat.core.output import optional_file
 
     output, packed = scene.settings.output, None
     if output.picture and output.review and "frames.usdc" in files:
@@ -144,7 +143,7 @@ def packed_film(scene: Scene, folder: Path, files: Sequence[str]) -> Mapping[str
 
 def packed_pictures(scene: Scene, folder: Path, files: Sequence[str]) -> dict[str, str]:
     """Return the pictures among the files that have been written, packed for `review.html` if the scene wants it."""
-    from warpflat.core.optional_files import optional_file
+    from warpflat.core.output import optional_file
 
     output, packed = scene.settings.output, dict[str, str]()
     if output.picture and output.review:
@@ -173,7 +172,7 @@ def review_files(
         film: of :func:`packed_film`.
         pictures: of :func:`packed_pictures`.
     """
-    from warpflat.core.optional_files import optional_file
+    from warpflat.core.output import optional_file
 
     output, written = scene.settings.output, list[str]()
     if output.picture and output.review:

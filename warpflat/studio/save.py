@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_file_name, make_file_name, plain_name
+from warpflat.core.output import atomic_path
 from warpflat.core.toml_file import document_as_toml
 from warpflat.flattening.progress import Progress
 from warpflat.scene.load import Scene, load_scene

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from warpflat.core.activity import activity_listener
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, system_reason
 from warpflat.core.text import one_line
 from warpflat.draping.drape_garment import drape
 from warpflat.draping.options import DrapeOptions
@@ -348,7 +348,7 @@ class Session:
         except InputError as error:
             self.tell(str(error))
         except OSError as error:
-            self.tell(f"cannot read or write {error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
+            self.tell(f"cannot read or write {error.filename or 'a file'}: {system_reason(error)}")
         except Exception as error:
             # The page must not fall silent over a fault of the program.
             traceback.print_exc(file=sys.stderr)
