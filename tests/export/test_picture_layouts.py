@@ -21,12 +21,11 @@ from warpflat.cutting import ledger_picture
 from warpflat.draping import compare_picture, correction_picture, picture
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export import picture_walked
+from warpflat.export.figure import DPI, PAGE_WIDTH, keep_words_on_page
 from warpflat.export.geometry import face_areas
 from warpflat.export.letters import all_letters
 from warpflat.export.picture import PicturePiece, draw_figure
 from warpflat.export.picture_garment import Body
-from warpflat.export.picture_pen import DPI, PAGE_WIDTH
-from warpflat.export.picture_png import keep_words_on_page
 from warpflat.flattening import fit_picture
 from warpflat.model.fit import MAPS as MAPS_OF_FIT
 from warpflat.model.fit import Misfit, WornFit
@@ -158,7 +157,7 @@ def check_written(module: Any, write: Any, *arguments: Any, **options: Any) -> N
     """The page that a function of a module draws for a file is as it should be."""
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         checked = []
-        patch.setattr(module, "save_png", lambda path, figure, text: checked.append(check_page(figure)))
+        patch.setattr(module, "write_figure", lambda path, figure: checked.append(check_page(figure)))
         write(Path(folder) / "a.png", *arguments, **options)
         assert checked
 

@@ -9,18 +9,15 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path
-from warpflat.draping.picture import body_around, draw_scale, seen_from
+from warpflat.draping.picture import body_around, draw_scale
 from warpflat.draping.result import Drape
 from warpflat.export.colours import on_cloth
+from warpflat.export.figure import GREY, PAGE_WIDTH, Pen, new_figure, write_figure
 from warpflat.export.letters import all_letters
-from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
-from warpflat.export.picture_png import save_png
-from warpflat.export.picture_views import DrawnView
+from warpflat.export.picture_views import DrawnView, view_from_side
 
 __all__ = ["write_compared_drapes"]
 
-_SKIN = (0.80, 0.79, 0.77)
 _TALLEST, _TOP, _BAR, _GAP = 4.2, 0.75, 1.2, 0.25
 
 
@@ -31,36 +28,29 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     report_activity("drawing the drapes")
     meshes = {name: body_around(drape) for name, drape in drapes.items()}
-    views = {name: seen_from(points, faces, 0.0, cloth=cloth) for name, (points, faces, cloth) in meshes.items()}
+    views = {name: view_from_side(points, facets, 0.0) for name, (points, facets, _) in meshes.items()}
     size = np.max([view.size for view in views.values()], axis=0)
     room = PAGE_WIDTH - _BAR - _GAP * (len(views) + 1)
     scale = min(room / (len(views) * float(size[0])), _TALLEST / float(size[1]))
     tall, wide = scale * float(size[1]), scale * float(size[0]) + _GAP
     maps = _maps(drapes)
     height = len(maps) * (tall + _TOP) + 0.3
-    figure = Figure(figsize=(PAGE_WIDTH, height), dpi=DPI, facecolor="white")
-    pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    pen.open_page(figure, PAGE_WIDTH, height)
+    figure = new_figure(PAGE_WIDTH, height)
+    pen = Pen(figure)
+    pen.open_page()
     for row, (title, values, low, high, colours) in enumerate(maps):
         bottom = height - (row + 1) * (tall + _TOP)
         for column, name in enumerate(drapes):
-            _, faces, cloth = meshes[name]
-            face_colours = np.tile(np.array(_SKIN), (len(faces), 1))
-            face_colours[:cloth] = on_cloth(colours)(np.clip((values[name] - low) / (high - low), 0.0, 1.0))[:, :3]
+            shades = on_cloth(colours)(np.clip((values[name] - low) / (high - low), 0.0, 1.0))[:, :3]
             left = _GAP + column * wide
-            DrawnView(views[name], left=left, bottom=bottom, inches_per_metre=scale, dpi=DPI).draw(
-                pen.axes, face_colours
-            )
+            drawn = DrawnView(views[name], left=left, bottom=bottom, inches_per_metre=scale)
+            drawn.draw(pen.axes, np.concatenate([shades, meshes[name][2]]))
             pen.write(left + 0.5 * (wide - _GAP), bottom + tall + 0.1, name, 9, color=GREY, ha="center")
         pen.write(0.3, bottom + tall + 0.34, title, 11, fontweight="bold")
         draw_scale(figure, (PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall, height), low, high, colours)
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 def _maps(drapes: Mapping[str, Drape]) -> list[tuple[str, Mapping[str, FloatArray], float, float, str]]:

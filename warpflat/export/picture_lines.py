@@ -14,6 +14,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import polyline_length, resample
 from warpflat.core.text import name_without_number
+from warpflat.export.figure import GRAIN, INK, LABEL_SIZE, Pen
 from warpflat.export.labels import (
     LabelRoom,
     Spot,
@@ -27,8 +28,7 @@ from warpflat.export.labels import (
     spots_beside,
     spots_beyond_ends,
 )
-from warpflat.export.picture_pen import GRAIN, LABEL_SIZE, Pen
-from warpflat.export.picture_views import INK, DrawnView
+from warpflat.export.picture_views import DrawnView
 
 __all__ = ["draw_lines"]
 
