@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from warpflat.cutting import ledger_picture
-from warpflat.draping import compare_picture, correction_picture, picture
+from warpflat.draping import correction_picture, picture
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export import picture_walked
 from warpflat.export.figure import DPI, PAGE_WIDTH, keep_words_on_page
@@ -299,7 +299,7 @@ def test_drape_and_correction_of_any_pieces(worn_pieces: list[Any], fabric: str,
     drape = drape_of(flat)
     check_written(picture, picture.write_drape_picture, drape)
     both = {fabric: drape, "another": drape}
-    check_written(compare_picture, compare_picture.write_compared_drapes, both)
+    check_written(picture, picture.write_compared_drapes, both)
     rounds = [SimpleNamespace(misfit=0.01)]
     correction = Correction(before=drape, after=drape_of(1.01 * flat), rounds=tuple(rounds), reason="")  # type: ignore[arg-type]
     check_written(correction_picture, correction_picture.write_correction_picture, correction)

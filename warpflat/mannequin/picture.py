@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.export.figure import INK, Pen, new_figure, write_figure
-from warpflat.export.geometry import vertex_normals
 from warpflat.export.labels import space_out
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_views import DrawnView, make_facets, view_from_side
 from warpflat.mannequin.layout import LEG_LINES, RING_LEVELS
+from warpflat.mannequin.normals import vertex_normals
 
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
@@ -51,7 +51,7 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
         corner = middle - 0.5 * float(view.size[0]) * scale
         drawn = DrawnView(view, left=corner, bottom=0.01 * _HEIGHT + 0.02 * span * scale, inches_per_metre=scale)
         drawn.draw(pen.axes, np.tile(_BODY, (len(faces), 1)))
-        towards = vertex_normals(view.vectors, facets.triangles, len(view.points))[:, 2] > _FACING
+        towards = vertex_normals(view.points, faces)[:, 2] > _FACING
         for ids in mannequin.layout.body_lines.values():
             edges = np.column_stack([ids[:-1], ids[1:]])
             drawn.draw_segments(pen.axes, edges[towards[edges].all(axis=1)], width=0.9, colour=_LINE, zorder=5)
@@ -94,7 +94,11 @@ def _label_lines(pen: Pen, drawn: DrawnView, mannequin: Mannequin, view: str) ->
         line = line if line[0, 1] < line[-1, 1] else line[::-1]
         row = int(share * (len(line) - 1))
         (x, y), (rise_x, rise_y) = line[row].tolist(), (line[row + 2] - line[row]).tolist()
-        along = {"rotation": float(np.degrees(np.arctan2(rise_y, rise_x))), "rotation_mode": "anchor", "va": "bottom"}
+        along: dict[str, Any] = {
+            "rotation": float(np.degrees(np.arctan2(rise_y, rise_x))),
+            "rotation_mode": "anchor",
+            "va": "bottom",
+        }
         pen.write(x - 0.03, y, name, 8, color=_LINE, **along)
     if view != "three-quarter":
         return

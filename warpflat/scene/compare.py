@@ -125,7 +125,7 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.manifest import write_report
     from warpflat.core.optional_files import optional_file
-    from warpflat.draping.compare_picture import write_compared_drapes
+    from warpflat.draping.picture import write_compared_drapes
     from warpflat.scene.compare_picture import write_overlay_picture, write_overlay_svg
 
     sources = [
