@@ -46,7 +46,7 @@ DRAPE = {
 GARMENT = {
     "picture.png": "warpflat.export.picture_garment.GarmentViews.draw",
     "wear.png": "warpflat.flattening.fit_picture._Sheet.of",
-    "walked.png": "warpflat.export.picture_walked.save_png",
+    "walked.png": "warpflat.export.picture_walked.write_figure",
     "frames.usdc": "warpflat.scene.frames_keys.KeyFile.append",
     "review.html": "warpflat.review.page.pack_pictures",
     "the guide": "warpflat.export.pdf.legend_page",

@@ -10,6 +10,7 @@ from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
 
 from warpflat.core.sums import weighted_percentile
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
+from warpflat.export.figure import GREY, Pen, new_figure, write_figure
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
 from warpflat.export.labels import (
     LabelRoom,
@@ -25,10 +26,8 @@ from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_garment import Body, crop_body
 from warpflat.export.picture_packing import pack_boxes, pack_rows
-from warpflat.export.picture_pen import GREY, Pen
-from warpflat.export.picture_png import save_png
-from warpflat.export.picture_silhouette import BETWEEN, Silhouette, place_views
-from warpflat.export.picture_views import make_facets, pattern_view
+from warpflat.export.picture_page import BETWEEN, place_views
+from warpflat.export.picture_views import Silhouette, make_facets, pattern_view
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
@@ -381,17 +380,14 @@ def test_samples_are_averaged_over_what_is_covered() -> None:
 
 @pytest.mark.parametrize("shape", [(1, 1), (70, 33), (32, 5)])
 def test_a_png_holds_the_pixels_its_resolution_and_who_wrote_it(tmp_path: Path, shape: tuple[int, int]) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from PIL import Image
 
     rng = np.random.default_rng(6)
     given = rng.integers(0, 256, (*shape, 4), dtype=np.uint8)
     given[..., 3] = 255
-    figure = Figure(figsize=(shape[1] / 150, shape[0] / 150), dpi=150)
-    FigureCanvasAgg(figure)
+    figure = new_figure(shape[1] / 150, shape[0] / 150)
     figure.figimage(given, resize=True)
-    save_png(tmp_path / "a.png", figure, {"Software": "warpflat"})
+    write_figure(tmp_path / "a.png", figure)
     with Image.open(tmp_path / "a.png") as image:
         assert image.mode == "RGB"
         assert image.info["dpi"] == pytest.approx((150, 150), abs=0.1)

@@ -18,15 +18,14 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from warpflat.cutting import ledger_picture
-from warpflat.draping import compare_picture, correction_picture, picture
+from warpflat.draping import correction_picture, picture
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export import picture_walked
+from warpflat.export.figure import DPI, PAGE_WIDTH, keep_words_on_page
 from warpflat.export.geometry import face_areas
 from warpflat.export.letters import all_letters
 from warpflat.export.picture import PicturePiece, draw_figure
 from warpflat.export.picture_garment import Body
-from warpflat.export.picture_pen import DPI, PAGE_WIDTH
-from warpflat.export.picture_png import keep_words_on_page
 from warpflat.flattening import fit_picture
 from warpflat.model.fit import MAPS as MAPS_OF_FIT
 from warpflat.model.fit import Misfit, WornFit
@@ -158,7 +157,7 @@ def check_written(module: Any, write: Any, *arguments: Any, **options: Any) -> N
     """The page that a function of a module draws for a file is as it should be."""
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         checked = []
-        patch.setattr(module, "save_png", lambda path, figure, text: checked.append(check_page(figure)))
+        patch.setattr(module, "write_figure", lambda path, figure: checked.append(check_page(figure)))
         write(Path(folder) / "a.png", *arguments, **options)
         assert checked
 
@@ -300,7 +299,7 @@ def test_drape_and_correction_of_any_pieces(worn_pieces: list[Any], fabric: str,
     drape = drape_of(flat)
     check_written(picture, picture.write_drape_picture, drape)
     both = {fabric: drape, "another": drape}
-    check_written(compare_picture, compare_picture.write_compared_drapes, both)
+    check_written(picture, picture.write_compared_drapes, both)
     rounds = [SimpleNamespace(misfit=0.01)]
     correction = Correction(before=drape, after=drape_of(1.01 * flat), rounds=tuple(rounds), reason="")  # type: ignore[arg-type]
     check_written(correction_picture, correction_picture.write_correction_picture, correction)

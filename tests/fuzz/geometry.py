@@ -83,7 +83,7 @@ def garment_meshes() -> dict[str, bytes]:
 
 def geometry_case(kind: str, random: Random) -> Case:
     """A damaged scene or mesh of a kind, and the command that reads it."""
-    from .mutations import _MUCH_WORK, damaged_toml, damaged_bytes
+    from .mutations import _MUCH_WORK, damaged_bytes, damaged_toml
     from .seeds import BARE
 
     meshes = garment_meshes()

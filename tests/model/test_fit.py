@@ -242,11 +242,11 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     results = [fitting, replace(tight, positions=tight.positions * [0.7, 1.0])]
     drawn: list[Figure] = []
 
-    def keep(path: Path, figure: Figure, text: object) -> None:
+    def keep(path: Path, figure: Figure) -> None:
         drawn.append(figure)
         path.touch()
 
-    monkeypatch.setattr("warpflat.flattening.fit_picture.save_png", keep)
+    monkeypatch.setattr("warpflat.flattening.fit_picture.write_figure", keep)
     write_wear_sheet(tmp_path / "wear.png", results, title="sleeves")
     assert (tmp_path / "wear.png").exists()
     figure = drawn[0]

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from warpflat.batch.body_statistics import BODY_GIRTHS, MEASURES, BodyPattern, fit_trend
-from warpflat.core.output import atomic_path
+from warpflat.export.figure import new_figure, write_figure
 from warpflat.export.letters import all_letters
-from warpflat.export.picture_png import save_png
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 __all__ = ["write_body_picture"]
 
@@ -30,14 +26,10 @@ def write_body_picture(path: str | os.PathLike[str], patterns: Sequence[BodyPatt
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     measures = [name for name in MEASURES if any(name in pattern.measures for pattern in patterns)]
     graded = [pattern for pattern in patterns if pattern.size]
     rows = len(measures) + bool(graded)
-    figure = Figure(figsize=(11.0, 2.6 * rows + 0.4), dpi=_DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.0, 2.6 * rows + 0.4, dpi=_DPI, layout="constrained")
     axes = figure.subplots(rows, len(BODY_GIRTHS), squeeze=False)
     for place, name in zip(axes, measures, strict=False):
         for ax, level in zip(place, BODY_GIRTHS, strict=True):
@@ -45,8 +37,7 @@ def write_body_picture(path: str | os.PathLike[str], patterns: Sequence[BodyPatt
     if graded:
         for ax, level in zip(axes[-1], BODY_GIRTHS, strict=True):
             _draw_ease(ax, graded, level)
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 def _draw_measure(ax: Axes, patterns: Sequence[BodyPattern], name: str, level: str) -> None:

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.output import atomic_path
 from warpflat.export.colours import energy_colours, energy_scale
+from warpflat.export.figure import PAGE_WIDTH, Pen, new_figure, write_figure
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters
-from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
-from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import DrawnView, make_facets, surface_view
 
 if TYPE_CHECKING:
@@ -51,30 +49,26 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     entries = ledger.entries[:_MOST]
     surface, density = ledger.result.surface, ledger.result.face_energy_density
     view = surface_view(surface, make_facets(surface.faces), polylines_of({}))
     per_metre = min(_BODY / float(view.size[0]), 5.2 / float(view.size[1]))
     tall = max(float(view.size[1]) * per_metre + 0.7, _ROW * (len(entries) + 2))
     height = tall + 1.15
-    figure = Figure(figsize=(PAGE_WIDTH, height), dpi=DPI, facecolor="white")
-    pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    pen.open_page(figure, PAGE_WIDTH, height)
+    figure = new_figure(PAGE_WIDTH, height)
+    pen = Pen(figure)
+    pen.open_page()
     pen.write(0.45, height - 0.35, f"{surface.name}: where to cut", 15, fontweight="bold")
     peak = ledger.peaks.words[0] if ledger.peaks.words else "none inside"
     stored = f"strain energy {1e3 * ledger.result.stages[-1].strain_energy_j:.0f} mJ"
     pen.write(0.45, height - 0.64, f"{stored}; highest density: {peak}", 9.5, color=_GREY)
     scale = energy_scale(density, ledger.result.worn.area)
     drawn = DrawnView(view, left=0.45, bottom=height - 1.15 - float(view.size[1]) * per_metre,
-                      inches_per_metre=per_metre, dpi=DPI)  # fmt: skip
+                      inches_per_metre=per_metre)  # fmt: skip
     drawn.draw(pen.axes, energy_colours(density, scale))
     _draw_paths(pen, drawn, surface.vertices, entries, view)
     _draw_table(pen, entries, height - 1.0)
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 def _draw_paths(pen: Pen, drawn: DrawnView, vertices: FloatArray, entries: Sequence[LedgerEntry], view: Any) -> None:

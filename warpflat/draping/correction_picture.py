@@ -9,11 +9,10 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.output import atomic_path
 from warpflat.draping.correct_pattern import Correction
+from warpflat.export.figure import new_figure, write_figure
 from warpflat.export.geometry import outline_edges
 from warpflat.export.letters import all_letters
-from warpflat.export.picture_png import save_png
 
 __all__ = ["write_correction_picture"]
 
@@ -30,9 +29,6 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     report_activity(f"drawing {Path(path).name}")
     old, new, moved = correction.before.cloth, correction.after.cloth, correction.moved()
     edges = outline_edges(old.flat_faces)
@@ -44,8 +40,7 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
     tall = float((old.flat + shift)[:, 1].max())
     scale = min(_SCALE, _LARGEST / max(x, tall))
     size = (max(scale * x, 6.0), scale * tall + 1.0)
-    figure = Figure(figsize=size, dpi=110, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = new_figure(*size, dpi=110)
     axis = figure.add_axes((0.01, 0.01, 0.98, 0.9 * (1.0 - 0.4 / size[1])))
     axis.set_axis_off()
     for points, colour, width in ((old.flat + shift, _BEFORE, 1.4), (new.flat + shift, _AFTER, 1.1)):
@@ -62,8 +57,7 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
         f"{1e3 * last.misfit:.2f} mm after",
         fontsize=11,
     )
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 def _lines(points: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:

@@ -9,24 +9,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.patches import Polygon
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.output import atomic_path
-from warpflat.export.colours import energy_scale
+from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
+from warpflat.export.figure import DPI, GREY, MARGIN, PAGE_WIDTH, POINT, Pen, Pixels, new_figure, write_figure
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_garment import Body, GarmentViews
-from warpflat.export.picture_page import CAPTIONS_ALONE, Cell, draw_cell, lay_out
-from warpflat.export.picture_pen import DPI, GREY, MARGIN, PAGE_WIDTH, Pen
-from warpflat.export.picture_png import save_png
-from warpflat.export.picture_scale import STRIP, colour_bar_room, draw_colour_bar, draw_scale_bar
+from warpflat.export.picture_page import CAPTIONS_ALONE, STRIP, Cell, draw_cell, draw_scale_bar, lay_out
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
 __all__ = ["PicturePiece", "draw_figure", "write_picture"]
 
-SCALE_BAR = 2.3  # [in], for the scale of lengths left of the colour bar
+SCALE_BAR = 2.3  # [in], for the scale of lengths left of the colour bar, as all that follows
+_BAR_HEIGHT = 0.17
+_BAR_TIP = 0.03  # of its length, for what lies above the scale
+_NOTE, _POWER, _PLAIN = 2.0, 0.7, 0.35  # room right of the bar: for what it leaves out, for a power of ten, for neither
+_SHORTEST_BAR = 1.2
+_WORDS_SIZE, _TICK_SIZE = 9.5, 8.5  # [pt]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,9 +86,7 @@ def write_picture(
         ValueError: there is no piece.
     """
     report_activity(f"drawing {Path(path).name}")
-    figure = draw_figure(pieces, quantity=quantity, scale=scale, body=body)
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, draw_figure(pieces, quantity=quantity, scale=scale, body=body))
 
 
 @all_letters()
@@ -100,9 +102,6 @@ def draw_figure(
     Raises:
         ValueError: there is no piece.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     if not pieces:
         raise ValueError("a picture needs at least one piece")
     shown_names = titles([piece.name for piece in pieces], is_drawn)
@@ -111,22 +110,22 @@ def draw_figure(
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
     areas = np.concatenate([cell.areas for cell in cells])
     scale = energy_scale(density, areas) if scale is None else scale
-    figure = Figure(figsize=(PAGE_WIDTH, 4.0), dpi=DPI, facecolor="white")
-    pen = Pen(FigureCanvasAgg(figure).get_renderer())
+    figure = new_figure(PAGE_WIDTH, 4.0)
+    pen = Pen(figure)
     shared = _take_shared(pen, cells)
     worn = None
     if body is not None:
         worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
     left = MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR)
-    narrowest = left + colour_bar_room(pen, scale, density, quantity)
+    narrowest = left + _colour_bar_room(pen, scale, density, quantity)
     width, height, page_scale = lay_out(pen, cells, worn, narrowest=narrowest)
     height += STRIP
     figure.set_size_inches(width, height)
-    pen.open_page(figure, width, height)
+    pen.open_page()
     if not alone:
         draw_scale_bar(pen, MARGIN, height - 0.27, page_scale)
         pen.write(MARGIN, height - 0.48, shared, 7.5, color=GREY)
-    draw_colour_bar(pen, scale, density, areas, quantity, left=left, top=height)
+    _draw_colour_bar(pen, scale, density, areas, quantity, left=left, top=height)
     top = height - STRIP
     if worn is not None:
         worn.draw(pen, MARGIN, top, scale)
@@ -166,3 +165,84 @@ def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool)
     )
     cell.stack_if_wide()
     return cell
+
+
+def _colour_bar_room(pen: Pen, scale: float, density: FloatArray, quantity: str) -> float:
+    """Return how much room the colour bar needs at least, from its words to the right edge of the page [in]; arguments as it takes them."""
+    words = pen.measure(_bar_words(scale, density, quantity), _WORDS_SIZE)[0]
+    return words + (MARGIN if _is_flat(scale, density) else 0.15 + _SHORTEST_BAR + _right_of_bar(scale, density))
+
+
+def _is_flat(scale: float, density: FloatArray) -> bool:
+    return scale <= SMALLEST_SCALE and not (density > scale).any()
+
+
+def _bar_words(scale: float, density: FloatArray, quantity: str) -> str:
+    return f"{quantity}: none, the cloth lies flat without strain" if _is_flat(scale, density) else f"{quantity} [J/m²]"
+
+
+def _right_of_bar(scale: float, density: FloatArray) -> float:
+    return _NOTE if (density > scale).any() else _POWER if _ticks(scale, 1.0)[2] else _PLAIN
+
+
+def _draw_colour_bar(
+    pen: Pen, scale: float, density: FloatArray, areas: FloatArray, quantity: str, *, left: float, top: float
+) -> None:
+    """Draw the colour bar from `left` [in] to the right margin, and the share of the area above its end.
+
+    The page must leave `_colour_bar_room`. A surface without strain needs no scale: words say so.
+
+    Args:
+        scale: upper end of the colours [J/m2].
+        density, areas: #F [J/m2] and [m2] of all faces.
+        quantity: what the colours show.
+        left, top: of the strip [in].
+    """
+    above = density > scale
+    words = _bar_words(scale, density, quantity)
+    pen.write(left, top - 0.24, words, _WORDS_SIZE)
+    if _is_flat(scale, density):
+        return
+    left += pen.measure(words, _WORDS_SIZE)[0] + 0.15
+    right = pen.page_width - _right_of_bar(scale, density)
+    upper = top - 0.24 + 0.5 * _BAR_HEIGHT
+    lower = upper - _BAR_HEIGHT
+    end = left + (right - left) / (1.0 + _BAR_TIP) if above.any() else right
+    first, last = round(left * DPI), round(end * DPI)
+    shades = energy_colours((np.arange(last - first) + 0.5) / (last - first), 1.0)
+    strip = np.full((round(_BAR_HEIGHT * DPI), last - first, 4), 255, dtype=np.uint8)
+    strip[..., :3] = np.round(255.0 * shades)
+    pen.axes.add_artist(Pixels(strip, left=first, bottom=round(lower * DPI), zorder=1))
+    outline = [(left, lower), (end, lower), (end, upper), (left, upper)]
+    if above.any():
+        tip = (right, 0.5 * (lower + upper))
+        # It starts one pixel earlier, so that no white shows between.
+        corners = [(end - 1.0 / DPI, lower), (end, lower), tip, (end, upper), (end - 1.0 / DPI, upper)]
+        pen.axes.add_patch(Polygon(corners, facecolor=energy_colours([1.0], 1.0)[0], linewidth=0, zorder=1))
+        outline.insert(2, tip)
+    pen.axes.add_patch(Polygon(outline, fill=False, edgecolor="black", linewidth=0.6, zorder=6))
+    places, numbers, power = _ticks(scale, end - left)
+    for place, word in zip(left + (end - left) * places / scale, numbers, strict=True):
+        pen.line(np.array([(place, lower), (place, lower - 3 * POINT)]), width=0.6, colour="black")
+        pen.write(place, lower - 5 * POINT, word, _TICK_SIZE, color="black", ha="center", va="top")
+    if power:
+        pen.write(right + 0.16, lower - 5 * POINT, power, 8, color="black", va="top")
+    total = float(areas.sum())
+    if above.any() and total > 0.0:
+        share = float(areas[above].sum()) / total
+        percent = f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
+        text = f"clipped: {percent} of the area\nis above, up to {density.max():.3g} J/m²"
+        pen.write(right + 0.12, 0.5 * (lower + upper), text, 7.5, color=GREY, linespacing=1.35)
+
+
+def _ticks(scale: float, length: float) -> tuple[FloatArray, list[str], str]:
+    """Return round values from 0 to `scale` for a bar of this length [in], their words, and their power of ten."""
+    most = int(np.clip(length / (5.0 * _TICK_SIZE * POINT), 1, 9))
+    values = np.asarray(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, scale))
+    values = values[values <= scale * (1.0 + 1e-9)]
+    formatter = ScalarFormatter()
+    formatter.create_dummy_axis()
+    formatter.axis.set_view_interval(0.0, scale)  # type: ignore[union-attr]
+    formatter.set_powerlimits((-3, 4))
+    words = formatter.format_ticks(values)  # type: ignore[arg-type]
+    return values, words, formatter.get_offset()

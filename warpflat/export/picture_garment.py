@@ -9,17 +9,15 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
-from warpflat.export.geometry import area_vectors, outline_edges
-from warpflat.export.picture_pen import GREY, Pen
-from warpflat.export.picture_silhouette import Silhouette
-from warpflat.export.picture_views import DrawnView, Facets, View, make_facets
+from warpflat.export.figure import GREY, Pen
+from warpflat.export.geometry import outline_edges
+from warpflat.export.picture_views import SIDES, DrawnView, Silhouette, make_facets, view_from_side
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["Body", "GarmentViews", "crop_body"]
 
-_VIEWS = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _HEIGHT, _HEAD, _FOOT = 9.0, 0.26, 0.30  # [in], as all that follows
 _LEAST_GAP = 0.25
 # How far the mannequin shows around the garment [m].
@@ -65,18 +63,14 @@ class GarmentViews:
         cloth = np.concatenate(pieces).astype(np.int32)
         skin = np.column_stack([near, np.full(len(near), -1)]) + counts[-1]
         skin[:, 3] = -1
-        facets = make_facets(np.concatenate([cloth, skin]).astype(np.int32))
         # Outlines of pieces show the seams; the body has none.
-        facets = Facets(
-            faces=cloth[:0],
-            triangles=facets.triangles,
-            face_of_triangle=facets.face_of_triangle,
-            outline=np.concatenate([outline_edges(faces.astype(np.int32)) for faces in pieces]),
-            used=facets.used,
-        )
+        seams = np.concatenate([outline_edges(faces.astype(np.int32)) for faces in pieces])
+        facets = make_facets(np.concatenate([cloth, skin]).astype(np.int32), seams)
         self._skin_faces = len(skin)
         points = np.concatenate([worn, skin_points])
-        self._views = [(title, _view(points, len(worn), facets, angle)) for title, angle in _VIEWS]
+        self._views = [(title, view_from_side(points, facets, degrees)) for title, degrees in SIDES]
+        for _, view in self._views:
+            view.points[: len(worn), 2] += _NEARER
         self._width = sum(float(view.size[0]) for _, view in self._views)
         self._tallest = max(float(view.size[1]) for _, view in self._views)
         self._area = sum(Silhouette(view).area for _, view in self._views)
@@ -85,7 +79,7 @@ class GarmentViews:
     def size(self, share: float, room: float) -> tuple[float, float]:
         """Return width and height of the band [in] at a share of the largest scale on a page with so much room [in]."""
         scale = self._scale_at(share, room)
-        return min(self._width * scale + len(_VIEWS) * _LEAST_GAP, room), _HEAD + self._tallest * scale + _FOOT
+        return min(self._width * scale + len(SIDES) * _LEAST_GAP, room), _HEAD + self._tallest * scale + _FOOT
 
     def covered(self, share: float, room: float) -> float:
         """Return the area of the page that the views cover [in2]; arguments as of :meth:`size`."""
@@ -94,10 +88,10 @@ class GarmentViews:
     def place(self, share: float, room: float, width: float, *, beside: bool) -> None:
         """Choose the scale, and gaps that fill a width [in] unless pieces stand `beside` the views."""
         self._scale = self._scale_at(share, room)
-        self._gap = _LEAST_GAP if beside else max((width - self._width * self._scale) / len(_VIEWS), _LEAST_GAP)
+        self._gap = _LEAST_GAP if beside else max((width - self._width * self._scale) / len(SIDES), _LEAST_GAP)
 
     def _scale_at(self, share: float, room: float) -> float:
-        return share * min((room - len(_VIEWS) * _LEAST_GAP) / self._width, _HEIGHT / self._tallest)
+        return share * min((room - len(SIDES) * _LEAST_GAP) / self._width, _HEIGHT / self._tallest)
 
     def draw(self, pen: Pen, left: float, top: float, scale: float) -> None:
         """Draw the band whose upper left corner is at (`left`, `top`) [in], colours up to `scale` [J/m2]."""
@@ -105,9 +99,7 @@ class GarmentViews:
         for title, view in self._views:
             width, height = view.size[:2] * self._scale
             left += 0.5 * self._gap
-            drawn = DrawnView(
-                view, left=left, bottom=top - _HEAD - float(height), inches_per_metre=self._scale, dpi=pen.dpi
-            )
+            drawn = DrawnView(view, left=left, bottom=top - _HEAD - float(height), inches_per_metre=self._scale)
             drawn.draw(pen.axes, colours)
             pen.write(left + 0.5 * float(width), top - 0.12, title, 9, color=GREY, ha="center", fontstyle="italic")
             left += float(width) + 0.5 * self._gap
@@ -162,13 +154,3 @@ def _cut(triangles: IntArray, vertices: FloatArray, beyond: FloatArray) -> tuple
         # As a face beyond the cut would have them, so that it looks outwards.
         edges.append(np.column_stack([p, q] if alone_is_outside else [q, p]))
     return np.concatenate(found), vertices, np.concatenate(edges)
-
-
-def _view(points: FloatArray, cloth: int, facets: Facets, degrees: float) -> View:
-    """Return the mesh as it is seen by somebody who walked `degrees` around it to its left."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    directions = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
-    seen = points @ directions.T
-    vectors = area_vectors(seen, facets.triangles)
-    seen[:cloth, 2] += _NEARER
-    return View(points=seen, facets=facets, lines={}, vectors=vectors)

@@ -8,24 +8,21 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from matplotlib.patches import Rectangle
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
-from warpflat.export.labels import LabelRoom, Spot
+from warpflat.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen
+from warpflat.export.labels import LabelRoom, Spot, draw_lines
 from warpflat.export.picture_garment import GarmentViews
-from warpflat.export.picture_lines import draw_lines
 from warpflat.export.picture_packing import pack_boxes, pack_rows
-from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen
-from warpflat.export.picture_scale import STRIP, STRIP_WORDS, draw_scale_bar
-from warpflat.export.picture_silhouette import Silhouette, Words, heading_room, place_views
-from warpflat.export.picture_views import DrawnView, View
+from warpflat.export.picture_views import DrawnView, Silhouette, View
 
-__all__ = ["CAPTIONS_ALONE", "Cell", "draw_cell", "lay_out"]
+__all__ = ["BETWEEN", "CAPTIONS_ALONE", "STRIP", "Cell", "draw_cell", "draw_scale_bar", "lay_out", "place_views"]
 
-_BESIDE, _BESIDE_ALONE = (
-    0.2,
-    0.12,
-)  # [in], as all that follows: either side of a view, for names; those of one piece may stand in the margin
+# All lengths in inches. Above all cells there is a strip with the scales of length and colour.
+STRIP, _STRIP_WORDS = 0.66, 0.52  # its height, and where its words end
+_BESIDE, _BESIDE_ALONE = 0.2, 0.12  # either side of a view, for names; those of one piece may stand in the margin
 _FOOT = 0.22  # below a view, for names
 _HIGHEST = 0.15  # a view below the upper edge
 _SMALLEST_PATTERN, _NARROWEST, _NARROWEST_PAGE = 2.0, 1.6, 8.5
@@ -39,6 +36,18 @@ _STACKED = 2.6  # width of two views side by side over their height, from which 
 CAPTIONS_ALONE = 4.6  # wide, left of the colour bar
 _LONGEST_NAME = 5.4  # two of them have room side by side
 _SHORTEST_GRAIN = 0.28  # half its length
+_HEADING, _HALF_HEADING = 0.34, 0.4  # above the cloth, with its heading; half the width of one
+BETWEEN = 0.34  # cloth of a view from that of the view above, with names between
+_ABOVE = 0.2  # cloth below words, with a name between
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Words:
+    """A box of words above the views of a piece [in]: between `left` and `right`, down to `bottom` below the cell's upper edge."""
+
+    left: float
+    right: float
+    bottom: float
 
 
 @dataclass(kw_only=True, eq=False)
@@ -66,7 +75,7 @@ class Cell:
     width: float = 0.0
     height: float = 0.0
     places: list[tuple[float, float]] = field(default_factory=list)
-    words: list[Words] = field(default_factory=list)
+    words: list[_Words] = field(default_factory=list)
 
     @property
     def areas(self) -> FloatArray:
@@ -132,9 +141,9 @@ class Cell:
         """Place the views in the cell below its words, whose name is so wide [in]."""
         words = max(named, *(pen.measure(line, _CAPTION_SIZE)[0] for line in self.caption_lines), 0.0)
         above = STRIP - 0.08 if self.alone else 0.0
-        self.words = [Words(left=0.0, right=words, bottom=0.25 + 0.15 * len(self.caption_lines) - above)]
+        self.words = [_Words(left=0.0, right=words, bottom=0.25 + 0.15 * len(self.caption_lines) - above)]
         if self.alone:
-            self.words.append(Words(left=CAPTIONS_ALONE - 0.1, right=PAGE_WIDTH, bottom=STRIP_WORDS - STRIP))
+            self.words.append(_Words(left=CAPTIONS_ALONE - 0.1, right=PAGE_WIDTH, bottom=_STRIP_WORDS - STRIP))
         self.places = place_views(
             self.silhouettes,
             self.inches_per_metre,
@@ -149,6 +158,70 @@ class Cell:
             for (_, low), shape in zip(self.places, self.silhouettes, strict=True)
         ]
         self.height = max(ends) + _FOOT
+
+
+def place_views(
+    silhouettes: Sequence[Silhouette],
+    scale: float,
+    *,
+    width: float,
+    stacked: bool,
+    words: Sequence[_Words],
+    top: float,
+    has_headings: bool,
+) -> list[tuple[float, float]]:
+    """Place the views of a piece side by side or one below the other, as near to words and to each other as their outlines allow.
+
+    Args:
+        silhouettes: of the views, from the left or from the top.
+        scale: [in/m].
+        width: of the cell [in].
+        stacked: whether they stand one below the other.
+        words: above them.
+        top: the highest place of a view, below the cell's upper edge [in].
+        has_headings: whether a word stands above the middle of each view.
+
+    Returns:
+        For each view how far its box is to the right and below the cell's upper left corner [in].
+    """
+    sizes = [(scale * shape.width, scale * shape.height) for shape in silhouettes]
+    spare = (width - sum(wide for wide, _ in sizes)) / len(sizes)
+    places, left = list[tuple[float, float]](), 0.0
+    for shape, (wide, _) in zip(silhouettes, sizes, strict=True):
+        x = 0.5 * (width - wide) if stacked else left + 0.5 * spare
+        left += wide + spare
+        low = top
+        for box in words:
+            low = max(
+                low, box.bottom + _ABOVE - scale * shape.room_above((box.left - x) / scale, (box.right - x) / scale)
+            )
+            if (
+                has_headings
+                and box.left < x + 0.5 * wide + _HALF_HEADING
+                and box.right > x + 0.5 * wide - _HALF_HEADING
+            ):
+                low = max(low, box.bottom + _HEADING - _heading_room(shape, scale))
+        if stacked and places:
+            before, (x_before, low_before) = silhouettes[len(places) - 1], places[-1]
+            bottom = low_before + scale * before.height
+            low = max(low, bottom + BETWEEN - scale * before.overlap_below(shape, (x - x_before) / scale))
+            if has_headings:
+                middle = (x + 0.5 * wide - x_before) / scale
+                above = before.room_below(middle - _HALF_HEADING / scale, middle + _HALF_HEADING / scale)
+                low = max(low, bottom + BETWEEN + _HEADING - _heading_room(shape, scale) - scale * above)
+        places.append((x, low))
+    if not stacked:
+        # The lower ones are as low as they must be; others stand in the middle of their room.
+        floor = max(low + high for (_, low), (_, high) in zip(places, sizes, strict=True))
+        places = [(x, 0.5 * (low + floor - high)) for (x, low), (_, high) in zip(places, sizes, strict=True)]
+    return places
+
+
+def _heading_room(shape: Silhouette, scale: float) -> float:
+    """Return how far the cloth below the heading of a view is from the view's upper edge [in]."""
+    half = _HALF_HEADING / scale
+    room = scale * shape.room_above(0.5 * shape.width - half, 0.5 * shape.width + half)
+    return min(room, scale * shape.height)
 
 
 def lay_out(
@@ -248,7 +321,7 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     size, shown = cell.inches_per_metre, list[DrawnView]()
     for view, (left, low) in zip(cell.views, cell.places, strict=True):
         y = top - low - size * float(view.size[1])
-        drawn = DrawnView(view, left=cell.left + left, bottom=y, inches_per_metre=size, dpi=DPI)
+        drawn = DrawnView(view, left=cell.left + left, bottom=y, inches_per_metre=size)
         drawn.draw(pen.axes, energy_colours(cell.density, scale))
         shown.append(drawn)
     room = LabelRoom()
@@ -256,7 +329,7 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
         room.take_box(cell.left + box.left, top - box.bottom, cell.left + box.right, top - box.bottom + 0.5)
     if cell.shows_body:
         for drawn, shape, words in zip(shown, cell.silhouettes, ("on the body", "pattern"), strict=True):
-            _heading(pen, room, drawn, words, drawn.box[3] - heading_room(shape, size) + 0.24)
+            _heading(pen, room, drawn, words, drawn.box[3] - _heading_room(shape, size) + 0.24)
     floor, start = top - cell.height + 0.02, cell.left
     if cell.alone or size != page_scale:
         end = draw_scale_bar(pen, cell.left, floor, size)
@@ -273,6 +346,22 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
         unnamed["grain"] = None
     if unnamed:
         _write_unnamed(pen, room, list(unnamed), start, cell.left + cell.width, floor)
+
+
+def draw_scale_bar(pen: Pen, left: float, y: float, inches_per_metre: float) -> float:
+    """Draw a bar of a round length whose lower left corner is at (`left`, `y`) [in]; return where its words end."""
+    steps = np.outer(10.0 ** np.arange(-6, 4), [1.0, 2.0, 5.0]).ravel()
+    metres = float(steps[max(int(np.searchsorted(steps, 1.3 / inches_per_metre, side="right")) - 1, 0)])
+    wide = metres * inches_per_metre
+    for part in range(2):
+        fill = INK if part == 0 else "white"
+        box = Rectangle(
+            (left + 0.5 * part * wide, y), 0.5 * wide, 0.06, facecolor=fill, edgecolor=INK, linewidth=0.7, zorder=6
+        )
+        pen.axes.add_patch(box)
+    text = f"{100 * metres:.0f} cm" if metres >= 0.00999 else f"{1000 * metres:.3g} mm"
+    pen.write(left + wide + 0.08, y + 0.03, text, 9, color=GREY)
+    return left + wide + 0.08 + pen.measure(text, 9)[0]
 
 
 def _write_unnamed(pen: Pen, room: LabelRoom, names: Sequence[str], left: float, right: float, floor: float) -> None:

@@ -1,4 +1,4 @@
-"""One mesh on a page: the surface seen from its front, lit, or the pattern in its plane, coloured by energy."""
+"""One mesh on a page: the surface seen from its front, lit, or the pattern in its plane, coloured by energy; and its silhouette."""
 
 from __future__ import annotations
 
@@ -8,23 +8,38 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import PathCollection
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.export.figure import DPI, HALO_LAYER, INK, Pixels
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["DrawnView", "Facets", "View", "make_facets", "pattern_view", "surface_view"]
+__all__ = [
+    "SIDES",
+    "DrawnView",
+    "Facets",
+    "Silhouette",
+    "View",
+    "make_facets",
+    "pattern_view",
+    "surface_view",
+    "view_from_side",
+]
+
+#: From where a worn garment or a body is shown, with degrees for :func:`view_from_side`.
+SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 
 _FINE = 500_000  # triangles, about as many as pixels: from here on smooth light and smooth edges show no difference
 _SEGMENTS_TO_A_PATH = 500
 _MARGIN = 3  # pixels around the image of a mesh
 _LIGHT = (-0.42, 0.55, 0.72)  # where it comes from: right, up, towards the viewer
 _BACK = (0.80, 0.80, 0.79)
-INK = (0.10, 0.11, 0.14)
-HALO_LAYER = 3.5  # below the outline
+_COLUMNS = 120  # of a silhouette
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,9 +47,9 @@ class Facets:
     """The faces of a mesh as triangles, with their outline.
 
     Attributes:
-        faces: #F by 4.
+        faces: #F by 4, whose edges are drawn where they are coarse.
         triangles, face_of_triangle: #T by 3 and #T.
-        outline: #B by 2, the edges with one face.
+        outline: #B by 2.
         used: the vertices that have a face.
     """
 
@@ -45,13 +60,20 @@ class Facets:
     used: NDArray[np.int64]
 
 
-def make_facets(faces: IntArray) -> Facets:
-    """Return the facets of faces (#F by 4)."""
+def make_facets(faces: IntArray, outline: IntArray | None = None) -> Facets:
+    """Return the facets of faces (#F by 4).
+
+    Args:
+        faces: those that are coloured.
+        outline: #B by 2, edges that are drawn in place of the border; the edges of a coarse mesh are not drawn then.
+    """
     triangles, face = triangulate(faces)
     has_face = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
     has_face[triangles] = True
     used = np.flatnonzero(has_face)
-    return Facets(faces=faces, triangles=triangles, face_of_triangle=face, outline=outline_edges(faces), used=used)
+    drawn = faces if outline is None else faces[:0]
+    outline = outline_edges(faces) if outline is None else outline
+    return Facets(faces=drawn, triangles=triangles, face_of_triangle=face, outline=outline, used=used)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,6 +121,13 @@ def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list
     return View(points=points, facets=facets, lines=lines, vectors=None)
 
 
+def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
+    """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    seen = points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]).T
+    return View(points=seen, facets=facets, lines={}, vectors=area_vectors(seen, facets.triangles))
+
+
 def _view_directions(vectors: FloatArray) -> FloatArray:
     """Return the directions right, up and towards the viewer (3 by 3, in rows), by the area vectors (#T by 3)."""
     total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
@@ -123,17 +152,16 @@ def _view_directions(vectors: FloatArray) -> FloatArray:
 class DrawnView:
     """A view at a place on the page: where its points are, and which of them are visible."""
 
-    def __init__(self, view: View, *, left: float, bottom: float, inches_per_metre: float, dpi: int) -> None:
+    def __init__(self, view: View, *, left: float, bottom: float, inches_per_metre: float) -> None:
         """Rasterise a view whose lower left corner comes to (`left`, `bottom`) [in]."""
         self.view = view
-        self._dpi = dpi
         self._fine = len(view.facets.triangles) > _FINE
         self._per_pixel = 1 if self._fine else 2
         self._low = view.low
         self._scale = inches_per_metre
         # On the grid of pixels, so that the image is shown as it is and not resampled.
-        self.left, self.bottom = round(left * dpi) / dpi, round(bottom * dpi) / dpi
-        pixels = np.ceil(view.size[:2] * inches_per_metre * dpi).astype(int) + 2 * _MARGIN
+        self.left, self.bottom = round(left * DPI) / DPI, round(bottom * DPI) / DPI
+        pixels = np.ceil(view.size[:2] * inches_per_metre * DPI).astype(int) + 2 * _MARGIN
         self._columns, self._rows = int(pixels[0]), int(pixels[1])
         self._grid = self._to_samples(view.points)
         shape = (self._rows * self._per_pixel, self._columns * self._per_pixel)
@@ -151,7 +179,7 @@ class DrawnView:
 
     def covers(self, spots: FloatArray) -> BoolArray:
         """Return whether the mesh is at places on the page (#N, for #N by 2 [in])."""
-        per_inch = self._dpi * self._per_pixel
+        per_inch = DPI * self._per_pixel
         margin = _MARGIN * self._per_pixel
         column = np.floor((spots[:, 0] - self.left) * per_inch + margin).astype(int)
         row = len(self._samples.triangle) - 1 - np.floor((spots[:, 1] - self.bottom) * per_inch + margin).astype(int)
@@ -162,9 +190,7 @@ class DrawnView:
 
     def draw(self, axes: Any, face_colours: FloatArray) -> None:
         """Draw the coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
-        from warpflat.export.picture_pixels import Pixels
-
-        left, bottom = (round(place * self._dpi) - _MARGIN for place in (self.left, self.bottom))
+        left, bottom = (round(place * DPI) - _MARGIN for place in (self.left, self.bottom))
         axes.add_artist(Pixels(self._image(face_colours), left=left, bottom=bottom, zorder=1))
         self._draw_mesh(axes)
         self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
@@ -173,9 +199,6 @@ class DrawnView:
         self, axes: Any, edges: IntArray, *, width: float, colour: Any = INK, halo: bool = False, zorder: float
     ) -> None:
         """Draw the visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
-        from matplotlib.collections import PathCollection
-        from matplotlib.path import Path
-
         if len(edges):
             segments = self._visible_parts(edges)
             # Many to a path: a path each takes longer to set up than all of them to draw.
@@ -204,7 +227,7 @@ class DrawnView:
 
     def _to_samples(self, points: FloatArray) -> FloatArray:
         """Return points [m] in samples."""
-        per_metre = self._scale * self._dpi
+        per_metre = self._scale * DPI
         result = np.empty((len(points), 3))
         result[:, 0] = ((points[:, 0] - self._low[0]) * per_metre + _MARGIN) * self._per_pixel
         result[:, 1] = (self._rows - ((points[:, 1] - self._low[1]) * per_metre + _MARGIN)) * self._per_pixel
@@ -251,7 +274,7 @@ class DrawnView:
         a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
         if self.view.vectors is None:
             return np.stack([self.to_page(a), self.to_page(b)], axis=1)
-        pixels = np.linalg.norm((b - a)[:, :2], axis=1) * self._scale * self._dpi
+        pixels = np.linalg.norm((b - a)[:, :2], axis=1) * self._scale * DPI
         count = np.clip(np.ceil(pixels / 3.0), 1, 400).astype(int)
         edge = np.repeat(np.arange(len(edges)), count)
         step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
@@ -272,3 +295,55 @@ class DrawnView:
         around = np.arange(9)[:, None]
         least = self._samples.depth_at(row + around // 3 - 1, column + around % 3 - 1).min(axis=0)
         return np.asarray(spots[:, 2] >= least - 0.01 * float(np.linalg.norm(self.view.size)))
+
+
+class Silhouette:
+    """How far the cloth of a view lies from the upper and the lower edge of its box, in columns of one width.
+
+    Attributes:
+        width, height: of the box [m].
+        below_top: #C, from the upper edge down to the cloth [m]; infinite in a column without cloth.
+        above_bottom: #C, likewise from the lower edge up.
+        area: that the view covers [m2].
+    """
+
+    def __init__(self, view: View) -> None:
+        width, height = (max(float(size), 1e-9) for size in view.size[:2])
+        self.width, self.height = width, height
+        pitch = width / _COLUMNS
+        rows = int(np.clip(np.ceil(height / pitch), 1, 10 * _COLUMNS))
+        grid = np.empty((len(view.points), 3))
+        grid[:, 0] = (view.points[:, 0] - view.low[0]) / pitch
+        grid[:, 1] = rows * (1.0 - (view.points[:, 1] - view.low[1]) / height)
+        grid[:, 2] = view.points[:, 2]
+        covered = rasterise(grid, view.facets.triangles, (rows, _COLUMNS)).triangle >= 0
+        any_cloth, step = covered.any(axis=0), height / rows
+        self.below_top = np.where(any_cloth, covered.argmax(axis=0) * step, np.inf)
+        self.above_bottom = np.where(any_cloth, covered[::-1].argmax(axis=0) * step, np.inf)
+        self.area = float(covered.sum()) * pitch * step
+
+    def columns(self, left: float, right: float) -> slice:
+        """Return the columns between two places, measured from the left edge [m]."""
+        first, last = (int(np.floor(place / self.width * _COLUMNS)) for place in (left, right))
+        return slice(max(first, 0), max(last + 1, 0))
+
+    def room_above(self, left: float, right: float) -> float:
+        """Return how far the cloth between two places lies below the upper edge [m]; infinite if there is none."""
+        return float(self.below_top[self.columns(left, right)].min(initial=np.inf))
+
+    def room_below(self, left: float, right: float) -> float:
+        """Return how far the cloth between two places lies above the lower edge [m]; infinite if there is none."""
+        return float(self.above_bottom[self.columns(left, right)].min(initial=np.inf))
+
+    def overlap_below(self, lower: Silhouette, shift: float) -> float:
+        """Return how far the box of another view may reach up into this one's, without cloth upon cloth [m].
+
+        Args:
+            lower: the view below.
+            shift: of its left edge to the right of this one's [m].
+        """
+        places = (np.arange(_COLUMNS) + 0.5) * self.width / _COLUMNS - shift
+        number = np.floor(places / lower.width * _COLUMNS).astype(int)
+        inside = (number >= 0) & (number < _COLUMNS)
+        gaps: FloatArray = self.above_bottom[inside] + lower.below_top[number[inside]]
+        return float(gaps.min(initial=np.inf))

@@ -5,20 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
-from warpflat.core.output import atomic_path
+from warpflat.export.figure import new_figure, write_figure
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_packing import pack_boxes
-from warpflat.export.picture_png import save_png
 from warpflat.pattern.walked import WalkedSeam
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 __all__ = ["write_walked_picture"]
 
@@ -42,9 +41,6 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     report_activity(f"drawing {Path(path).name}")
     # The tallest first, so that the columns end at nearly the same height.
     seams = sorted(seams, key=lambda seam: -float(np.ptp(_fitted(seam)[0], axis=0)[1]))
@@ -54,8 +50,7 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     packed = [pack_boxes(sizes, columns * CELL) for columns in range(2, COLUMNS + 1)]
     places, width, foot = min(packed, key=lambda found: found[1] * (found[2] + HEAD))
     width, height = max(width, 2 * CELL), HEAD + foot + MARGIN
-    figure = Figure(figsize=(width, height), dpi=110, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, height, dpi=110)
     # One axis over the page, in inches: an axis for each seam takes longer than all that is drawn in it.
     axis = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(0.0, height))
     axis.set_axis_off()
@@ -69,8 +64,7 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
         fontsize=min(11.0, 135.0 * (width - 2 * MARGIN) / len(words)),
         va="center",
     )
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 def _fitted(seam: WalkedSeam) -> list[FloatArray]:
@@ -87,10 +81,6 @@ def _fitted(seam: WalkedSeam) -> list[FloatArray]:
 
 def _draw_seam(axis: Axes, seam: WalkedSeam, lines: Sequence[FloatArray], middle: float, top: float) -> None:
     """Draw a seam, fitted, in a cell, whose middle and upper edge are given [in]."""
-    import shapely
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Polygon
-
     upper = top - MARGIN
     seam_height = float(np.ptp(lines[0], axis=0)[1])
     centre = np.array([middle, upper - CLOTH - 0.5 * seam_height])

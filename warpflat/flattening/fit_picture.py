@@ -6,25 +6,28 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.output import atomic_path
 from warpflat.core.sums import weighted_percentile
+from warpflat.export.colours import on_cloth
+from warpflat.export.figure import ColouredFaces, new_figure, write_figure
 from warpflat.export.letters import all_letters, is_drawn, titles
-from warpflat.export.picture_png import save_png
 from warpflat.flattening.fit_report import RANGES, pressure_words, remedy_words, strain_words
 from warpflat.model.fit import MAPS, WornFit
 from warpflat.surface.half_edges import border_edges
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.figure import Figure
-
     from warpflat.flattening.result import Flattening
 
 __all__ = ["OnBody", "write_wear_picture", "write_wear_sheet"]
@@ -122,15 +125,11 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     report_activity(f"drawing {Path(path).name}")
     span = np.ptp(result.positions, axis=0)
     width = 3.4
     height = float(np.clip(width * span[1] / max(float(span[0]), 1e-9), 1.6, 6.5))
-    figure = Figure(figsize=(3 * (width + 0.85), 2 * (height + 0.45) + 0.4), dpi=110, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = new_figure(3 * (width + 0.85), 2 * (height + 0.45) + 0.4, dpi=110)
     fit = result.fit
     scales, strokes = _scales([fit], [[name] for name in MAPS]), _Strokes.of(result)
     for axis, (name, (label, factor, unit)) in zip(figure.subplots(2, 3).ravel(), MAPS.items(), strict=True):
@@ -156,8 +155,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
         fontsize=12,
     )
     figure.tight_layout(pad=0.5, h_pad=0.8, w_pad=0.8, rect=(0.0, 0.0, 1.0, 0.985))
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 @all_letters()
@@ -175,14 +173,10 @@ def write_wear_sheet(
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     report_activity(f"drawing {Path(path).name}")
     maps = (*(_BODY_MAPS if on_body else ()), *MAPS)
     sheet = _Sheet.of(results, len(maps))
-    figure = Figure(figsize=sheet.size, dpi=110, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = new_figure(*sheet.size, dpi=110)
     fits = [result.fit for result in results]
     bodies = on_body or [{}] * len(results)
     scales = _scales(fits, [*([name] for name in maps if name in _BODY_MAPS), *_ALIKE], bodies)
@@ -216,8 +210,7 @@ def write_wear_sheet(
         fontsize=9,
         color="#404040",
     )
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -351,8 +344,6 @@ def _shown(value: float) -> str:
 def _write_row_label(
     figure: Figure, result: Flattening, title: str, x: float, y: float, *, on_form: bool = False
 ) -> None:
-    from textwrap import fill
-
     fit = result.fit
     word = "lies on the form" if on_form else "fits"
     lines = [f"{word}: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
@@ -377,12 +368,6 @@ def _draw_map(
     axis: Axes, places: FloatArray, result: Flattening, strokes: _Strokes, name: str, scale: _Scale, body: OnBody
 ) -> ScalarMappable:
     """Draw a map of a piece whose vertices come to lie at `places` (#P by 2) in the units of the axis."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    from warpflat.export.colours import on_cloth
-    from warpflat.export.picture_faces import ColouredFaces
-
     colours = on_cloth(scale.colours).with_extremes(bad=_NOT_AROUND)
     mappable = ScalarMappable(Normalize(scale.low, scale.high), colours)
     axis.add_artist(ColouredFaces(places, result.faces, _values(result.fit, body, name), mappable))
@@ -395,9 +380,6 @@ def _draw_map(
 
 def _draw_segments(axis: Axes, segments: FloatArray, colour: str, width: float) -> None:
     """Draw straight segments (#S by 2 by 2) as one path: a path each takes longer to set up than all of them to draw."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path as Outline
-
     if len(segments):
         path = Outline(segments.reshape(-1, 2), np.tile([Outline.MOVETO, Outline.LINETO], len(segments)))
         axis.add_artist(PathPatch(path, fill=False, edgecolor=colour, linewidth=width, zorder=2))

@@ -93,13 +93,9 @@ class Flattening:
 
     def plot(self) -> Any:
         """Return a Matplotlib figure of the piece, on the body and in the plane, coloured by strain energy density."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
         from warpflat.export.picture import draw_figure
 
-        figure = draw_figure([self.picture_piece()])
-        FigureCanvasAgg(figure)
-        return figure
+        return draw_figure([self.picture_piece()])
 
     def _repr_png_(self) -> bytes:
         """Return the picture that a notebook shows."""

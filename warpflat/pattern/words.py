@@ -6,23 +6,28 @@ longest run of a name's words that the table has is replaced, then the next. Wha
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from importlib import resources
 
-from warpflat.pattern.words_german import NAMES, PHRASES
+from warpflat.core.toml_file import read_toml
 
-__all__ = ["LANGUAGES", "language_words", "printed_in", "translate", "translate_name"]
-
-LANGUAGES = ("en", "de")
+__all__ = ["language_words", "printed_in", "translate", "translate_name"]
 
 _EMPTY: Mapping[str, str] = {}
 _table: ContextVar[Mapping[str, str]] = ContextVar("words", default=_EMPTY)
 
 
+@functools.cache
 def language_words(language: str) -> Mapping[str, str]:
-    """Return the table of a language: what is printed, by the English phrase or name."""
-    return {**NAMES, **PHRASES} if language == "de" else {}
+    """Return the table of a language, ``"en"`` or ``"de"``: what is printed, by the English phrase or name."""
+    if language == "en":
+        return _EMPTY
+    with resources.as_file(resources.files("warpflat.pattern") / f"data/words_{language}.toml") as path:
+        tables = read_toml(path)
+    return {**tables["names"], **tables["phrases"]}
 
 
 @contextmanager

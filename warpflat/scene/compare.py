@@ -123,7 +123,7 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
         InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
     from warpflat.core.output import optional_file, output_folder, write_report
-    from warpflat.draping.compare_picture import write_compared_drapes
+    from warpflat.draping.picture import write_compared_drapes
     from warpflat.scene.compare_picture import write_overlay_picture, write_overlay_svg
 
     sources = [

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.output import atomic_path
+from warpflat.export.figure import new_figure
 from warpflat.export.letters import all_letters
 from warpflat.scene.comparison import Comparison, outline
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from warpflat.surface.connectivity import border_loops
 
 __all__ = ["write_overlay_picture", "write_overlay_svg"]
 
@@ -87,12 +88,8 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
     Raises:
         InputError: the file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     rows = len(comparison.pieces)
-    figure = Figure(figsize=(13.0, 6.6 * rows + 0.9), dpi=110, facecolor="white")
-    FigureCanvasAgg(figure)
+    figure = new_figure(13.0, 6.6 * rows + 0.9, dpi=110)
     grid = figure.add_gridspec(rows * _CLOSE_UPS, 2, width_ratios=(2.6, 1.0), hspace=0.35, wspace=0.05)
     for row, piece in enumerate(comparison.pieces):
         whole = figure.add_subplot(grid[row * _CLOSE_UPS : (row + 1) * _CLOSE_UPS, 0])
@@ -124,8 +121,6 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
 
 
 def _legend_lines(comparison: Comparison) -> tuple[list[Any], list[str]]:
-    from matplotlib.lines import Line2D
-
     handles = []
     for number, _ in enumerate(comparison.fabrics):
         colour, dashes = _style(number)
@@ -171,8 +166,6 @@ def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, Float
 
 
 def _loops(comparison: Comparison, piece: str) -> list[IntArray]:
-    from warpflat.surface.connectivity import border_loops
-
     return border_loops(comparison.results[comparison.fabrics[0]][piece].faces)
 
 
