@@ -1,0 +1,205 @@
+"""A statistical body: shapes, joints and skin of persons of all ages and builds, from MakeHuman's CC0 data.
+
+`data/make_body_model.py` makes the data. A person is a vector of shape coefficients (each of variance one), a rotation at every joint,
+and a place in space. Vertices follow the joints by linear blend skinning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+
+__all__ = ["BodyModel", "Person", "rotation", "rotation_vector"]
+
+
+def rotation(vectors: FloatArray) -> FloatArray:
+    """Return rotation matrices (#N by 3 by 3) of rotation vectors (#N by 3 [rad])."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vectors).as_matrix())
+
+
+def rotation_vector(matrices: FloatArray) -> FloatArray:
+    """Return the rotation vectors (#N by 3 [rad]) of rotation matrices (#N by 3 by 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(matrices).as_rotvec())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Person:
+    """A body of the model.
+
+    Attributes:
+        shape: #S, coefficients of the shapes.
+        bend: #J by 3 by 3, rotation at each joint; the identity in the standard pose.
+        turn: 3 by 3. scale: of the model, whose mean is 1 m tall. place: 3 [m]. A point p comes to scale * turn p + place.
+    """
+
+    shape: FloatArray
+    bend: FloatArray
+    turn: FloatArray
+    scale: float
+    place: FloatArray
+
+    def standing(self) -> Person:
+        """Return the person in the standard pose: arms and legs a little apart, joints straight."""
+        return replace(self, bend=np.tile(np.eye(3), (len(self.bend), 1, 1)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyModel:
+    """The mean body, its shapes and its skin; 1 m tall, Y up, facing +Z, the left side at x > 0.
+
+    Attributes:
+        mean: #V + #J by 3, the vertices and after them the joints.
+        shapes: #S by #V + #J by 3, how they move by one standard deviation of each shape.
+        triangles: #T by 3.
+        weights: #V by #J + 1, share of each joint in a vertex; the last is the pelvis, which never bends.
+        joints: their names. parents: #J, the joint from which each one hangs; -1 for the pelvis.
+        mirror: #V, the vertex on the other side.
+        detail: #V, vertices of head, hands and feet.
+    """
+
+    mean: FloatArray
+    shapes: FloatArray
+    triangles: NDArray[np.int64]
+    weights: FloatArray
+    joints: tuple[str, ...]
+    parents: NDArray[np.int64]
+    mirror: NDArray[np.int64]
+    detail: NDArray[np.bool_]
+
+    @classmethod
+    @lru_cache(maxsize=1)
+    def load(cls) -> BodyModel:
+        """Return the model that comes with the package."""
+        with (files("warpflat.mannequin.data") / "body_model.npz").open("rb") as file, np.load(file) as data:
+            weights = data["weights"].astype(np.float64)
+            return cls(
+                mean=data["mean"].astype(np.float64),
+                shapes=data["shapes"] * data["scale"].astype(np.float64)[:, None, None],
+                triangles=data["triangles"].astype(np.int64),
+                weights=weights / weights.sum(axis=1, keepdims=True),
+                joints=tuple(data["joints"].tolist()),
+                parents=data["parents"].astype(np.int64),
+                mirror=data["mirror"].astype(np.int64),
+                detail=data["detail"].astype(bool),
+            )
+
+    @property
+    def count(self) -> int:
+        """The number of vertices."""
+        return len(self.weights)
+
+    @cached_property
+    def below(self) -> FloatArray:
+        """#J by #J + 1, 1 where the second joint hangs from the first one or is the same."""
+        table = np.zeros((len(self.parents), len(self.parents) + 1))
+        for joint in range(len(self.parents)):
+            up = joint
+            while up >= 0:
+                table[up, joint] = 1.0
+                up = int(self.parents[up])
+        return table
+
+    def shaped(self, shape: FloatArray) -> FloatArray:
+        """Return vertices and joints (#V + #J by 3) of a shape in the standard pose, before scale and place."""
+        return self.mean + np.tensordot(shape, self.shapes, 1)
+
+    def frames(self, joints: FloatArray, bend: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how each joint moves what hangs from it: rotations (#J + 1 by 3 by 3) and shifts (#J + 1 by 3); the last is the pelvis.
+
+        Args:
+            joints: #J by 3, in the standard pose.
+            bend: #J by 3 by 3.
+        """
+        turn, shift = np.tile(np.eye(3), (len(bend) + 1, 1, 1)), np.zeros((len(bend) + 1, 3))
+        for joint, parent in enumerate(self.parents):
+            turn[joint] = turn[parent] @ bend[joint]
+            shift[joint] = shift[parent] + (turn[parent] - turn[joint]) @ joints[joint]
+        return turn, shift
+
+    def vertices(self, person: Person) -> FloatArray:
+        """Return the vertices of a person, #V by 3 [m]."""
+        rest = self.shaped(person.shape)
+        turn, shift = self.frames(rest[self.count :], person.bend)
+        posed = np.einsum("vj,jab,vb->va", self.weights, turn, rest[: self.count], optimize=True) + self.weights @ shift
+        return person.scale * posed @ person.turn.T + person.place
+
+    def unbend(self, person: Person, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return points on a person as they lie when the person stands in the standard pose.
+
+        Args:
+            person: in the present pose.
+            points: #P by 3 [m].
+            weights: #P by #J + 1, shares of the joints in each point.
+        """
+        rest = self.shaped(person.shape)
+        turn, shift = self.frames(rest[self.count :], person.bend)
+        posed = (points - person.place) @ person.turn / person.scale
+        blended = np.einsum("pj,jab->pab", weights, turn)
+        back = np.linalg.solve(blended, (posed - weights @ shift)[:, :, None])[:, :, 0]
+        return person.scale * back @ person.turn.T + person.place
+
+    def jacobian(self, person: Person, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        """Return some vertices of a person (#R by 3 [m]) and their derivatives (#R by 3 by #S + 3 #J + 7).
+
+        Parameters are the shapes, a small rotation [rad] at each joint in the body's own axes, one of the whole body in the axes of
+        space, its place [m], and the logarithm of its scale.
+        """
+        n, joints, shapes = self.count, len(self.parents), len(self.shapes)
+        weights, count = self.weights[rows], len(rows)
+        rest = self.shaped(person.shape)
+        turn, shift = self.frames(rest[n:], person.bend)
+        out = np.empty((count, 3, shapes + 3 * joints + 7))
+        spin = person.scale * person.turn
+        # Shapes move the vertices, and the joints about which they are bent.
+        move = np.zeros((joints + 1, shapes, 3))
+        for joint, parent in enumerate(self.parents):
+            move[joint] = move[parent] + self.shapes[:, n + joint] @ (turn[parent] - turn[joint]).T
+        blended = (weights @ turn.reshape(joints + 1, 9)).reshape(count, 3, 3)
+        by_shape = np.matmul(blended, self.shapes[:, rows].transpose(1, 2, 0))
+        by_shape += (weights @ move.reshape(joints + 1, -1)).reshape(count, shapes, 3).transpose(0, 2, 1)
+        out[:, :, :shapes] = np.matmul(spin, by_shape)
+        # A joint turns all that hangs from it about its own place.
+        each = rest[rows] @ turn.transpose(0, 2, 1) + shift[:, None]
+        each *= weights.T[:, :, None]
+        at = np.einsum("jab,jb->ja", turn[self.parents], rest[n:]) + shift[self.parents]
+        hung = np.tensordot(self.below, each, 1) - (self.below @ weights.T)[:, :, None] * at[:, None]
+        for joint in range(joints):
+            first = shapes + 3 * joint
+            out[:, :, first : first + 3] = np.matmul(spin, -_cross(hung[joint]))
+        posed = each.sum(axis=0) @ spin.T
+        out[:, :, -7:-4] = -_cross(posed)
+        out[:, :, -4:-1] = np.eye(3)
+        out[:, :, -1] = posed
+        return posed + person.place, out
+
+    def moved(self, person: Person, step: FloatArray) -> Person:
+        """Return a person after a step in the parameters of :meth:`jacobian`."""
+        shapes, joints = len(self.shapes), len(self.parents)
+        turn, _ = self.frames(self.shaped(person.shape)[self.count :], person.bend)
+        small = rotation(step[shapes : shapes + 3 * joints].reshape(-1, 3))
+        parent = turn[self.parents]
+        return Person(
+            shape=person.shape + step[:shapes],
+            bend=parent.transpose(0, 2, 1) @ small @ parent @ person.bend,
+            turn=rotation(step[None, -7:-4])[0] @ person.turn,
+            place=person.place + step[-4:-1],
+            scale=person.scale * float(np.exp(step[-1])),
+        )
+
+
+def _cross(vectors: FloatArray) -> FloatArray:
+    """Return the matrices (#N by 3 by 3) that multiply by vectors (#N by 3) from the left, as a cross product."""
+    out = np.zeros((len(vectors), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -vectors[:, 2], vectors[:, 1], -vectors[:, 0]
+    out[:, 1, 0], out[:, 2, 0], out[:, 2, 1] = vectors[:, 2], -vectors[:, 1], vectors[:, 0]
+    return out
