@@ -550,3 +550,5 @@ class Metrics(Entry):
     drape: Drape | None = None
     files: dict[str, dict[str, str]] | None = None
     """SHA-256 of every file, by run and name."""
+    sha256: str | None = None
+    """Seal: the digest of the content, by which the file is known to be as it was written."""

@@ -6,7 +6,7 @@ import gc
 import os
 import sys
 
-from warpflat.cli.signals import end_at_once
+from warpflat.cli.signals import end_at_once, ignore_at_exit
 
 __all__ = ["program"]
 
@@ -18,6 +18,7 @@ _SELDOM = 50_000, 20, 100
 def program() -> int:
     """Run the command line on the arguments of this process, and return its exit code."""
     end_at_once()  # before anything is imported that takes a while
+    ignore_at_exit()  # before anything else asks for something at exit: the first is done last
     gc.set_threshold(*_SELDOM)
     # Dense matrices have some hundred rows. A second thread of OpenBLAS gains nothing there, and while other processes run it waits for a
     # core: a fifth of the processor time of a block.

@@ -63,6 +63,17 @@ def test_a_signal_while_the_process_ends_changes_nothing(number: signal.Signals,
     assert told.count("\n") == 1
 
 
+def test_a_signal_at_the_very_end_of_the_process_changes_nothing(tmp_path: Path):
+    """Python takes the handlers away before it ends; what is still to be destroyed then takes the signal."""
+    code = (
+        "import os, signal, sys; from warpflat.__main__ import program\n"
+        "class Ends:\n    def __del__(self, kill=os.kill, me=os.getpid()):\n"
+        "        [kill(me, number) for number in (signal.SIGINT, signal.SIGTERM)]\n"
+        "sys.modules['sys'].ends = Ends()\nsys.argv = ['warpflat', 'fabrics', 'nylon']\nsys.exit(program())"
+    )
+    assert ended(code, tmp_path)[0] == 2
+
+
 def test_a_signal_in_a_destructor_is_not_lost(tmp_path: Path):
     code = (
         "import os, signal, sys, time; from warpflat.cli.signals import Stopped, stop_on_signals\n"

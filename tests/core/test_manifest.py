@@ -81,8 +81,27 @@ def test_a_folder_whose_files_are_not_known_is_left_alone(tmp_path: Path):
     known = metrics(tmp_path)
     del known["files"]
     (tmp_path / "out" / "metrics.json").write_text(json.dumps(known))
-    assert not [note for note in run(tmp_path).notes if "removed" in note]
-    assert "cap.svg" in files(tmp_path)
+    before = contents(tmp_path)
+    with pytest.raises(InputError, match=r"cap\.obj: is not of warpflat, and would be replaced"):
+        run(tmp_path)
+    assert contents(tmp_path) == before
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
+
+
+def test_metrics_that_were_changed_stay(tmp_path: Path):
+    run(tmp_path)
+    known = {**metrics(tmp_path), "my note": "keep"}
+    (tmp_path / "out" / "metrics.json").write_text(json.dumps(known))
+    before = contents(tmp_path)
+    with pytest.raises(InputError, match=r"metrics\.json: was changed since warpflat wrote it"):
+        run(tmp_path)
+    assert contents(tmp_path) == before
+    del known["my note"]  # with other blanks it is still what warpflat has written
+    (tmp_path / "out" / "metrics.json").write_text(json.dumps(known))
+    run(tmp_path)
 
 
 def test_pieces_of_another_name_stay_in_a_shared_folder(tmp_path: Path):

@@ -16,6 +16,7 @@ from random import Random
 import click
 from tqdm import tqdm
 
+from .folders import packed
 from .known_faults import known_faults
 from .mutations import SHARES, random_case
 from .promise import Case, Verdict, Worker
@@ -50,6 +51,10 @@ def _judged(cases: Iterator[Case], *, workers: int, seconds: float | None) -> It
 def _save(case: Case, number: int) -> Path:
     """Leaves the odd file of a case, or its command line, where it can be run again and moved to tests/regressions."""
     FOUND.mkdir(exist_ok=True)
+    if case.kind in ("batch", "result", "folder"):
+        file = FOUND / f"{number}.folder.json"
+        file.write_bytes(packed(case))
+        return file
     name = case.subject or next((file for file in case.files if case.kind in file), "")
     if case.kind == "arguments":
         content = json.dumps(case.arguments).encode()
@@ -62,6 +67,7 @@ def _save(case: Case, number: int) -> Path:
         "metrics": "metrics.json",
         "scan": "scan.obj",
         "arguments": "arguments.json",
+        "studio": "studio.json",
     }.get(case.kind, f"{case.kind}.toml" if name.endswith(".toml") else case.kind)
     file = FOUND / f"{number}.{ending}"
     file.write_bytes(content)

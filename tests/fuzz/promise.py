@@ -58,6 +58,8 @@ class Case:
     """The file that a run leaves and that names the others."""
     replaces: str = ""
     """The one of the files that the command is asked to write anew; "*" for all in `out`."""
+    keeps: str = ""
+    """The one of the files in `out` that stays nevertheless."""
     links: Mapping[str, str] = field(default_factory=dict)
     """Symbolic links beside the files, each with its target."""
     says: str = ""
@@ -163,6 +165,8 @@ def _broken_files(case: Case, here: str, before: Mapping[str, bytes | None], aft
 
 def _replaced(case: Case, here: str, path: str) -> bool:
     """Whether a file is one that the command is asked to write anew."""
+    if case.keeps and path == os.path.join(here, case.keeps):
+        return False
     return path.startswith(f"{here}/out/") if case.replaces == "*" else path == os.path.join(here, case.replaces)
 
 

@@ -7,6 +7,8 @@ NAME.pattern.json                                                    exported in
 NAME.metrics.json                                                    in the folder of results before a run
 NAME.scan.obj                                                        made a mannequin
 NAME.arguments.json                                                  a list of strings: the command line
+NAME.studio.json                                                     done to the studio, as studio_messages says
+NAME.folder.json                                                     files, links and command line (see `folders.py`)
 
 NAME says what the file has, such as `one_vertex_far_away`. A file must keep the promise, and may be refused or not;
 NAME.refused.obj must be refused, NAME.accepted.obj must not. `NAME.obj.gz` is unpacked first.
@@ -15,10 +17,13 @@ NAME.refused.obj must be refused, NAME.accepted.obj must not. `NAME.obj.gz` is u
 from __future__ import annotations
 
 import gzip
+from importlib.util import find_spec
 from pathlib import Path
 
+from .folders import unpacked
 from .promise import Case
 from .seeds import MESHES, case_of_file
+from .studio_messages import attack_case
 
 __all__ = ["REGRESSIONS", "cases_of", "regression_files"]
 
@@ -30,6 +35,7 @@ _TWO_ENDINGS = {
     ".metrics.json": "metrics",
     ".scan.obj": "scan",
     ".arguments.json": "arguments",
+    ".studio.json": "studio",
 }
 
 
@@ -38,13 +44,18 @@ def cases_of(file: Path) -> list[Case]:
     content, name = file.read_bytes(), file.name
     if name.endswith(".gz"):
         content, name = gzip.decompress(content), name.removesuffix(".gz")
+    if name.endswith(".folder.json"):
+        return [unpacked(content)]
     kind = next((kind for ending, kind in _TWO_ENDINGS.items() if name.endswith(ending)), name.rpartition(".")[2])
     if kind not in (*MESHES, "usd", *_TWO_ENDINGS.values()):
         raise ValueError(f"{file}: the name tells no kind; see {__name__}")
     refused = True if ".refused." in name else False if ".accepted." in name else None
+    if kind == "studio":
+        return [attack_case(content, refused=refused)]
     return case_of_file(kind, content, name=name.partition(".")[0], refused=refused)
 
 
 def regression_files() -> list[Path]:
-    """All of them."""
-    return sorted(path for path in REGRESSIONS.iterdir() if path.is_file() and path.suffix != ".md")
+    """All of them; those of the studio only where its extra is installed."""
+    files = [path for path in REGRESSIONS.iterdir() if path.is_file() and path.suffix != ".md"]
+    return sorted(path for path in files if find_spec("viser") is not None or not path.name.endswith(".studio.json"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import json
 import os
 import subprocess
@@ -10,6 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any
+
+from warpflat.core.own_files import seal_of
 
 from .promise import Case
 
@@ -118,10 +121,10 @@ def case_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool 
         return [
             case(
                 ("export", "out", *formats, "--quiet"),
-                {"out/pattern.json": content},
+                {"out/pattern.json": content, "out/metrics.json": _record({"pattern.json": content})},
                 leaves=None,
                 subject="out/pattern.json",
-                replaces="out/pattern.json",
+                replaces="*",
             )
         ]
     if kind == "metrics":
@@ -137,6 +140,13 @@ def case_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool 
         replaces = "done/pattern.json" if "export" in arguments else ""
         return [case(arguments, beside_commands(), leaves=None, replaces=replaces, seconds=90.0)]
     raise ValueError(f"{kind}: no kind of file; one of {', '.join((*KINDS, 'usd', 'arguments'))}")
+
+
+def _record(files: dict[str, bytes]) -> bytes:
+    """A `metrics.json` by which files are known to be of warpflat, so that they may be replaced."""
+    digests = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+    data = {"warpflat": "0", "files": {"cloth": digests}}
+    return json.dumps({**data, "sha256": seal_of(data)}).encode()
 
 
 def beside_commands() -> dict[str, bytes]:

@@ -37,6 +37,14 @@ def peak_memory(*, reset: bool = False) -> int:
     return int(line.split()[1]) * 1024
 
 
+def attack(arguments: list[str]) -> int:
+    """Attack the studio of this process; it goes on for the next case."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from fuzz.studio_messages import run_attack
+
+    return run_attack(Path(arguments[1]))
+
+
 def run_case(case: dict[str, Any]) -> dict[str, Any]:
     """Run the command line in the case's folder, with standard output and error in files; return code, seconds and bytes."""
     from warpflat.cli.main import main
@@ -53,7 +61,7 @@ def run_case(case: dict[str, Any]) -> dict[str, Any]:
     started = time.perf_counter()
     try:
         with warnings.catch_warnings():  # each case warns anew
-            code = main(case["arguments"])
+            code = main(case["arguments"]) if case["arguments"][:1] != ["studio-attack"] else attack(case["arguments"])
     except SystemExit as ended:
         code = ended.code
     except BaseException:

@@ -154,6 +154,25 @@ def test_triangles_of_quads_keep_order_winding_and_area():
     assert triangulate(quads[:1], other_diagonal=True)[0].tolist() == [[1, 4, 3], [1, 3, 0]]
 
 
+def test_diagonals_may_be_kept_apart_from_each_other_and_from_sides():
+    doublet = np.array([[0, 1, 2, 4], [0, 4, 2, 3], [3, 2, 5, 6]])
+    fan = np.array([[0, 1, 2, 3], [0, 2, 1, -1]])
+    # Four quads in a row: the second must turn as the first cannot, and so on.
+    chain = np.array([[0, 1, 2, 3], [0, 2, 7, -1], [1, 4, 3, 5], [4, 6, 5, 8]])
+    for faces in (doublet, fan, chain):
+        for turn in (False, True):
+            triangles, _ = triangulate(faces, other_diagonal=turn, distinct=True)
+            plain, _ = triangulate(faces, other_diagonal=turn)
+            assert len(triangles) == len(plain)
+            edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+            sides = {tuple(edge) for edge in half_edges(faces).edges.tolist()}
+            inner = [tuple(edge) for edge in edges.tolist() if tuple(edge) not in sides]
+            diagonals = int((faces[:, 3] >= 0).sum())
+            assert len(set(inner)) == diagonals
+            assert len(inner) == 2 * diagonals
+    assert triangulate(doublet, distinct=True)[0][-2:].tolist() == [[3, 2, 5], [3, 5, 6]]
+
+
 def test_corner_triangles_measure_the_mean_of_both_splits():
     random = np.random.default_rng(3)
     vertices, quads = grid(4, 4)

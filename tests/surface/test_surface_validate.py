@@ -139,7 +139,34 @@ def test_quad_with_straight_or_inward_corner_is_cut_from_there():
         surface = make_surface(vertices, [[0, 1, 2, 3]])
         assert surface.faces.tolist() == [[2, 3, 0, -1], [2, 0, 1, -1]]
         assert "straight or inward corner" in surface.notes[0]
-    assert "sides cross" in refusal(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1.5, 0]]), [[0, 1, 2, 3]])
+
+
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("crossing", [True, False])
+def test_folded_quad_is_cut_where_its_halves_lie_flatter(turn: int, order: int, crossing: bool):
+    if crossing:
+        quad = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1.5, 0]])
+    else:
+        quad = np.array([[0, 0, 0], [5, 0, 4], [1, 5, 1], [1, 0, 0]])
+    faces = [np.roll([0, 1, 2, 3], turn)[::order].tolist()]
+    if not crossing:
+        faces.append([2, 1, 4, 5][::order])
+    surface = make_surface(np.vstack([quad, [[4, 8, 12], [0, 12, 9]]]), faces)
+    check_invariants(surface)
+    assert surface.notes[0] == "1 quad folded over, or with crossing sides, cut into triangles: 0"
+    cut = [set(face[:3]) for face in surface.faces.tolist() if face[3] < 0]
+    # Both ways the crossing one is folded flat: the shorter diagonal is taken.
+    assert cut[0] & cut[1] == ({0, 2} if crossing else {1, 3})
+
+
+def test_two_quads_around_one_vertex_are_cut_from_it():
+    vertices = np.array([[-1, 0, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.9]], dtype=float)
+    quads = [[0, 1, 2, 4], [0, 4, 2, 3]]
+    surface = make_surface(vertices, quads)
+    check_invariants(surface)
+    assert surface.notes == ("2 quads that meet another at a vertex of no other face cut into triangles: 0, 1",)
+    assert [face.count(4) for face in surface.faces.tolist()] == [1, 1, 1, 1]
 
 
 def test_winding_is_mended_with_a_note():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.batch.task import AT_REST, NOT_AT_REST, Row
+from warpflat.core.own_files import has_seal, read_result
 
 __all__ = [
     "BODY_GIRTHS",
@@ -114,10 +114,12 @@ def read_body_patterns(rows: Sequence[Row], out: Path) -> list[BodyPattern]:
 
 def _read(row: Row, out: Path) -> BodyPattern | None:
     try:
-        metrics = json.loads((out / row.task.key / "metrics.json").read_text(encoding="utf-8"))
+        metrics = read_result(out / row.task.key / "metrics.json")
+        if not has_seal(metrics):
+            return None  # nobody knows what it holds
         levels = metrics["mannequin"]["levels"]
         girths = {level: float(levels[level]["girth_m"]) for level in BODY_GIRTHS}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError):
         return None
     body = row.task.data.get("mannequin") or {}
     pieces = list(metrics["pieces"].values())

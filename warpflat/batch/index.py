@@ -10,9 +10,11 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 
+from warpflat._version import __version__
 from warpflat.batch.plan import Task
 from warpflat.batch.task import AT_REST, ERROR, NOT_AT_REST, SET_ASIDE, TO_DO, Row
-from warpflat.core.atomic_files import atomic_path
+from warpflat.core.atomic_files import atomic_path, output_folder
+from warpflat.core.manifest import write_report
 
 __all__ = ["BatchIndex"]
 
@@ -60,15 +62,19 @@ class BatchIndex:
             self.write()
 
     def write(self, *, bodies: bool = False) -> None:
-        """Write `index.csv` and `index.html`; the page shows `bodies.png` if that is there.
+        """Write `index.csv`, `index.html` and `batch.json`, all of them or none; the page shows `bodies.png` if that is there.
 
         Raises:
             InputError: they cannot be written.
         """
         rows = self.rows
-        for name, text in (("index.csv", _table(rows)), ("index.html", _page(rows, bodies=bodies))):
-            with atomic_path(self._out / name) as temporary:
-                temporary.write_text(text, encoding="utf-8", newline="")
+        texts = {"index.csv": _table(rows), "index.html": _page(rows, bodies=bodies)}
+        with output_folder(self._out, [*texts, "batch.json"], guard=True) as folder:
+            for name, text in texts.items():
+                with atomic_path(folder / name) as temporary:
+                    temporary.write_text(text, encoding="utf-8", newline="")
+            files = [*texts, *(["bodies.csv", "bodies.png"] if bodies else [])]
+            write_report(folder / "batch.json", {"warpflat": __version__}, name="batch", files=files)
         self._written = time.monotonic()
 
 

@@ -6,6 +6,8 @@ import functools
 import hashlib
 import itertools
 import json
+import math
+import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +28,10 @@ __all__ = ["BatchTable", "BodyTable", "Task", "TaskTable", "load_batch"]
 # Hexadecimal digits of a key: in a million tasks two share one with a chance of 3e-8.
 _KEY_DIGITS = 16
 _LONGEST_LABEL = 80
+# Tasks of a batch: each is held in memory, and has a row in the index.
+_MOST_TASKS = 100_000
+# The largest file that a scene names [bytes].
+_MOST_BYTES = 4_000_000_000
 
 Names = Annotated[list[Annotated[str, Field(min_length=1)]], Field(min_length=1)]
 
@@ -84,6 +90,12 @@ class BatchTable(Table):
             raise ValueError(f"{product[0]} belongs to scenes or forms; in [[tasks]] each has its own")
         return self
 
+    @property
+    def count(self) -> int:
+        """The number of tasks, before any is made."""
+        lists = (self.tasks or self.scenes or self.forms, self.bodies, self.fabrics, self.overrides)
+        return math.prod(len(each) for each in lists if each is not None)
+
     def all_tasks(self) -> Iterator[TaskTable]:
         """Yield the listed tasks, or those of the product."""
         if self.tasks is not None:
@@ -137,6 +149,8 @@ def load_batch(path: str | Path) -> list[Task]:
             f'{path}: is empty; a batch needs scenes = ["FILE"] or forms = ["NAME"], and [[bodies]] or fabrics'
         )
     table = check_table(BatchTable, data, str(path))
+    if table.count > _MOST_TASKS:
+        raise InputError(f"{path}: has {table.count:,} tasks; a batch has at most {_MOST_TASKS:,}: make several of it")
     read = functools.lru_cache(maxsize=None)(_read_scene)
     digest = functools.lru_cache(maxsize=None)(_digest)
     tasks: dict[str, Task] = {}
@@ -202,9 +216,20 @@ def _key(scene: Scene, data: Mapping[str, Any], digest: Callable[[Path], str]) -
 
 
 def _digest(file: Path) -> str:
+    digest = hashlib.sha256()
     try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        found = file.stat()
+        if not stat.S_ISREG(found.st_mode):
+            raise InputError(f"{file}: is a folder, a pipe or a device; give a regular file")
+        if found.st_size > _MOST_BYTES:
+            raise InputError(f"{file}: has {found.st_size:,} bytes; at most {_MOST_BYTES:,} are read")
+        with file.open("rb") as stream:
+            while block := stream.read(1 << 20):
+                digest.update(block)
+        return digest.hexdigest()
     except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         reason = (getattr(error, "strerror", None) or str(error)).lower()
         raise InputError(f"{file}: cannot be read: {reason}") from None
 

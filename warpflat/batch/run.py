@@ -10,7 +10,8 @@ from warpflat.batch.body_statistics import bodies_table, read_body_patterns
 from warpflat.batch.index import BatchIndex
 from warpflat.batch.plan import Task
 from warpflat.batch.task import Row, forget_starts, read_row, run_task
-from warpflat.core.atomic_files import atomic_path, prepare_folder
+from warpflat.core.atomic_files import atomic_path, output_folder
+from warpflat.core.optional_files import optional_file
 
 __all__ = ["run_batch"]
 
@@ -27,7 +28,7 @@ def run_batch(
     """Run the tasks of a batch whose results are not in `out` yet; return a row for each, in their order.
 
     Files: `KEY/` as of a run or `KEY.error.json` per task, `index.csv` and `index.html`; of several bodies `bodies.csv` and
-    `bodies.png`. An interruption keeps what is done.
+    `bodies.png`; `batch.json` lists them with their digests. An interruption keeps what is done.
 
     Args:
         tasks: of :func:`warpflat.batch.plan.load_batch`.
@@ -38,10 +39,11 @@ def run_batch(
         on_note: called with what the user should know meanwhile.
 
     Raises:
-        InputError: `out` cannot be written, the scheduler cannot be reached, or a worker cannot use `out`.
+        InputError: `out` cannot be written, a file there would be replaced that is not as warpflat wrote it, the scheduler cannot be
+            reached, or a worker cannot use `out`.
         ImportError: workers or a scheduler are asked for, and Dask is not installed.
     """
-    folder = prepare_folder(out).absolute()
+    folder = Path(out).absolute()
     index = BatchIndex(folder, tasks)
     todo = []
     for task in tasks:
@@ -51,6 +53,10 @@ def run_batch(
         else:
             index.add(row)
     done = before = len(tasks) - len(todo)
+    if todo and scheduler is not None:
+        from warpflat.batch.workers import connect
+
+        connect(scheduler).close()  # before anything is written
     try:
         index.write()
         on_progress(done, before)
@@ -78,10 +84,13 @@ def _write_bodies(index: BatchIndex, out: Path) -> None:
         return
     from warpflat.batch.body_picture import write_body_picture
 
-    with atomic_path(out / "bodies.csv") as temporary:
-        temporary.write_text(bodies_table(patterns), encoding="utf-8", newline="")
-    write_body_picture(out / "bodies.png", patterns)
-    index.write(bodies=True)
+    with output_folder(out, ["bodies.csv", "bodies.png"], guard=True):
+        with atomic_path(out / "bodies.csv") as temporary:
+            temporary.write_text(bodies_table(patterns), encoding="utf-8", newline="")
+        drawn = list[str]()
+        with optional_file(out / "bodies.png", drawn) as path:
+            write_body_picture(path, patterns)
+        index.write(bodies=bool(drawn))
 
 
 def _results(

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
+import re
+import stat
 import time
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from warpflat.batch.plan import Task
 from warpflat.core.atomic_files import output_folder
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, is_number
 from warpflat.core.hidden_files import remove_unfinished
-from warpflat.core.json_file import write_json
+from warpflat.core.manifest import write_sealed
+from warpflat.core.own_files import NotOursError, open_result, read_result, refuse_to_replace_others
 from warpflat.core.text import one_line
 
 __all__ = [
@@ -75,16 +78,21 @@ def run_task(task: Task, out: Path) -> Row:
     Raises:
         InputError: the result cannot be written.
     """
-    done = read_row(task, out)
-    if done is not None:
-        return done
-    if has_killed(task, out):
-        return set_aside(task, out)
-    _note_start(task, out)
     try:
-        return _run(task, out)
-    finally:
-        forget_starts(task, out)
+        if (out / task.key).is_symlink():
+            raise NotOursError(f"{out / task.key}: is a link, and would be written into; move it away")
+        done = read_row(task, out)
+        if done is not None:
+            return done
+        if has_killed(task, out):
+            return set_aside(task, out)
+        _note_start(task, out)
+        try:
+            return _run(task, out)
+        finally:
+            forget_starts(task, out)
+    except NotOursError as error:  # once that is moved away, the task is tried again
+        return Row(task=task, status=ERROR, message=str(error))
 
 
 def _run(task: Task, out: Path) -> Row:
@@ -92,10 +100,12 @@ def _run(task: Task, out: Path) -> Row:
 
     begin, folder = time.perf_counter(), out / task.key
     try:
-        with output_folder(folder, ["task.json"]):
+        with output_folder(folder, ["task.json"], guard=True):
             run_scene(task.make_scene(), folder)
             own = {"scene": task.data, "seconds": time.perf_counter() - begin, "memory_mb": _peak_memory()}
-            write_json(folder / "task.json", {**_names(task), **own})
+            write_sealed(folder / "task.json", {**_names(task), **own})
+    except NotOursError as error:
+        raise NotOursError(f"{error}; the task is tried again once all of {folder} is moved away") from error
     except InputError as error:
         _write_error(task, out, ERROR, str(error))
     except Exception as error:  # a fault of the program in one task does not end the others
@@ -105,15 +115,33 @@ def _run(task: Task, out: Path) -> Row:
 
 def has_killed(task: Task, out: Path) -> bool:
     """Return whether a task has killed its process as often as is allowed."""
-    try:
-        return len(_started(task, out).read_text(encoding="utf-8").splitlines()) >= _MOST_KILLS
-    except OSError:
-        return False
+    return len(_starts(task, out)) >= _MOST_KILLS
 
 
 def forget_starts(task: Task, out: Path) -> None:
     """Begin the count of a task's kills anew: it has ended, or was stopped on purpose."""
-    _started(task, out).unlink(missing_ok=True)
+    with suppress(NotOursError):
+        if _starts(task, out):
+            _started(task, out).unlink(missing_ok=True)
+
+
+def _starts(task: Task, out: Path) -> list[str]:
+    """Return the lines that the starts of a task have left.
+
+    Raises:
+        NotOursError: something else bears the name of their file.
+    """
+    path = _started(task, out)
+    if not os.path.lexists(path):
+        return []
+    try:
+        with open_result(path, most=1_000_000) as stream:
+            lines = stream.read().decode(errors="replace").splitlines()
+    except InputError:
+        lines = [""]
+    if not lines or not all(re.fullmatch(r"\S+ \d+", line) for line in lines):
+        raise NotOursError(f"{path}: is not of warpflat, and would be written into; move it away")
+    return lines
 
 
 def _started(task: Task, out: Path) -> Path:
@@ -121,9 +149,12 @@ def _started(task: Task, out: Path) -> Path:
 
 
 def _note_start(task: Task, out: Path) -> None:
+    # Whatever has the name by now is not followed, nor waited for.
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     try:
-        with _started(task, out).open("a", encoding="utf-8") as file:
-            file.write(f"{platform.node()} {os.getpid()}\n")
+        with os.fdopen(os.open(_started(task, out), flags, 0o666), "ab") as file:
+            if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                file.write(f"{platform.node() or 'here'} {os.getpid()}\n".encode())
     except OSError as error:
         raise InputError(f"{_started(task, out)} cannot be written ({error.strerror})") from None
 
@@ -135,7 +166,7 @@ def set_aside(task: Task, out: Path) -> Row:
         InputError: that cannot be written.
     """
     folder = out / task.key
-    if folder.is_dir():
+    if folder.is_dir() and not folder.is_symlink():
         remove_unfinished(folder)
         if not any(folder.iterdir()):
             folder.rmdir()
@@ -154,32 +185,40 @@ def error_file(task: Task, out: Path) -> Path:
 def read_row(task: Task, out: Path) -> Row | None:
     """Return the row of a task that is done, or None; a result that cannot be read counts as none."""
     folder = out / task.key
-    try:
-        metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-        own = json.loads((folder / "task.json").read_text(encoding="utf-8"))
-        return _row_of_run(task, metrics, own, frozenset(os.listdir(folder)))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        pass
-    try:
-        error = json.loads(error_file(task, out).read_text(encoding="utf-8"))
-        return Row(task=task, status=str(error["status"]), message=str(error["message"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    if folder.is_symlink():
         return None
+    with suppress(Exception):  # others may have changed it in any way
+        metrics, own = read_result(folder / "metrics.json"), read_result(folder / "task.json")
+        return _row_of_run(task, metrics, own, frozenset(os.listdir(folder)))
+    with suppress(Exception):
+        error = read_result(error_file(task, out))
+        if error["status"] in (ERROR, SET_ASIDE):
+            return Row(task=task, status=error["status"], message=one_line(error["message"]) or "without a word")
+    return None
 
 
 def _row_of_run(task: Task, metrics: Mapping[str, Any], own: Mapping[str, Any], files: frozenset[str]) -> Row:
     pieces = list(metrics["pieces"].values())
     wear = metrics.get("wear") or pieces[0].get("wear") or {}
+    fits = metrics.get("drape", wear).get("fits")
+    if fits not in (None, True, False):
+        raise ValueError(fits)
     return Row(
         task=task,
         status=AT_REST if _is_at_rest(metrics) else NOT_AT_REST,
-        strain_energy_j=sum(piece["strain_energy_j"] for piece in pieces),
-        fits=metrics.get("drape", wear).get("fits"),
-        girths_m={level: girth["pattern_m"] for level, girth in metrics.get("girths", {}).items()},
-        seconds=own["seconds"],
-        memory_mb=own["memory_mb"],
+        strain_energy_j=sum(_number(piece["strain_energy_j"]) for piece in pieces),
+        fits=fits,
+        girths_m={one_line(level): _number(girth["pattern_m"]) for level, girth in metrics.get("girths", {}).items()},
+        seconds=_number(own["seconds"]),
+        memory_mb=None if own["memory_mb"] is None else _number(own["memory_mb"]),
         files=files,
     )
+
+
+def _number(value: Any) -> float:
+    if not (is_number(value) and abs(number := float(value)) < float("inf")):
+        raise ValueError(value)
+    return number
 
 
 def _is_at_rest(metrics: Mapping[str, Any]) -> bool:
@@ -197,8 +236,10 @@ def _is_at_rest(metrics: Mapping[str, Any]) -> bool:
 
 def _write_error(task: Task, out: Path, status: str, message: str, trace: str = "") -> None:
     more = {"traceback": trace} if trace else {}
-    write_json(
-        error_file(task, out),
+    file = error_file(task, out)
+    refuse_to_replace_others(out, [file.name])
+    write_sealed(
+        file,
         {**_names(task), "status": status, "message": one_line(message), **more, "scene": task.data},
     )
 

@@ -11,6 +11,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from distributed import Client, Future, KilledWorker, LocalCluster, TimeoutError, wait
 from distributed.comm import CommClosedError
@@ -20,8 +21,9 @@ from warpflat._version import __version__
 from warpflat.batch.plan import Task
 from warpflat.batch.task import SET_ASIDE, Row, has_killed, run_task, set_aside
 from warpflat.core.errors import InputError
+from warpflat.core.text import control_in, quote_value
 
-__all__ = ["run_on_cluster", "run_on_workers"]
+__all__ = ["connect", "run_on_cluster", "run_on_workers"]
 
 # A task that waits while so many workers die is given up for this time, though it never got as far as its start.
 _MOST_BLAMES = 20
@@ -76,11 +78,10 @@ def run_on_cluster(
     Raises:
         InputError: the scheduler cannot be reached for a minute, or a worker does not see `out` or has another version.
     """
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     todo = {task.key: task for task in tasks}
     while todo:
         try:
-            with _connect(address) as client:
+            with connect(address) as client:
                 if not client.nthreads():
                     on_note(f"the scheduler {address} has no workers yet; waiting for them")
                 yield from _run_round(client, todo, out)
@@ -88,10 +89,25 @@ def run_on_cluster(
             on_note(f"the scheduler {address} is lost; waiting for it")
 
 
-def _connect(address: str) -> Client:
+def connect(address: str) -> Client:
+    """Return a client of the scheduler of an address.
+
+    Raises:
+        InputError: it is no address, or no scheduler answers there for a minute.
+    """
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        parts = urlsplit(address if "://" in address else f"tcp://{address}")
+        is_address = bool(parts.hostname and parts.port) and not any(map(control_in, address))
+    except ValueError:
+        is_address = False
+    if not is_address:
+        raise InputError(
+            f"--scheduler: {quote_value(address)} is no address of a scheduler; give it as tcp://HOST:8786"
+        )
     try:
         return Client(address, timeout=_PATIENCE)
-    except (OSError, TimeoutError, ValueError) as error:
+    except Exception as error:  # each kind of connection has its own
         raise InputError(
             f"no Dask scheduler answers at {address} ({type(error).__name__}); start one with `dask scheduler`, and give its address "
             "as tcp://HOST:8786. What is done is kept: the same command goes on from there"

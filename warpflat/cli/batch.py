@@ -22,6 +22,7 @@ What comes out, in DIR:
   KEY.error.json   instead of them: why the task failed; remove it to try the task again
   index.html       a table of all tasks with pictures; a click on a heading sorts
   index.csv        the same for programs
+  batch.json       digests of these files, by which the next run knows them
   bodies.csv, bodies.png
                    of several bodies: measures of the patterns over girths, and which bodies no size fits"""
 _MOST_ERRORS = 10
@@ -77,10 +78,11 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
 
 def _report(rows: list[Row], folder: Path, *, quiet: bool) -> int:
     from warpflat.batch.task import NOT_AT_REST
+    from warpflat.core.text import one_line
 
     failed = [row for row in rows if row.message]
     for row in failed[:_MOST_ERRORS]:
-        click.echo(f"warpflat: {row.task.key}: {row.message}", err=True)
+        click.echo(f"warpflat: {one_line(f'{row.task.key}: {row.message}')}", err=True)
     if len(failed) > _MOST_ERRORS:
         click.echo(f"warpflat: {len(failed) - _MOST_ERRORS} more errors; see {folder / 'index.html'}", err=True)
     counts: dict[str, int] = {}

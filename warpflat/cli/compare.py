@@ -48,7 +48,7 @@ def compare(
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.cli.tables import warnings_of
     from warpflat.core.atomic_files import output_folder
-    from warpflat.scene.compare import COMPARED_FILES, compare_fabrics, comparison_table, save_comparison
+    from warpflat.scene.compare import compare_fabrics, compared_files, comparison_table, save_comparison
     from warpflat.scene.load import load_scene
 
     job = load_scene(scene)
@@ -56,7 +56,7 @@ def compare(
     target = out if out is not None else Path("out") / f"{job.name}-compared"
     with (
         ProgressBar(job.name, hidden=quiet or as_json) as bar,
-        output_folder(target, COMPARED_FILES, sources=job.sources) as folder,
+        output_folder(target, compared_files(drape=drape), sources=job.sources, guard=True) as folder,
     ):
         comparison = compare_fabrics(
             job, fabrics, on_progress=lambda _, progress: bar(progress), device=device, drape=drape

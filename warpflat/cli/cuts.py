@@ -99,7 +99,8 @@ def _compare(
     """Write the ledger of a scene, and run it with one of its cuts on demand."""
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.core.atomic_files import output_folder
-    from warpflat.core.json_file import write_json
+    from warpflat.core.manifest import write_report
+    from warpflat.core.optional_files import optional_file
     from warpflat.core.toml_file import tables_as_toml
     from warpflat.cutting.ledger_picture import write_ledger_picture
     from warpflat.scene.cuts import cuts_of_entry
@@ -110,19 +111,24 @@ def _compare(
     files = ["ledger.json", "cuts.toml" if is_form else "ledger.png"]
     files += files_of_run(loaded) if apply is not None else []
     result: SceneResult | None = None
-    with ProgressBar(loaded.name, hidden=hidden) as bar, output_folder(target, files, sources=loaded.sources) as folder:
+    with (
+        ProgressBar(loaded.name, hidden=hidden) as bar,
+        output_folder(target, files, sources=loaded.sources, guard=True) as folder,
+    ):
         if is_form:
             own = form_ledger(loaded, by=by, device=device)
-            write_json(folder / "ledger.json", own.as_dict())
             tables = [tables_as_toml({"cuts": [entry.cut]}) for entry in own.entries]
             chosen = tables if apply is None else [tables_as_toml({"cuts": [own.cut(apply)]})]
             _write_toml(folder, "Cuts, the best first: paste one into the scene.", chosen)
+            write_report(folder / "ledger.json", own.as_dict(), name="ledger", files=["cuts.toml"])
             if apply is not None:
                 result = run_scene(with_cut(loaded, own.cut(apply)), folder, on_progress=bar, device=device)
             return own, folder, result
         ledger = scene_ledger(loaded, by=by, device=device)
-        write_json(folder / "ledger.json", ledger.as_dict())
-        write_ledger_picture(folder / "ledger.png", ledger)
+        drawn = list[str]()
+        with optional_file(folder / "ledger.png", drawn) as path:
+            write_ledger_picture(path, ledger)
+        write_report(folder / "ledger.json", ledger.as_dict(), name="ledger", files=drawn)
         if apply is not None:
             result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=cuts_of_entry(ledger, apply))
         return ledger, folder, result
@@ -135,7 +141,8 @@ def _print_ledger(ledger: Ledger | FormLedger, folder: Path) -> None:
     for note in ledger.notes:
         click.echo(f"warpflat: note: {note}", err=True)
     if isinstance(ledger, Ledger):
-        click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
+        drawn = ", ledger.png" if (folder / "ledger.png").exists() else ""
+        click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json{drawn}")
     else:
         click.echo(f"{form_ledger_table(ledger)}\n{folder}: ledger.json, cuts.toml")
 
@@ -160,7 +167,7 @@ def _edit(
     """Edit a dart, compare the garment before and after, and write `edit.json` and `cuts.toml`."""
     from warpflat.cli.tables import edit_table
     from warpflat.core.atomic_files import output_folder
-    from warpflat.core.json_file import write_json
+    from warpflat.core.manifest import write_report
     from warpflat.scene.form_edits import edit_dart
 
     (how, (dart, aim)), *more = [(how, edit) for how, edit in edits.items() if edit]
@@ -170,11 +177,11 @@ def _edit(
         raise InputError("--at belongs to --rotate and --split")
     if scene.settings.mannequin is None:
         raise InputError(f"{scene.where}: --{how} edits the darts of a form; on a [surface] edit [[cuts]]")
-    with output_folder(target, ["edit.json", "cuts.toml"], sources=scene.sources) as folder:
+    with output_folder(target, ["edit.json", "cuts.toml"], sources=scene.sources, guard=True) as folder:
         edit = edit_dart(scene, dart, how=how, aim=aim, at=at, device=device)
         data = edit.as_dict()
-        write_json(folder / "edit.json", data)
         _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [edit.as_toml()])
+        write_report(folder / "edit.json", data, name="edit", files=["cuts.toml"])
     if as_json:
         click.echo((folder / "edit.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:

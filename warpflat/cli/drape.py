@@ -100,7 +100,9 @@ def _report(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as
     from warpflat.cli.tables import drape_lines, warnings_of
 
     warnings = warnings_of(result.metrics)
-    for line in (*([] if quiet or as_json else result.notes), *warnings):
+    # What was left out has a line of its own at the end.
+    notes = [note for note in result.notes if note not in result.metrics.get("notes", ())]
+    for line in (*([] if quiet or as_json else notes), *warnings):
         click.echo(f"warpflat: {line}", err=True)
     if as_json:
         click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)

@@ -28,6 +28,7 @@ from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_s
 from warpflat.cli.studio import studio
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
+from warpflat.core.optional_files import listening_to_left_out
 from warpflat.core.text import one_line
 
 __all__ = ["cli", "main"]
@@ -39,12 +40,19 @@ class _Interrupted(Exception):
 
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
+        left_out: dict[str, None] = {}
         try:
-            with stop_on_signals():
-                return super().invoke(ctx)
+            with (
+                stop_on_signals(),
+                listening_to_left_out(lambda path, note: left_out.setdefault(f"{path.parent}: {note}")),
+            ):
+                code = super().invoke(ctx)
         except KeyboardInterrupt as error:
             # Click would print an empty line of its own.
             raise _Interrupted(error.code if isinstance(error, Stopped) else INTERRUPTED) from None
+        for note in left_out:
+            click.echo(one_line(f"warpflat: note: {note}"), err=True)
+        return code
 
 
 @click.group(

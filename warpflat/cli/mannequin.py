@@ -73,7 +73,8 @@ def mannequin(
     if resolution is not None:
         tables["resolution_mm"] = resolution
     table = check_table(MannequinTable, tables, "command line")
-    with output_folder(out if out is not None else Path("out") / "mannequin", MANNEQUIN_FILES.values()) as folder:
+    names = [name for kind, name in MANNEQUIN_FILES.items() if kind != "distances" or source["scan"] is not None]
+    with output_folder(out if out is not None else Path("out") / "mannequin", names, guard=True) as folder:
         body = mannequin_from_table(table, path_of=Path)
         files = write_mannequin(body, folder)
     if as_json:

@@ -25,13 +25,16 @@ def review(folder: Path, film: bool, sheet: bool, quiet: bool) -> int:
       warpflat review out/dress --film --sheet
     """
     from warpflat.cli.run import start_warp_silently
+    from warpflat.core.atomic_files import output_folder
     from warpflat.review.moving_picture import write_moving_pictures
-    from warpflat.review.page import review_folder
+    from warpflat.review.page import read_run, review_folder
 
-    files = [review_folder(folder).name]
-    if film or sheet:
-        start_warp_silently()
-        files += write_moving_pictures(folder, film=film, sheet=sheet)
+    read_run(folder)
+    with output_folder(folder, guard=True):
+        files = [review_folder(folder).name]
+        if film or sheet:
+            start_warp_silently()
+            files += write_moving_pictures(folder, film=film, sheet=sheet)
     if not quiet:
         click.echo(f"{folder}: {', '.join(files)}")
     return DONE

@@ -13,7 +13,18 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "signal_message", "stop_on_signals"]
+from warpflat.core.optional_files import SIGNALS
+
+__all__ = [
+    "HUNG_UP",
+    "INTERRUPTED",
+    "TERMINATED",
+    "Stopped",
+    "end_at_once",
+    "ignore_at_exit",
+    "signal_message",
+    "stop_on_signals",
+]
 
 HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
 _WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
@@ -57,6 +68,17 @@ def end_at_once(code: int | None = None) -> None:
         signal.signal(number, end)
 
 
+def ignore_at_exit() -> None:
+    """Let the very end of the process, after all exit functions, pass over signals: Python then gives them back their default action."""
+    import atexit
+
+    def ignore() -> None:
+        for number in _ours():
+            signal.signal(number, signal.SIG_IGN)
+
+    atexit.register(ignore)
+
+
 @contextmanager
 def stop_on_signals() -> Iterator[None]:
     """Let the first signal raise `Stopped` in the body, and a second one end the process at once.
@@ -65,7 +87,8 @@ def stop_on_signals() -> Iterator[None]:
     """
     before = {number: signal.getsignal(number) for number in _ours()}
     imports = _imports(sys._getframe())
-    came, waiting = list[int](), list[Any]()
+    came, waiting = SIGNALS, list[Any]()
+    came.clear()
 
     def stop(number: int, frame: FrameType | None) -> None:
         if _imports(frame) > imports:

@@ -25,7 +25,7 @@ _BLOCK = {
 @click.command(cls=ComputingCommand, epilog=EXIT_CODES)
 @click.argument("scene", type=click.Path(path_type=Path), required=False)
 @click.option(
-    "--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 is open to everybody."
+    "--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 opens it to other machines."
 )
 @click.option("--port", type=click.IntRange(1, 65535), default=8220, show_default=True, help="Port to serve on.")
 @click.option(
@@ -40,7 +40,8 @@ def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> i
     """Edit a scene on a page in the browser: body, form, cloth, ease, grain and cuts, with the pattern beside it.
 
     Saving writes a scene file beside the one that was opened, under a name of its own, and runs it from scratch. Without a
-    SCENE it begins with the basic block of size EU 38. Ctrl-C ends the studio.
+    SCENE it begins with the basic block of size EU 38. Ctrl-C ends the studio. The address that it prints has a token in it: only
+    who opens that address is let in.
 
     It needs viser: pip install "warpflat[studio]".
 
@@ -61,6 +62,8 @@ def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> i
 
     page = Page(made, host=host, port=port, out=out)
     click.echo(f"{page.url}  (Ctrl-C ends the studio)")
+    if page.door.opens:
+        click.echo(f"warpflat: note: {page.door.opens}", err=True)
     if show:
         import webbrowser
 

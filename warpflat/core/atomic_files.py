@@ -3,7 +3,7 @@
 A single file is written under a hidden name beside the final one, then renamed. The files of a run are written into a hidden folder
 inside the output folder. At the end those that they replace are kept aside in it while the new ones are moved in one by one; if one of
 them cannot be, or the process is killed meanwhile, what was there is put back: at once, at the end of the process, or by the next run.
-This is also the one place that sees to it that no file is replaced from which a run was made.
+This is also the one place that sees to it that no file is replaced from which a run was made, nor one of the user's.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
-from warpflat.core.errors import InputError, expect
+from warpflat.core.errors import CannotWriteError, InputError, expect
 from warpflat.core.file_names import check_file_name
 from warpflat.core.hidden_files import ASIDE, FRESH, NEW, clear_hidden, hidden_name, is_unfinished, remove_unfinished
 from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_replace
+from warpflat.core.own_files import refuse_to_replace_others
 from warpflat.core.replace_file import is_open_elsewhere, replace_file
 
 __all__ = [
@@ -30,7 +31,10 @@ __all__ = [
     "files_written",
     "hidden_file",
     "is_input",
+    "keep_note",
     "latest_file",
+    "note_amended",
+    "notes_kept",
     "output_folder",
     "prepare_folder",
     "remove_file",
@@ -54,6 +58,8 @@ def hidden_file(final: Path) -> Iterator[Path]:
     It lies beside `final`, or in the hidden folder of the run to which that belongs.
     """
     run = _run_into(final.parent)
+    if run is not None:
+        run.begin()
     path = hidden_name(final if run is None else run.new / final.name)
     try:
         yield path
@@ -71,7 +77,7 @@ def require_writable(final: str | os.PathLike[str]) -> None:
     run = _run_into(final.parent)
     try:
         if final.is_dir():
-            raise InputError(f"cannot write {final}: it is a folder; give the name of a file")
+            raise CannotWriteError(f"cannot write {final}: it is a folder; give the name of a file")
         if run is not None:
             run.refuse_inputs([final.name])
             return
@@ -123,16 +129,23 @@ class _Run:
         new: the folder in it for what is written.
         names: of the files written, in that order.
         removed: names of files of earlier runs that go with the change.
+        notes: on files that were left out, each once.
+        is_guarded: whether files are left alone that warpflat is not known to have written.
+        amended: names of files that keep what they hold when they are written again.
     """
 
-    def __init__(self, folder: Path, hidden: Path) -> None:
+    def __init__(self, folder: Path, hidden: Path, *, guard: bool) -> None:
         self.folder = folder
         self.hidden = hidden
+        self.is_guarded = guard
         self.new = hidden / NEW
         self.names: dict[str, None] = {}
         self.removed: dict[str, None] = {}
+        self.notes: dict[str, None] = {}
         self._expected: set[str] = set()
         self._sources: set[Path] = set()
+        self._has_begun = False
+        self.amended: set[str] = set()
 
     def expect(self, files: Iterable[str]) -> None:
         """Names of files that are going to be written, as soon as they are known."""
@@ -144,6 +157,12 @@ class _Run:
                 )
         self._expected |= names
         self.refuse_inputs(names)
+
+    def begin(self) -> None:
+        """Before the first file is written, when what the run is made from has been read, see that no file of the user's is in the way."""
+        if self.is_guarded and not self._has_begun:
+            refuse_to_replace_others(self.folder, sorted(self._expected))
+        self._has_begun = True
 
     def protect(self, source: Path) -> None:
         """A file that has been read, which is not to be replaced."""
@@ -172,6 +191,9 @@ class _Run:
         if not self.names:
             return
         self.refuse_inputs((*self.names, *self.removed))
+        if self.is_guarded:
+            replaced = [name for name in self.names if name not in self.amended]
+            refuse_to_replace_others(self.folder, replaced, {name: self.new / name for name in replaced})
         aside = self.hidden / ASIDE
         fresh = [name for name in self.names if not os.path.lexists(self.folder / name)]
         name = ""
@@ -217,7 +239,7 @@ def _keep_aside(final: Path, aside: Path) -> None:
 
 @contextmanager
 def output_folder(
-    path: str | os.PathLike[str], files: Iterable[str] = (), *, sources: Iterable[Path] = ()
+    path: str | os.PathLike[str], files: Iterable[str] = (), *, sources: Iterable[Path] = (), guard: bool = False
 ) -> Iterator[Path]:
     """Yield the folder for the files of a run; they appear together at the end of the block, or none of them if it fails.
 
@@ -228,9 +250,11 @@ def output_folder(
         path: the folder.
         files: names of files that will be written, as far as they are known; :func:`expect_files` adds to them.
         sources: files that were read before.
+        guard: whether files of the folder that warpflat is not known to have written are not replaced, either: so do all commands.
 
     Raises:
-        InputError: as :func:`prepare_folder`, nothing can be written into the folder, or it would replace one that was read.
+        InputError: as :func:`prepare_folder`, nothing can be written into the folder, or it would replace one that was read or, with
+            `guard`, one that is not as warpflat wrote it.
     """
     expect(path, (str, os.PathLike), "folder", "the path of one")
     folder = Path(path)
@@ -238,11 +262,12 @@ def output_folder(
     if joined is not None:
         for source in sources:
             joined.protect(source)
+        joined.is_guarded |= guard
         joined.expect(files)
         yield folder
         return
     made = _missing(folder)
-    run = _Run(folder, hidden_name(folder / "run", made))
+    run = _Run(folder, hidden_name(folder / "run", made), guard=guard)
     before = _going_on()
     try:
         prepare_folder(folder)
@@ -290,6 +315,24 @@ def adopt_files(files: Iterable[tuple[str, str]]) -> None:
     for folder, name in files:
         if run := _run_into(Path(folder)):
             run.names[name] = None
+
+
+def keep_note(path: Path, note: str) -> None:
+    """Keep a note on a file that the run into its folder has left out, if there is such a run."""
+    if run := _run_into(path.parent):
+        run.notes[note] = None
+
+
+def notes_kept(folder: Path) -> tuple[str, ...]:
+    """Return the notes on files that the run into a folder has left out."""
+    run = _run_into(folder)
+    return () if run is None else tuple(run.notes)
+
+
+def note_amended(path: Path) -> None:
+    """Note that what the run writes as a file is that file as it is, also with what the user has changed in it, and an entry more."""
+    if run := _run_into(path.parent):
+        run.amended.add(path.name)
 
 
 def is_input(path: Path) -> bool:
@@ -351,7 +394,9 @@ def _reason(error: OSError) -> str:
 
 def _cannot_write(final: Path, error: OSError) -> InputError:
     if is_open_elsewhere(error):
-        return InputError(
+        return CannotWriteError(
             f"cannot write {final}: it is open in another program or write-protected; close it, and run again"
         )
-    return InputError(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")
+    # Libraries raise errors of this kind for faults of their own, too; those of the system have a number.
+    kind = InputError if error.errno is None else CannotWriteError
+    return kind(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")

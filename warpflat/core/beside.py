@@ -19,6 +19,7 @@ from typing import Any, Generic, TypeVar
 from warpflat.core.activity import activity_listener, report_activity
 from warpflat.core.atomic_files import adopt_files, files_written
 from warpflat.core.input_files import listening_to_reads, note_read
+from warpflat.core.optional_files import leave_out, listening_to_left_out
 from warpflat.core.threads import thread_count
 
 __all__ = ["Beside", "work_beside"]
@@ -44,8 +45,8 @@ def work_beside() -> Iterator[None]:
 class Beside(Generic[Result]):
     """A function without arguments that runs in a process of its own while the caller goes on; used in a ``with`` block.
 
-    Its result must be picklable. Files that it writes into an output folder belong to the caller's run, and so do those that it reads. At
-    the end of the block the process is ended if its result has not been taken.
+    Its result must be picklable. Files that it writes into an output folder belong to the caller's run, and so do those that it reads or
+    leaves out. At the end of the block the process is ended if its result has not been taken.
 
     Attributes:
         process: the number of the other process; 0 if there was none.
@@ -102,10 +103,12 @@ class Beside(Generic[Result]):
         self._wait()
         if not parts:
             return self._function()
-        good, value, files, read = pickle.loads(b"".join(parts))
+        good, value, files, read, left_out = pickle.loads(b"".join(parts))
         adopt_files(files)
         for path in read:
             note_read(path)
+        for path, note in left_out:
+            leave_out(path, note)
         if not good:
             raise value
         return value
@@ -138,14 +141,18 @@ def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
         _die_with(parent)
-        before, read = files_written(), list[Path]()
+        before, read, left_out = files_written(), list[Path](), list[tuple[Path, str]]()
         try:
-            with activity_listener(lambda activity: None), listening_to_reads(read.append):
+            with (
+                activity_listener(lambda activity: None),
+                listening_to_reads(read.append),
+                listening_to_left_out(lambda path, note: left_out.append((path, note))),
+            ):
                 answer: tuple[bool, Any] = True, function()
         except Exception as error:
             answer = False, error
         new = [(folder, name) for folder, name in files_written() if (folder, name) not in before]
-        content = memoryview(_pickled(*answer, new, read))
+        content = memoryview(_pickled(*answer, new, read, left_out))
         while content:
             content = content[os.write(pipe, content) :]
     finally:

@@ -9,7 +9,7 @@ from typing import TypeGuard
 
 from warpflat.core.text import one_line, quote_value
 
-__all__ = ["InputError", "expect", "expect_callback", "expect_each", "is_number", "nearest"]
+__all__ = ["CannotWriteError", "InputError", "expect", "expect_callback", "expect_each", "is_number", "nearest"]
 
 
 #: Valid words that a message lists at most.
@@ -27,6 +27,10 @@ class InputError(ValueError):
 
     def __init__(self, message: str = "") -> None:
         super().__init__(one_line(message))
+
+
+class CannotWriteError(InputError):
+    """A file cannot be written: its place, the disk, or a file of the user's there is what the user must see to."""
 
 
 def expect(value: object, kind: type | tuple[type, ...], name: str, right: str) -> None:

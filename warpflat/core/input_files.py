@@ -9,7 +9,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.errors import InputError
+from warpflat.core.errors import CannotWriteError
 
 __all__ = ["is_among", "listening_to_reads", "note_read", "noting_resolver", "refuse_to_replace"]
 
@@ -65,7 +65,7 @@ def refuse_to_replace(final: Path, files: Iterable[Path]) -> None:
         InputError: it is.
     """
     if is_among(final, files):
-        raise InputError(
+        raise CannotWriteError(
             f"{final} is read by this run, which would replace it; choose another output folder (--out) or another name"
         )
 

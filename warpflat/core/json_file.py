@@ -12,7 +12,7 @@ import numpy as np
 
 from warpflat.core.atomic_files import atomic_path
 
-__all__ = ["write_json"]
+__all__ = ["plain_json", "write_json"]
 
 
 def write_json(path: str | os.PathLike[str], data: Mapping[str, Any]) -> None:
@@ -25,14 +25,15 @@ def write_json(path: str | os.PathLike[str], data: Mapping[str, Any]) -> None:
         InputError: the file cannot be written.
         TypeError: a value has no meaning in JSON; the message says at which key.
     """
-    text = json.dumps(_plain(data, "metrics"), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(plain_json(data), indent=2, ensure_ascii=False, allow_nan=False)
     with atomic_path(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _plain(value: Any, where: str) -> Any:
+def plain_json(value: Any, where: str = "metrics") -> Any:
+    """Return a value as what JSON has: see :func:`write_json`."""
     if isinstance(value, np.generic | np.ndarray):
-        return _plain(value.tolist(), where)
+        return plain_json(value.tolist(), where)
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if value is None or isinstance(value, bool | int | str):
@@ -43,7 +44,7 @@ def _plain(value: Any, where: str) -> Any:
         wrong = [key for key in value if not isinstance(key, str)]
         if wrong:
             raise TypeError(f"{where}: the key {wrong[0]!r} is not text")
-        return {key: _plain(entry, f"{where}.{key}") for key, entry in value.items()}
+        return {key: plain_json(entry, f"{where}.{key}") for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry, f"{where}[{index}]") for index, entry in enumerate(value)]
+        return [plain_json(entry, f"{where}[{index}]") for index, entry in enumerate(value)]
     raise TypeError(f"{where}: a {type(value).__name__} cannot be written as JSON")

@@ -2,23 +2,22 @@
 
 `metrics.json` lists under `files`, by the name of the run, what each has written, with its SHA-256. Nothing else is ever removed,
 and of that only what is still as it was written, so that a file which somebody has drawn on, or put there under that name, stays.
+Other reports, such as `compare.json`, list the files beside them in the same way (see `warpflat.core.own_files`).
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.atomic_files import is_input, latest_file, remove_file
+from warpflat.core.atomic_files import is_input, latest_file, note_amended, notes_kept, remove_file
 from warpflat.core.errors import InputError
-from warpflat.core.json_file import write_json
+from warpflat.core.json_file import plain_json, write_json
+from warpflat.core.own_files import NotOursError, file_digest, has_seal, read_result, recorded_files, seal_of
 
-__all__ = ["record_file", "remove_stale", "require_own_metrics", "write_metrics"]
-
-Record = dict[str, dict[str, str]]
+__all__ = ["record_file", "remove_stale", "require_own_metrics", "write_metrics", "write_report", "write_sealed"]
 
 #: Files that bear no name: in a folder with several runs they are taken to be the last one's.
 _NAMELESS = (
@@ -27,18 +26,56 @@ _NAMELESS = (
 )  # fmt: skip
 
 
-def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
-    """Write `metrics.json` and keep the manifest of the one before.
+def write_sealed(path: Path, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Write a file in JSON with its seal, by which it is known to be of warpflat, and return its content.
 
     Raises:
         InputError: it cannot be written.
     """
-    record = _record(_read(folder))
-    write_json(folder / "metrics.json", {**metrics, **({"files": record} if record else {})})
+    plain: dict[str, Any] = plain_json(data)
+    plain.pop("sha256", None)
+    complete = {**plain, "sha256": seal_of(plain)}
+    write_json(path, complete)
+    return complete
+
+
+def write_report(path: Path, data: Mapping[str, Any], *, name: str, files: Sequence[str]) -> None:
+    """Write a report that lists files beside it, and those that it listed before.
+
+    Args:
+        path: of the report.
+        data: all of it but `files`.
+        name: of the run that has written the files.
+        files: by name.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    before = latest_file(path)
+    record = recorded_files(read_result(before)) if before.exists() else {}
+    mine = {file: file_digest(latest_file(path.parent / file)) for file in files if file != path.name}
+    others = {run: {file: was for file, was in known.items() if file not in mine} for run, known in record.items()}
+    others[name] = {**others.get(name, {}), **mine}
+    write_sealed(path, {**data, "files": {run: known for run, known in others.items() if known}})
+
+
+def write_metrics(folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str]) -> None:
+    """Write `metrics.json` with the files of a result that is saved by hand, and keep the manifest of the one before.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    require_own_metrics(folder)
+    write_report(folder / "metrics.json", {**metrics, **_noted(folder)}, name=name, files=files)
 
 
 def remove_stale(
-    folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str]
+    folder: Path,
+    metrics: Mapping[str, Any],
+    *,
+    name: str,
+    files: Sequence[str],
+    drape: bool = False,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write `metrics.json` at the end of a run, and remove files of earlier runs that could be taken for its own.
 
@@ -51,21 +88,22 @@ def remove_stale(
         metrics: all of `metrics.json` but `files`.
         name: of the run.
         files: that it has written, by name.
+        drape: whether garments are draped, of which earlier ones are removed, and nothing else.
 
     Returns:
-        What `metrics.json` holds, and what was removed or left, one sentence each.
+        What `metrics.json` holds, and what was left out, removed or left, one sentence each.
 
     Raises:
         InputError: `metrics.json` cannot be written.
     """
-    record = _record(_read(folder))
-    mine = {file: _digest(latest_file(folder / file)) for file in files if file != "metrics.json"}
+    record = recorded_files(_read(folder))
+    mine = {file: file_digest(latest_file(folder / file)) for file in files if file != "metrics.json"}
     earlier = {run: {file: was for file, was in known.items() if file not in mine} for run, known in record.items()}
     stale = {
         (run, file): was
         for run, known in earlier.items()
         for file, was in known.items()
-        if run == name or file in _NAMELESS
+        if (file.endswith(".draped.obj") and run == name if drape else run == name or file in _NAMELESS)
     }
     earlier[name] = {**mine, **earlier.get(name, {})}
     removed, notes = [], []
@@ -77,9 +115,15 @@ def remove_stale(
             del earlier[run][file]
     if removed:
         notes.insert(0, f"removed what an earlier run had left and this one did not make: {', '.join(removed)}")
-    complete = {**metrics, "files": {run: known for run, known in earlier.items() if known}}
-    write_json(folder / "metrics.json", complete)
-    return complete, tuple(notes)
+    record = {run: known for run, known in earlier.items() if known}
+    complete = write_sealed(folder / "metrics.json", {**metrics, **_noted(folder), "files": record})
+    return complete, (*notes_kept(folder), *notes)
+
+
+def _noted(folder: Path) -> dict[str, list[str]]:
+    """Return the entry of `metrics.json` for files that the run into a folder has left out; empty where there are none."""
+    notes = list(notes_kept(folder))
+    return {"notes": notes} if notes else {}
 
 
 def record_file(folder: Path, name: str, file: str) -> None:
@@ -92,10 +136,13 @@ def record_file(folder: Path, name: str, file: str) -> None:
         metrics = _read(folder)
     except InputError:
         return  # somebody else's, which knows of no run
-    record = _record(metrics)
+    record = recorded_files(metrics)
     if name in record:
-        record[name][file] = _digest(latest_file(folder / file))
-        write_json(folder / "metrics.json", {**metrics, "files": record})
+        record[name][file] = file_digest(latest_file(folder / file))
+        # What the user has changed in it stays, and is known to be the user's by the seal that does not fit.
+        note_amended(folder / "metrics.json")
+        write = write_sealed if has_seal(metrics) else write_json
+        write(folder / "metrics.json", {**metrics, "files": record})
 
 
 def _take_away(path: Path, was: str) -> str:
@@ -105,7 +152,7 @@ def _take_away(path: Path, was: str) -> str:
     if path.is_symlink() or (path.exists() and not path.is_file()):
         return "it is not as an earlier run left it"
     try:
-        if path.exists() and _digest(path) != was:
+        if path.exists() and file_digest(path) != was:
             return "it is not as an earlier run left it"
         remove_file(path)
     except OSError as error:
@@ -129,38 +176,15 @@ def _read(folder: Path) -> dict[str, Any]:
         InputError: it is something else by that name.
     """
     file = folder / "metrics.json"
-    try:
-        data = json.loads(latest_file(file).read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    latest = latest_file(file)
+    if not os.path.lexists(latest):
         return {}
-    except (OSError, ValueError, RecursionError):
+    try:
+        data = read_result(latest)
+    except InputError:
         data = None
     if not isinstance(data, dict) or "warpflat" not in data:
-        raise InputError(
+        raise NotOursError(
             f"{file}: is not of warpflat, and a run would replace it; move it away, or choose another folder"
         )
     return data
-
-
-def _record(metrics: Mapping[str, Any]) -> Record:
-    """Return the listed files by run; names with a folder in them are left out, since no run writes such."""
-    listed = metrics.get("files")
-    if not isinstance(listed, dict):
-        return {}
-    return {
-        run: {file: was for file, was in known.items() if isinstance(was, str) and _is_plain(file)}
-        for run, known in listed.items()
-        if isinstance(known, dict)
-    }
-
-
-def _is_plain(file: str) -> bool:
-    return bool(file) and Path(file).name == file and file not in ("..", "metrics.json")
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as stream:
-        while block := stream.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()

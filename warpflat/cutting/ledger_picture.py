@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.export.colours import energy_colours, energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
+from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import DrawnView, make_facets, surface_view
 
 if TYPE_CHECKING:
@@ -53,7 +54,6 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     entries = ledger.entries[:_MOST]
     surface, density = ledger.result.surface, ledger.result.face_energy_density
     view = surface_view(surface, make_facets(surface.faces), polylines_of({}))
@@ -74,7 +74,7 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     _draw_paths(pen, drawn, surface.vertices, entries, view)
     _draw_table(pen, entries, height - 1.0)
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": "warpflat"})
+        save_png(temporary, figure, {"Software": "warpflat"})
 
 
 def _draw_paths(pen: Pen, drawn: DrawnView, vertices: FloatArray, entries: Sequence[LedgerEntry], view: Any) -> None:
@@ -111,17 +111,9 @@ def _draw_table(pen: Pen, entries: Sequence[LedgerEntry], top: float) -> None:
         y = top - _ROW * number
         ink = _INKS[(number - 1) % len(_INKS)]
         pen.write(_TABLE, y, f"{number}", 9, color=ink, fontweight="bold", ha="right")
-        pen.write(_TABLE + 0.1, y + 0.055, _shortened(pen, entry.candidate.name, 2.05), 8.5)
+        pen.write(_TABLE + 0.1, y + 0.055, pen.shorten(entry.candidate.name, 8.5, 2.05), 8.5)
         width = 2.0 * max(entry.per_cm, 0.0) / max(best, np.finfo(float).tiny)
         bar = np.array([[_TABLE + 0.1, y - 0.07], [_TABLE + 0.1 + width, y - 0.07]])
         pen.axes.plot(bar[:, 0], bar[:, 1], color=ink, linewidth=3.2, solid_capstyle="butt", zorder=5)
         for (_, x), text in zip(_COLUMNS, candidate_words(entry), strict=True):
             pen.write(x, y, text, 8.5, ha="right")
-
-
-def _shortened(pen: Pen, text: str, room: float) -> str:
-    if pen.measure(text, 8.5)[0] <= room:
-        return text
-    while len(text) > 4 and pen.measure(text + "…", 8.5)[0] > room:
-        text = text[:-1]
-    return text + "…"

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.draping.picture import body_around, draw_scale, seen_from
 from warpflat.draping.result import Drape
 from warpflat.export.colours import on_cloth
@@ -34,7 +34,6 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     report_activity("drawing the drapes")
     meshes = {name: body_around(drape) for name, drape in drapes.items()}
     views = {name: seen_from(points, faces, 0.0, cloth=cloth) for name, (points, faces, cloth) in meshes.items()}

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export.geometry import outline_edges
 from warpflat.export.letters import all_letters
@@ -17,8 +17,8 @@ from warpflat.export.picture_png import save_png
 
 __all__ = ["write_correction_picture"]
 
-# Room between pieces [m], inches per metre, and colours before and after.
-_GAP, _SCALE, _BEFORE, _AFTER = 0.06, 8.0, "#8a8a8a", "#c8452c"
+# Room between pieces [m], inches per metre, the largest page [in], and colours before and after.
+_GAP, _SCALE, _LARGEST, _BEFORE, _AFTER = 0.06, 8.0, 60.0, "#8a8a8a", "#c8452c"
 # Changes of the outline that are written beside it: the largest ones of a piece, so far apart [m].
 _LABELS, _APART, _LEAST = 6, 0.08, 1e-3
 
@@ -33,7 +33,6 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     old, new, moved = correction.before.cloth, correction.after.cloth, correction.moved()
     edges = outline_edges(old.flat_faces)
@@ -43,7 +42,8 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
         shift[rows] = [x - low[0], -low[1]]
         x += float(high[0] - low[0]) + _GAP
     tall = float((old.flat + shift)[:, 1].max())
-    size = (max(_SCALE * x, 6.0), _SCALE * tall + 1.0)
+    scale = min(_SCALE, _LARGEST / max(x, tall))
+    size = (max(scale * x, 6.0), scale * tall + 1.0)
     figure = Figure(figsize=size, dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     axis = figure.add_axes((0.01, 0.01, 0.98, 0.9 * (1.0 - 0.4 / size[1])))
@@ -53,7 +53,7 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
     for name, rows in old.piece_vertices.items():
         points = old.flat[rows] + shift[rows]
         across, up = points.mean(axis=0).tolist()
-        axis.text(across, up, name, ha="center", fontsize=10, parse_math=False)
+        axis.text(across, up, name, ha="center", fontsize=10)
         _label(axis, points, moved[name])
     axis.set_aspect("equal")
     first, last = correction.rounds[0], correction.rounds[-1]
@@ -61,7 +61,6 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
         f"Outlines before (grey) and after (red); changes outwards in mm. Misfit {1e3 * first.misfit:.2f} mm before, "
         f"{1e3 * last.misfit:.2f} mm after",
         fontsize=11,
-        parse_math=False,
     )
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.core.sums import weighted_percentile
 from warpflat.draping.result import Drape
 from warpflat.export.colours import on_cloth
@@ -41,7 +41,6 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     points, faces, cloth = body_around(drape)
     views = [seen_from(points, faces, degrees, cloth=cloth) for _, degrees in _VIEWS]

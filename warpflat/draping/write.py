@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core.atomic_files import file_in, output_folder
+from warpflat.core.atomic_files import file_in, latest_file, output_folder
+from warpflat.core.optional_files import optional_file
 from warpflat.draping.frames import write_drape_film, write_drape_frames
 from warpflat.draping.picture import write_drape_picture
 from warpflat.draping.result import Drape
@@ -33,7 +34,7 @@ def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True, frame
     """Write the files into a folder in a block of :func:`warpflat.core.atomic_files.output_folder`.
 
     Returns:
-        Their names, but not that of `frames.usdc`, which may hold more.
+        Their names, without those of pictures and film that had to be left out.
 
     Raises:
         InputError: the folder cannot be written.
@@ -50,11 +51,13 @@ def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True, frame
         write_obj(path, surface, cloth.flat[rows])
         files.append(path.name)
     if picture:
-        files.append("drape.png")
-        write_drape_picture(folder / files[-1], drape)
+        with optional_file(folder / "drape.png", files) as path:
+            write_drape_picture(path, drape)
     if frames:
-        write_drape_frames(folder / "frames.usdc", drape)
+        film = folder / "frames.usdc"
+        with optional_file(film, files, part="the drape" if latest_file(film).exists() else ""):
+            write_drape_frames(film, drape)
         if picture:
-            files.append("drape.webp")
-            write_drape_film(folder / files[-1], drape)
-    return files
+            with optional_file(folder / "drape.webp", files) as path:
+                write_drape_film(path, drape)
+    return list(dict.fromkeys(files))

@@ -20,10 +20,13 @@ _FONTS_OF_OTHER_SCRIPTS = (
 
 @contextmanager
 def all_letters() -> Iterator[None]:
-    """Draw with whatever fonts are installed; a letter that none of them has is a box, without a warning for each."""
+    """Draw with whatever fonts are installed; a letter that none of them has is a box, without a warning for each.
+
+    No name is read as a formula, whatever dollar signs it has.
+    """
     import matplotlib
 
-    with matplotlib.rc_context({"font.family": _families()}), warnings.catch_warnings():
+    with matplotlib.rc_context({"font.family": _families(), "text.parse_math": False}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+ ")
         yield
 

@@ -19,6 +19,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.optional_files import optional_file
 from warpflat.export.pdf_guide import guide_pages
 from warpflat.export.pdf_legend import draw_legend, legend_page
 from warpflat.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, Paper, Tiling, make_tiling
@@ -76,7 +77,7 @@ def write_pdf(
             of its own that readers can hide; None prints all.
 
     Returns:
-        Which tiles were printed: tiles without any part of a piece are left out.
+        Which tiles were printed: tiles without any part of a piece are left out. A guide that cannot be drawn is left out, too.
 
     Raises:
         InputError: unknown paper or size.
@@ -86,8 +87,6 @@ def write_pdf(
 
 
 def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, sizes: Sequence[str] | None) -> Tiling:
-    from reportlab.pdfgen.canvas import Canvas
-
     if paper not in PAPERS:
         raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
@@ -99,24 +98,46 @@ def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, si
     sheet, tiling = _arranged(nests(printed), kind)
     kind, sheet = tiling.paper, _with_labels_off_joints(sheet, garment.name, tiling)
     tiling = replace(tiling, sheet=sheet)
-    stream = BytesIO()
+    content, guided = b"", list[str]()
+    if kind.tiled:
+        with optional_file(path, guided, part="the guide"):
+            content = _pages(whole, printed, tiling, chosen, guide=True)
+    if not guided:
+        content = _pages(whole, printed, tiling, chosen, guide=False)
+    with atomic_path(path) as temporary:
+        Path(temporary).write_bytes(content)
+    return tiling
+
+
+def _pages(
+    whole: DraftedGarment, printed: DraftedGarment, tiling: Tiling, chosen: tuple[str, ...], *, guide: bool
+) -> bytes:
+    """Return the pages of the pattern, after those of legend and guide if these are wanted.
+
+    Args:
+        whole, printed: the garment, and as it is printed, with pieces on the fold.
+        tiling: of the pieces.
+        chosen: sizes.
+        guide: whether the legend and the guide come first.
+    """
+    from reportlab.pdfgen.canvas import Canvas
+
+    kind, stream = tiling.paper, BytesIO()
     canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
     _register_fonts()
-    canvas.setTitle(f"{garment.name}, {' / '.join(chosen)}")
+    canvas.setTitle(f"{whole.name}, {' / '.join(chosen)}")
     canvas.setCreator("warpflat")
     canvas.setViewerPreference("PrintScaling", "None")
     _sheet_form(canvas, tiling, printed, chosen)
-    if kind.tiled:
-        legend_page(canvas, printed, chosen, sheet, tiling)
+    if guide:
+        legend_page(canvas, printed, chosen, tiling.sheet, tiling)
         guide_pages(canvas, whole, printed, kind)
     for row, column in tiling.tiles:
-        _tile(canvas, tiling, row, column, garment.name.replace("_", " "))
+        _tile(canvas, tiling, row, column, whole.name.replace("_", " "))
     if len(chosen) > 1:
         _name_layers(canvas, chosen)
     canvas.save()
-    with atomic_path(path) as temporary:
-        Path(temporary).write_bytes(stream.getvalue())
-    return tiling
+    return stream.getvalue()
 
 
 def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:

@@ -12,15 +12,15 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_garment import Body, GarmentViews
-from warpflat.export.picture_page import CAPTIONS_ALONE, MARGIN, Cell, draw_cell, lay_out
-from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
+from warpflat.export.picture_page import CAPTIONS_ALONE, Cell, draw_cell, lay_out
+from warpflat.export.picture_pen import DPI, GREY, MARGIN, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
-from warpflat.export.picture_scale import STRIP, draw_colour_bar, draw_scale_bar
+from warpflat.export.picture_scale import STRIP, colour_bar_room, draw_colour_bar, draw_scale_bar
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
@@ -81,7 +81,6 @@ def write_picture(
         InputError: the file cannot be written.
         ValueError: there is no piece.
     """
-    require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     figure = draw_figure(pieces, quantity=quantity, scale=scale, body=body)
     with atomic_path(path) as temporary:
@@ -118,16 +117,16 @@ def draw_figure(
     worn = None
     if body is not None:
         worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
-    width, height, page_scale = lay_out(pen, cells, worn)
+    left = MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR)
+    narrowest = left + colour_bar_room(pen, scale, density, quantity)
+    width, height, page_scale = lay_out(pen, cells, worn, narrowest=narrowest)
     height += STRIP
     figure.set_size_inches(width, height)
     pen.open_page(figure, width, height)
     if not alone:
         draw_scale_bar(pen, MARGIN, height - 0.27, page_scale)
         pen.write(MARGIN, height - 0.48, shared, 7.5, color=GREY)
-    draw_colour_bar(
-        pen, scale, density, areas, quantity, left=MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR), top=height
-    )
+    draw_colour_bar(pen, scale, density, areas, quantity, left=left, top=height)
     top = height - STRIP
     if worn is not None:
         worn.draw(pen, MARGIN, top, scale)

@@ -15,15 +15,17 @@ from warpflat.export.labels import LabelRoom, Spot
 from warpflat.export.picture_garment import GarmentViews
 from warpflat.export.picture_lines import draw_lines
 from warpflat.export.picture_packing import pack_boxes, pack_rows
-from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, PAGE_WIDTH, Pen
+from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen
 from warpflat.export.picture_scale import STRIP, STRIP_WORDS, draw_scale_bar
 from warpflat.export.picture_silhouette import Silhouette, Words, heading_room, place_views
 from warpflat.export.picture_views import DrawnView, View
 
-__all__ = ["CAPTIONS_ALONE", "MARGIN", "Cell", "draw_cell", "lay_out"]
+__all__ = ["CAPTIONS_ALONE", "Cell", "draw_cell", "lay_out"]
 
-MARGIN = 0.25  # [in], as all that follows
-_BESIDE, _BESIDE_ALONE = 0.2, 0.12  # either side of a view, for names; those of one piece may stand in the margin
+_BESIDE, _BESIDE_ALONE = (
+    0.2,
+    0.12,
+)  # [in], as all that follows: either side of a view, for names; those of one piece may stand in the margin
 _FOOT = 0.22  # below a view, for names
 _HIGHEST = 0.15  # a view below the upper edge
 _SMALLEST_PATTERN, _NARROWEST, _NARROWEST_PAGE = 2.0, 1.6, 8.5
@@ -35,6 +37,7 @@ _REORDERED = 0.02  # how much more of the page pieces must cover to stand otherw
 _BETWEEN, _CAPTION_SIZE, _TITLE_SIZE = "  ·  ", 7.5, 10.5  # [pt]
 _STACKED = 2.6  # width of two views side by side over their height, from which they stand one below the other
 CAPTIONS_ALONE = 4.6  # wide, left of the colour bar
+_LONGEST_NAME = 5.4  # two of them have room side by side
 _SHORTEST_GRAIN = 0.28  # half its length
 
 
@@ -107,16 +110,21 @@ class Cell:
         width, height = self.extent
         self.stacked = len(self.views) > 1 and float(width) > _STACKED * float(height)
 
-    def fit(self, pen: Pen, scale: float) -> None:
-        """Choose scale [in/m], width and captions; a piece that would become too small to read is drawn larger."""
+    def fit(self, pen: Pen, scale: float, narrowest: float) -> None:
+        """Choose scale [in/m], width and captions; a piece that would become too small to read is drawn larger.
+
+        The name is shortened to its room. A page with this piece `alone` is `narrowest` [in] at least.
+        """
         beside = 2 * (_BESIDE_ALONE if self.alone else _BESIDE) * self.columns
         widest = (PAGE_WIDTH - 2 * MARGIN - beside) / max(float(self.extent[0]), 1e-9)
         readable = _SMALLEST_PATTERN / max(float(self.pattern.size[:2].max()), 1e-9)
         self.inches_per_metre = max(scale, min(widest, readable))
+        longest = CAPTIONS_ALONE - 0.15 if self.alone else _LONGEST_NAME
+        self.name = pen.shorten(self.name, _TITLE_SIZE, longest, "bold")
         named = pen.measure(self.name, _TITLE_SIZE, "bold")[0] + 0.15
         self.width = max(self.inches_per_metre * float(self.extent[0]) + beside, _NARROWEST, named)
         if self.alone:
-            self.width = max(self.width, _NARROWEST_PAGE - 2 * MARGIN)
+            self.width = max(self.width, narrowest - 2 * MARGIN)
         self.caption_lines = _wrapped(pen, self)
         self._place_views(pen, named)
 
@@ -143,28 +151,32 @@ class Cell:
         self.height = max(ends) + _FOOT
 
 
-def lay_out(pen: Pen, cells: Sequence[Cell], worn: GarmentViews | None = None) -> tuple[float, float, float]:
+def lay_out(
+    pen: Pen, cells: Sequence[Cell], worn: GarmentViews | None = None, *, narrowest: float = 0.0
+) -> tuple[float, float, float]:
     """Choose the scale and the place of each piece, from the upper left corner; return width and height of the page, and the scale [in/m].
 
     All pieces have the same scale, so that they can be compared; only one that would become too small to read is
     drawn larger. A garment on its body comes first, at a scale of its own. The scales are those that leave least of the page empty.
+    The page is `narrowest` [in] at least.
     """
+    narrowest = max(narrowest, _NARROWEST_PAGE)
     room, tallest = PAGE_WIDTH - 2 * MARGIN, _TALLEST if worn is None else _TALLEST_WORN
     if worn is None and len(cells) == 1:
-        return _lay_out_one(pen, cells[0], room)
+        return _lay_out_one(pen, cells[0], room, narrowest)
     own_order = list(range(len(cells)))
     by_height = sorted(range(len(cells)), key=lambda k: -float(cells[k].extent[1]))
     found = []
     for scale in min(_largest_scale(cell, room) for cell in cells) * _SCALES:
         for cell in cells:
-            cell.fit(pen, scale)
+            cell.fit(pen, scale, narrowest)
         covered = sum(cell.covered for cell in cells)
         for share in _BAND_SCALES if worn is not None else (1.0,):
             band = [] if worn is None else [worn.size(share, room)]
             shown = covered + (0.0 if worn is None else worn.covered(share, room))
             for order, pack in ((own_order, pack_rows), (by_height, pack_boxes)):
                 places, wide, tall = pack([*band, *((cells[k].width, cells[k].height) for k in order)], room)
-                wide = max(wide, _NARROWEST_PAGE - 2 * MARGIN)
+                wide = max(wide, narrowest - 2 * MARGIN)
                 empty = _REORDERED * (order is by_height) - shown / ((wide + 2 * MARGIN) * (tall + STRIP))
                 found.append((max(0.0, tall - tallest), empty, scale, share, order, places, wide, tall))
     _, _, scale, share, order, places, wide, tall = min(found, key=lambda each: each[:2])
@@ -172,7 +184,7 @@ def lay_out(pen: Pen, cells: Sequence[Cell], worn: GarmentViews | None = None) -
         worn.place(share, room, wide, beside=any(top < worn.size(share, room)[1] for _, top in places[1:]))
         places = places[1:]
     for k, (left, top) in zip(order, places, strict=True):
-        cells[k].fit(pen, scale)
+        cells[k].fit(pen, scale, narrowest)
         cells[k].left, cells[k].top = MARGIN + left, top
     return wide + 2 * MARGIN, tall, float(scale)
 
@@ -184,17 +196,17 @@ def _largest_scale(cell: Cell, room: float) -> float:
     return min((room - beside) / max(float(cell.extent[0]), 1e-9), tallest / max(float(cell.extent[1]), 1e-9))
 
 
-def _lay_out_one(pen: Pen, cell: Cell, room: float) -> tuple[float, float, float]:
+def _lay_out_one(pen: Pen, cell: Cell, room: float, narrowest: float) -> tuple[float, float, float]:
     """Lay out one piece, its views side by side or one below the other; as :func:`lay_out`."""
     found = []
     for stacked in (False, True) if cell.alone and len(cell.views) > 1 else (cell.stacked,):
         cell.stacked = stacked
         scale = _largest_scale(cell, room)
-        cell.fit(pen, scale)
+        cell.fit(pen, scale, narrowest)
         empty = 1.0 - cell.covered / ((cell.width + 2 * MARGIN) * (cell.height + STRIP))
         found.append((max(0.0, cell.height - _TALLEST), empty, stacked, scale))
     _, _, cell.stacked, scale = min(found)
-    cell.fit(pen, scale)
+    cell.fit(pen, scale, narrowest)
     cell.left, cell.top = MARGIN, 0.0
     return cell.width + 2 * MARGIN, cell.height, scale
 
@@ -208,7 +220,7 @@ def _wrapped(pen: Pen, cell: Cell) -> list[str]:
     lines: list[str] = []
     room = 0.0
     for key, value in captions.items():
-        entry = f"{key} {value}"
+        entry = pen.shorten(f"{key} {value}", _CAPTION_SIZE, all_room)
         taken = pen.measure(entry, _CAPTION_SIZE)[0]
         if lines and gap + taken < room:
             lines[-1] += _BETWEEN + entry
@@ -245,10 +257,11 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     if cell.shows_body:
         for drawn, shape, words in zip(shown, cell.silhouettes, ("on the body", "pattern"), strict=True):
             _heading(pen, room, drawn, words, drawn.box[3] - heading_room(shape, size) + 0.24)
-    floor = top - cell.height + 0.02
+    floor, start = top - cell.height + 0.02, cell.left
     if cell.alone or size != page_scale:
         end = draw_scale_bar(pen, cell.left, floor, size)
         room.take_box(cell.left, floor, end, floor + 0.08)
+        start = end + 0.15
     datum = cell.pattern.lines.get(cell.datum, [None])[0] if cell.datum is not None else None
     has_grain = datum is None or _grain(pen, room, shown[-1], datum, cell.grain_angle)
     unnamed: dict[str, None] = {}
@@ -259,8 +272,27 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     if not has_grain and datum is not None and not _grain(pen, room, shown[-1], datum, cell.grain_angle, pages[-1]):
         unnamed["grain"] = None
     if unnamed:
-        text = f"not labelled for want of room: {', '.join(unnamed)}"
-        pen.write(cell.left, floor + 0.04, text, 7, color=GREY)
+        _write_unnamed(pen, room, list(unnamed), start, cell.left + cell.width, floor)
+
+
+def _write_unnamed(pen: Pen, room: LabelRoom, names: Sequence[str], left: float, right: float, floor: float) -> None:
+    """Write at the foot of a cell which names had no room, between names that stand there [in]; their number where there is little room."""
+    all_names = ", ".join(names)
+    texts = [
+        f"not labelled for want of room: {all_names}",
+        pen.shorten(f"not labelled: {all_names}", 7, right - left - 0.1),
+        f"not labelled: {len(names)}",
+    ]
+    for text in texts:
+        width, height = pen.measure(text, 7)
+        spots = [
+            Spot(x=x + 0.5 * width, y=floor + 0.04, angle=0.0)
+            for x in np.arange(left, right - width - 0.1 + 1e-6, 0.1).tolist()
+        ]
+        page = (left - 0.1, floor - 0.1, right + 0.1, floor + 0.3)
+        if spot := room.place(spots, width, height, page):
+            pen.write(spot.x, spot.y, text, 7, color=GREY, ha="center")
+            return
 
 
 def _pages(cell: Cell, shown: Sequence[DrawnView], top: float) -> list[tuple[float, float, float, float]]:

@@ -7,10 +7,11 @@ from typing import Any
 from warpflat.core.arrays import FloatArray
 from warpflat.export.picture_views import HALO_LAYER, INK
 
-__all__ = ["DPI", "GRAIN", "GREY", "LABEL_SIZE", "PAGE_WIDTH", "POINT", "Pen"]
+__all__ = ["DPI", "GRAIN", "GREY", "LABEL_SIZE", "MARGIN", "PAGE_WIDTH", "POINT", "Pen"]
 
 DPI = 150
 PAGE_WIDTH = 12.5  # [in], at most
+MARGIN = 0.25  # [in]
 POINT = 1.0 / 72.0  # [in]
 GREY = (0.36, 0.38, 0.42)
 GRAIN = (0.02, 0.27, 0.66)
@@ -46,6 +47,20 @@ class Pen:
             width, height, _ = self._renderer.get_text_width_height_descent(text, font, ismath=False)
             self._measured[key] = width / DPI, height / DPI
         return self._measured[key]
+
+    def shorten(self, text: str, size: float, room: float, weight: str = "normal") -> str:
+        """Return a line of text, at a size [pt], cut with dots at its end where it takes more room [in]."""
+        if self.measure(text, size, weight)[0] <= room:
+            return text
+        # The longest beginning that fits, by halving.
+        fits, too_long = 1, len(text)
+        while too_long - fits > 1:
+            middle = (fits + too_long) // 2
+            if self.measure(f"{text[:middle].rstrip()}…", size, weight)[0] <= room:
+                fits = middle
+            else:
+                too_long = middle
+        return f"{text[:fits].rstrip()}…"
 
     def write(self, x: float, y: float, text: str, size: float, *, halo: bool = False, **options: Any) -> None:
         """Write a text; with a halo it stays legible over colours and lines."""

@@ -6,16 +6,18 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours
-from warpflat.export.picture_pen import DPI, GREY, POINT, Pen
+from warpflat.export.picture_pen import DPI, GREY, MARGIN, POINT, Pen
 from warpflat.export.picture_views import INK
 
-__all__ = ["STRIP", "STRIP_WORDS", "draw_colour_bar", "draw_scale_bar", "length_text"]
+__all__ = ["STRIP", "STRIP_WORDS", "colour_bar_room", "draw_colour_bar", "draw_scale_bar", "length_text"]
 
 STRIP = 0.66  # [in], as all that follows
 STRIP_WORDS = 0.52  # where the words of the strip end
 _BAR_HEIGHT = 0.17
 _BAR_TIP = 0.03  # of its length, for what lies above the scale
-_NOTE, _POWER = 2.0, 0.7  # room right of the bar for what it leaves out, and for a power of ten
+_NOTE, _POWER, _PLAIN = 2.0, 0.7, 0.35  # room right of the bar: for what it leaves out, for a power of ten, for neither
+_SHORTEST_BAR = 1.2
+_WORDS_SIZE = 9.5  # [pt]
 _TICK_SIZE = 8.5  # [pt]
 
 
@@ -37,12 +39,30 @@ def draw_scale_bar(pen: Pen, left: float, y: float, inches_per_metre: float) -> 
     return left + wide + 0.08 + pen.measure(text, 9)[0]
 
 
+def colour_bar_room(pen: Pen, scale: float, density: FloatArray, quantity: str) -> float:
+    """Return how much room the colour bar needs at least, from its words to the right edge of the page [in]; arguments as it takes them."""
+    words = pen.measure(_bar_words(scale, density, quantity), _WORDS_SIZE)[0]
+    return words + (MARGIN if _is_flat(scale, density) else 0.15 + _SHORTEST_BAR + _right_of_bar(scale, density))
+
+
+def _is_flat(scale: float, density: FloatArray) -> bool:
+    return scale <= SMALLEST_SCALE and not (density > scale).any()
+
+
+def _bar_words(scale: float, density: FloatArray, quantity: str) -> str:
+    return f"{quantity}: none, the cloth lies flat without strain" if _is_flat(scale, density) else f"{quantity} [J/m²]"
+
+
+def _right_of_bar(scale: float, density: FloatArray) -> float:
+    return _NOTE if (density > scale).any() else _POWER if _ticks(scale, 1.0)[2] else _PLAIN
+
+
 def draw_colour_bar(
     pen: Pen, scale: float, density: FloatArray, areas: FloatArray, quantity: str, *, left: float, top: float
 ) -> None:
     """Draw the colour bar from `left` [in] to the right margin, and the share of the area above its end.
 
-    A surface without strain needs no scale: words say so.
+    The page must leave :func:`colour_bar_room`. A surface without strain needs no scale: words say so.
 
     Args:
         scale: upper end of the colours [J/m2].
@@ -55,14 +75,12 @@ def draw_colour_bar(
     from warpflat.export.picture_pixels import Pixels
 
     above = density > scale
-    if scale <= SMALLEST_SCALE and not above.any():
-        pen.write(left, top - 0.24, f"{quantity}: none, the cloth lies flat without strain", 9.5)
+    words = _bar_words(scale, density, quantity)
+    pen.write(left, top - 0.24, words, _WORDS_SIZE)
+    if _is_flat(scale, density):
         return
-    words = f"{quantity} [J/m²]"
-    pen.write(left, top - 0.24, words, 9.5)
-    left += pen.measure(words, 9.5)[0] + 0.15
-    _, _, power = _ticks(scale, 1.0)
-    right = pen.page_width - (_NOTE if above.any() else _POWER if power else 0.35)
+    left += pen.measure(words, _WORDS_SIZE)[0] + 0.15
+    right = pen.page_width - _right_of_bar(scale, density)
     upper = top - 0.24 + 0.5 * _BAR_HEIGHT
     lower = upper - _BAR_HEIGHT
     end = left + (right - left) / (1.0 + _BAR_TIP) if above.any() else right

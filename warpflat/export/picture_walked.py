@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_packing import pack_boxes
 from warpflat.export.picture_png import save_png
@@ -45,7 +45,6 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     # The tallest first, so that the columns end at nearly the same height.
     seams = sorted(seams, key=lambda seam: -float(np.ptp(_fitted(seam)[0], axis=0)[1]))
@@ -69,7 +68,6 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
         words,
         fontsize=min(11.0, 135.0 * (width - 2 * MARGIN) / len(words)),
         va="center",
-        parse_math=False,
     )
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
@@ -112,4 +110,4 @@ def _draw_seam(axis: Axes, seam: WalkedSeam, lines: Sequence[FloatArray], middle
     words = (
         f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip()
     )
-    axis.text(middle, upper - 0.4 * CLOTH, words, fontsize=9, ha="center", va="center", parse_math=False)
+    axis.text(middle, upper - 0.4 * CLOTH, words, fontsize=9, ha="center", va="center")

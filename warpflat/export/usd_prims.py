@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path
-from warpflat.core.errors import InputError
+from warpflat.core.errors import CannotWriteError
 from warpflat.export.geometry import Polylines
 
 __all__ = [
@@ -52,7 +52,7 @@ def usd_errors(path: str | os.PathLike[str]) -> Iterator[None]:
         yield
     except Tf.ErrorException as error:
         message = next((" ".join(one.commentary.split())[:200] for one in error.args), "USD failed")
-        raise InputError(f"cannot write {path}: {message} (folder still there? disk full?)") from error
+        raise CannotWriteError(f"cannot write {path}: {message} (folder still there? disk full?)") from error
 
 
 def export_stage(stage: Any, path: str | os.PathLike[str]) -> None:
@@ -77,7 +77,7 @@ def require_usd(written: Path, path: str | os.PathLike[str]) -> None:
 
     with usd_errors(path):
         if not Sdf.Layer.FindOrOpen(str(written)):
-            raise InputError(f"cannot write {path}: USD has left it incomplete (folder still there? disk full?)")
+            raise CannotWriteError(f"cannot write {path}: USD has left it incomplete (folder still there? disk full?)")
 
 
 def valid_name(name: str, taken: set[str]) -> str:

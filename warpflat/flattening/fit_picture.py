@@ -12,7 +12,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.atomic_files import atomic_path
 from warpflat.core.sums import weighted_percentile
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_png import save_png
@@ -125,7 +125,6 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     span = np.ptp(result.positions, axis=0)
     width = 3.4
@@ -179,7 +178,6 @@ def write_wear_sheet(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     maps = (*(_BODY_MAPS if on_body else ()), *MAPS)
     sheet = _Sheet.of(results, len(maps))

@@ -261,10 +261,10 @@ class Flattening:
         from warpflat.core.manifest import require_own_metrics, write_metrics
 
         others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
-        with output_folder(folder, others, sources=self.surface.sources) as to:
+        with output_folder(folder, others, sources=self.surface.sources, guard=True) as to:
             require_own_metrics(to)
             files = write_files([self], to, picture=picture, frames=frames)
-            write_metrics(to, self.metrics())
+            write_metrics(to, self.metrics(), name=self.surface.name, files=files)
         return [*files, "metrics.json"]
 
     def write_obj(self, folder: Path) -> str:
@@ -319,7 +319,7 @@ def run_metrics(
 def write_files(
     results: Sequence[Flattening], folder: Path, *, picture: bool, frames: bool, body: Body | None = None
 ) -> list[str]:
-    """Write the files of several pieces, but not `metrics.json`, and return their names.
+    """Write the files of several pieces, but not `metrics.json`, and return their names; a picture or film that fails is left out.
 
     Args:
         results: the pieces, of different names.
@@ -331,15 +331,17 @@ def write_files(
     Raises:
         InputError: the folder cannot be written.
     """
-    from warpflat.export.picture import write_picture
+    from warpflat.core.optional_files import optional_file
 
     files = [result.write_obj(folder) for result in results]
     if frames:
-        files.append("frames.usdc")
-        _write_frames(folder / files[-1], results)
+        with optional_file(folder / "frames.usdc", files) as path:
+            _write_frames(path, results)
     if picture:
-        files.append("picture.png")
-        write_picture(folder / files[-1], [result.picture_piece() for result in results], body=body)
+        with optional_file(folder / "picture.png", files) as path:
+            from warpflat.export.picture import write_picture
+
+            write_picture(path, [result.picture_piece() for result in results], body=body)
     return files
 
 

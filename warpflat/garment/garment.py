@@ -211,10 +211,10 @@ class Garment:
         from warpflat.core.manifest import require_own_metrics, write_metrics
 
         others = [*(["picture.png"] if picture else []), "metrics.json"]
-        with output_folder(folder, others, sources=self.mannequin.sources) as to:
+        with output_folder(folder, others, sources=self.mannequin.sources, guard=True) as to:
             require_own_metrics(to)
             files = self.write_files(to, picture=picture)
-            write_metrics(to, self.metrics())
+            write_metrics(to, self.metrics(), name=self.name, files=files)
         return [*files, "metrics.json"]
 
     def write_files(self, folder: Path, *, picture: bool) -> list[str]:

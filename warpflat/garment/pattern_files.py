@@ -186,7 +186,7 @@ def export_patterns(
     source = folder / "pattern.json"
     drafted = read_pattern_json(source)
     # pattern.json may be written over itself: that is what was asked for.
-    with output_folder(folder, sources=[] if "json" in formats else [source]):
+    with output_folder(folder, sources=[] if "json" in formats else [source], guard=True):
         files = [
             _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
             for format in formats

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.core.text import find_unused_name
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
+from warpflat.garment.sew_pieces import meeting_borders
 from warpflat.garment.sewing import sew
 from warpflat.garment.sewn import SeamPair, Sewn
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import NamedSeam, SurfaceSeam, surface_seams
+from warpflat.surface.mesh import Surface
 
 __all__ = ["SewnSurface", "sew_surface"]
 
@@ -84,6 +89,13 @@ def sew_surface(
         )
         for seam in found
     ]
+    sewn_edges = {(min(edge), max(edge)) for pair in pairs for row in pair.vertices for edge in pairwise(row.tolist())}
+    # What was cut open before, here or in the file, is sewn like any cut.
+    for pair in meeting_borders({name: result.network.surface}, without=sewn_edges):
+        opening = _opening(result.network.surface, pair)
+        title = find_unused_name(opening or pair.name, {pair.name for pair in pairs})
+        pairs.append(replace(pair, name=title))
+        titles.append((f"{opening or title}.left", f"{opening or title}.right"))
     if not pairs and not constraints:
         return None
     sewn = sew({name: result}, pairs, constraints=constraints, options=options)
@@ -103,6 +115,16 @@ def sew_surface(
         for pair, title, result in zip(pairs, titles, sewn.results, strict=False)
     )
     return SewnSurface(result=after, sewn=sewn, seams=measured)
+
+
+def _opening(surface: Surface, pair: SeamPair) -> str | None:
+    """Return the name of the line along which a stretch of border was cut open."""
+    first = {frozenset(side[:2].tolist()) for side in pair.vertices}
+    for name, line in surface.lines.items():
+        side = re.fullmatch(r"(.+)\.(left|right)(\.\d+)?'*", name)
+        if side is not None and not first.isdisjoint(map(frozenset, pairwise(line.tolist()))):
+            return side[1]
+    return None
 
 
 def _with_fullness(result: Flattening, seams: Sequence[SurfaceSeam], options: RelaxOptions | None) -> Flattening:

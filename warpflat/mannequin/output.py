@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from warpflat._version import __version__
 from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.manifest import require_own_metrics, write_metrics
+from warpflat.core.optional_files import optional_file
 from warpflat.mannequin.distance_picture import write_distance_picture
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
@@ -36,22 +37,27 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
 
     Returns:
         the files by kind: ``usd``, ``obj``, ``picture``, of a scan ``distances``, ``metrics``; metrics come last, so where they
-            are the rest is.
+            are the rest is. A picture that cannot be drawn is left out, with a note in the metrics.
 
     Raises:
         InputError: if a file cannot be written, or the body was read from one that would be replaced.
     """
-    with output_folder(folder, MANNEQUIN_FILES.values(), sources=mannequin.sources) as place:
+    names = {kind: name for kind, name in MANNEQUIN_FILES.items() if mannequin.scan is not None or kind != "distances"}
+    with output_folder(folder, names.values(), sources=mannequin.sources, guard=True) as place:
         require_own_metrics(place)
-        files = {kind: place / name for kind, name in MANNEQUIN_FILES.items()}
-        if mannequin.scan is None:
-            del files["distances"]
+        files = {kind: place / name for kind, name in names.items()}
         write_mannequin_usd(mannequin, files["usd"])
         write_mannequin_obj(mannequin, files["obj"])
-        write_mannequin_picture(mannequin, files["picture"])
+        drawn = list[str]()
+        with optional_file(files["picture"], drawn) as path:
+            write_mannequin_picture(mannequin, path)
         if mannequin.scan is not None:
-            write_distance_picture(mannequin, files["distances"])
-        write_metrics(place, {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
+            with optional_file(files["distances"], drawn) as path:
+                write_distance_picture(mannequin, path)
+        files = {kind: path for kind, path in files.items() if path.suffix != ".png" or path.name in drawn}
+        written = [path.name for path in files.values()]
+        metrics = {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()}
+        write_metrics(place, metrics, name="mannequin", files=written)
     return files
 
 

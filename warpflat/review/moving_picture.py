@@ -17,7 +17,7 @@ from warpflat.export.colours import SMALLEST_SCALE, energy_colours
 from warpflat.export.geometry import outline_edges
 from warpflat.export.raster import rasterise, shade
 from warpflat.review.film import FilmPiece, Shape, open_film
-from warpflat.review.page import read_run
+from warpflat.review.page import read_run, reading_members
 from warpflat.surface.triangles import triangulate
 
 if TYPE_CHECKING:
@@ -46,9 +46,11 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
     _, files, name = read_run(folder)
     if "frames.usdc" not in files:
         raise InputError(f"{folder}: has no frames.usdc of this run; run the scene with frames above 0")
-    pieces = open_film(folder / "frames.usdc")
+    with reading_members(folder):
+        pieces = open_film(folder / "frames.usdc")
     written = []
-    with output_folder(folder, [file for file, asked in (("film.webp", film), ("contact_sheet.png", sheet)) if asked]):
+    names = [file for file, asked in (("film.webp", film), ("contact_sheet.png", sheet)) if asked]
+    with output_folder(folder, names, guard=True), reading_members(folder):
         if film:
             images = _images(pieces, _evenly(pieces[0].times, _FRAMES), _LONG_SIDE)
             _save(folder / "film.webp", images, loop=0, duration=_durations(pieces[0].times, len(images)), quality=80)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+import os
+import struct
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -14,40 +17,59 @@ from typing import Any
 from warpflat.core.activity import report_activity
 from warpflat.core.atomic_files import atomic_path, latest_file
 from warpflat.core.errors import InputError
+from warpflat.core.memory_limit import is_out_of_memory
+from warpflat.core.own_files import open_result, read_result, recorded_files
 from warpflat.export.colours import SMALLEST_SCALE
 from warpflat.review.film import open_film, pack_film
 from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
 
-__all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
+__all__ = ["pack_frames", "pack_pictures", "read_run", "reading_members", "review_folder", "write_review"]
 
 # Nothing on the page may ask for anything from elsewhere, nor from the disk.
 _POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 # Pictures come in this order, and others after them.
 _FIRST = ("picture.png", "drape.png", "wear.png", "walked.png")
 _QUALITY = 85  # of JPEG
+_PNG = b"\x89PNG\r\n\x1a\n"
+# The largest picture, which takes 3 bytes of memory for each pixel, and the largest file that the page holds.
+_MOST_PIXELS = 150_000_000
+_MOST_BYTES = 200_000_000
 
 
 def read_run(folder: Path) -> tuple[dict[str, Any], list[str], str]:
     """Read what a run has left in a folder: its metrics, the names of its files, and its name.
 
     Raises:
-        InputError: there is no `metrics.json` of warpflat.
+        InputError: there is no `metrics.json` of warpflat, or a file that it lists is a link, a pipe or a device.
     """
     path = folder / "metrics.json"
-    try:
-        metrics = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"cannot read {path}: {reason}; give the folder of a run") from None
-    except (ValueError, RecursionError):
-        metrics = None
+    metrics = read_result(path)
     if not isinstance(metrics, dict) or not isinstance(metrics.get("pieces"), dict) or not metrics["pieces"]:
         raise InputError(f"{path}: is not of a run of warpflat; give the folder that `warpflat run` has written")
-    files = metrics.get("files")
-    runs = files if isinstance(files, dict) else {}
+    runs = recorded_files(metrics)
     name = next(reversed(runs), folder.resolve().name)
-    listed = [file for file in runs.get(name, {}) if Path(file).name == file and (folder / file).is_file()]
+    listed = [file for file in runs.get(name, {}) if os.path.lexists(folder / file)]
+    for file in listed:
+        open_result(folder / file).close()
     return metrics, listed, name
+
+
+@contextmanager
+def reading_members(folder: Path) -> Iterator[None]:
+    """Guard the reading of the files of a run, which others may have changed in any way.
+
+    Raises:
+        InputError: whatever goes wrong in the block.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        if is_out_of_memory(error) or getattr(error, "errno", None) is not None:  # Pillow's own errors have no number
+            raise
+        words = f"{type(error).__name__} {error}".strip()
+        raise InputError(f"{folder}: a file of the run is damaged ({words[:200]}); run the scene again") from error
 
 
 def review_folder(folder: str | Path) -> Path:
@@ -61,7 +83,7 @@ def review_folder(folder: str | Path) -> Path:
 
     folder = Path(folder)
     metrics, files, name = read_run(folder)
-    with output_folder(folder, ["review.html"]):
+    with output_folder(folder, ["review.html"], guard=True):
         write_review(folder, metrics, files, name=name)
         record_file(folder, name, "review.html")
     return folder / "review.html"
@@ -105,10 +127,8 @@ def write_review(
     """
     report_activity("writing the review page")
     path = folder / "review.html"
-    try:
+    with reading_members(folder):
         page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)), pictures or {})
-    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
-        raise InputError(f"{folder}: a file of the run is damaged ({error}); run the scene again") from error
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path.name
@@ -125,7 +145,11 @@ def _page(
     film, packed = "", None
     if "frames.usdc" in files:
         packed = packed_film()
-        film = _film_section(packed) if packed else "<p>The film is too large for a page; see frames.usdc.</p>"
+        film = (
+            _film_section(packed)
+            if packed
+            else "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
+        )
     notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
     sections = [
         ("", summary_cards(metrics)),
@@ -190,7 +214,7 @@ def _worn(folder: Path, files: Sequence[str]) -> str:
     """Return the moving picture of the drape."""
     if "drape.webp" not in files:
         return ""
-    text = base64.b64encode(latest_file(folder / "drape.webp").read_bytes()).decode("ascii")
+    text = base64.b64encode(_bytes(latest_file(folder / "drape.webp"))).decode("ascii")
     return (
         f'<img alt="drape.webp" src="data:image/webp;base64,{text}"><p>Front, left side and back, coloured by the gap to the body; '
         "frames.usdc holds the same in space.</p>"
@@ -201,7 +225,7 @@ def _drawings(folder: Path, files: Sequence[str]) -> str:
     found = sorted(file for file in files if file.endswith(".svg"))
     parts = []
     for file in found:
-        text = base64.b64encode(latest_file(folder / file).read_bytes()).decode("ascii")
+        text = base64.b64encode(_bytes(latest_file(folder / file))).decode("ascii")
         parts.append(f'<img class="drawing" alt="{escape(file)}" src="data:image/svg+xml;base64,{text}">')
     return "".join(parts)
 
@@ -210,14 +234,23 @@ def _image(path: Path) -> str:
     """Return a picture as text: as JPEG where that is smaller."""
     from PIL import Image
 
-    best, kind, small = path.read_bytes(), "png", io.BytesIO()
-    with Image.open(io.BytesIO(best)) as picture:
+    best, kind, small = _bytes(path), "png", io.BytesIO()
+    # No other format is tried, some of which start a program; and the size is known before a pixel is decoded.
+    wide, high = struct.unpack(">II", best[16:24]) if best[:8] == _PNG and len(best) >= 24 else (0, 0)
+    if not 0 < wide * high <= _MOST_PIXELS:
+        raise InputError(f"{path}: is no PNG of at most {_MOST_PIXELS:,} pixels; run the scene again")
+    with Image.open(io.BytesIO(best), formats=["PNG"]) as picture:
         if max(picture.size) < 65_000:
             # WebP has half the bytes, and takes ten times as long.
             picture.convert("RGB").save(small, "JPEG", quality=_QUALITY)
             if len(small.getvalue()) < len(best):
                 best, kind = small.getvalue(), "jpeg"
     return f"data:image/{kind};base64,{base64.b64encode(best).decode('ascii')}"
+
+
+def _bytes(path: Path) -> bytes:
+    with open_result(path, most=_MOST_BYTES) as stream:
+        return stream.read()
 
 
 def _data(file: str) -> str:

@@ -23,10 +23,7 @@ if TYPE_CHECKING:
     from warpflat.draping.result import Drape
     from warpflat.garment.garment import Garment
 
-__all__ = ["COMPARED_FILES", "compare_fabrics", "comparison_table", "laid_upon", "save_comparison"]
-
-#: Those of a comparison; the last one of drapes alone.
-COMPARED_FILES = ("compare.json", "compare.png", "compare.svg", "compare-drape.png")
+__all__ = ["compare_fabrics", "compared_files", "comparison_table", "laid_upon", "save_comparison"]
 
 
 def compare_fabrics(
@@ -114,6 +111,11 @@ def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
     return np.asarray((layout - centre) @ turn + aim)
 
 
+def compared_files(*, drape: bool) -> list[str]:
+    """Return the names of the files of a comparison."""
+    return ["compare.json", "compare.png", "compare.svg", *(["compare-drape.png"] if drape else [])]
+
+
 def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
     """Write `compare.json`, `compare.png` and `compare.svg` (outlines in true size), all of them or none.
 
@@ -121,20 +123,24 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
         InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
     from warpflat.core.atomic_files import output_folder
-    from warpflat.core.json_file import write_json
+    from warpflat.core.manifest import write_report
+    from warpflat.core.optional_files import optional_file
     from warpflat.draping.compare_picture import write_compared_drapes
     from warpflat.scene.compare_picture import write_overlay_picture, write_overlay_svg
 
     sources = [
         file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources
     ]
-    with output_folder(folder, COMPARED_FILES, sources=sources) as to:
+    files = ["compare.svg"]
+    with output_folder(folder, compared_files(drape=bool(comparison.drapes)), sources=sources, guard=True) as to:
         write_overlay_svg(to / "compare.svg", comparison)
-        write_overlay_picture(to / "compare.png", comparison)
+        with optional_file(to / "compare.png", files) as path:
+            write_overlay_picture(path, comparison)
         if comparison.drapes:
-            write_compared_drapes(to / "compare-drape.png", comparison.drapes)
-        write_json(to / "compare.json", comparison.as_dict())
-    return list(COMPARED_FILES if comparison.drapes else COMPARED_FILES[:3])
+            with optional_file(to / "compare-drape.png", files) as path:
+                write_compared_drapes(path, comparison.drapes)
+        write_report(to / "compare.json", comparison.as_dict(), name="compare", files=files)
+    return ["compare.json", *files]
 
 
 def comparison_table(comparison: Comparison) -> str:

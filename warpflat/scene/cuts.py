@@ -53,8 +53,10 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutSequence:
     Raises:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
     """
-    surface, left, notes = _open_tubes(surface, dict(enumerate(tables)))
-    return replace(_plan_paths(surface, left), notes=notes)
+    from warpflat.surface.tubes import tube_borders
+
+    sequence = _plan_paths(surface, dict(enumerate(tables)))
+    return _open_tubes(sequence) if tube_borders(surface) else sequence
 
 
 def _plan_paths(surface: Surface, tables: dict[int, CutTable]) -> CutSequence:
@@ -84,35 +86,24 @@ def _plan_paths(surface: Surface, tables: dict[int, CutTable]) -> CutSequence:
     return CutSequence(surface=surface, plans=plans, first_auto=len(plans))
 
 
-def _open_tubes(surface: Surface, tables: dict[int, CutTable]) -> tuple[Surface, dict[int, CutTable], tuple[str, ...]]:
-    """Cut a tube open along those cuts that do so, or else where its borders are nearest to each other.
-
-    Returns:
-        The surface, which is the same where it is no tube; the cuts that are left; and what was chosen, one sentence each.
-    """
-    from warpflat.cutting.cut_plan import make_cuts
-    from warpflat.cutting.open_tube import open_tube
+def _open_tubes(sequence: CutSequence) -> CutSequence:
+    """Cut a tube open along its cuts, and where these leave a tube, where borders are nearest to each other."""
+    from warpflat.core.text import quote_value
+    from warpflat.cutting.open_tube import open_with_cuts, without_overlaps
     from warpflat.surface.paths.edge_paths import path_length
-    from warpflat.surface.tubes import tube_borders
 
-    left, borders = dict(tables), len(tube_borders(surface))
-    for number, table in tables.items():
-        if borders:
-            sequence = _plan_paths(surface, {number: table})
-            opened = make_cuts(sequence.surface, sequence.plans).surface
-            if len(tube_borders(opened)) < borders:
-                surface, borders = opened, len(tube_borders(opened))
-                del left[number]
-    if not borders:
-        return surface, left, ()
-    opened = open_tube(surface)
-    lines = [line for name, line in opened.lines.items() if name not in surface.lines and name.endswith(".left")]
-    ends = " and ".join(f"from {_centimetres(opened, line[0])} to {_centimetres(opened, line[-1])}" for line in lines)
-    note = (
-        f"it is a tube, cut open where its borders are nearest, {100 * path_length(opened, lines):.1f} cm, {ends} cm; "
-        "[[cuts]] or --open choose another line"
-    )
-    return opened, left, (note,)
+    distinct, shorter = without_overlaps(sequence.plans)
+    surface, plans, openings, uncut = open_with_cuts(sequence.surface, distinct)
+    notes = tuple(f"cut {quote_value(name)} is left out where it runs along another cut" for name in shorter)
+    if openings:
+        lines = [plan.paths[0] for plan in openings]
+        ends = " and ".join(f"from {_centimetres(uncut, line[0])} to {_centimetres(uncut, line[-1])}" for line in lines)
+        notes = (
+            *notes,
+            f"it is a tube, cut open where its borders are nearest, {100 * path_length(uncut, lines):.1f} cm, {ends} cm; "
+            "[[cuts]] or --open choose another line",
+        )
+    return CutSequence(surface=surface, plans=tuple(plans), first_auto=len(plans), notes=notes)
 
 
 def _centimetres(surface: Surface, vertex: int) -> str:

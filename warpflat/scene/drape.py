@@ -56,8 +56,8 @@ def _write_correction(
     scene: Scene, garment: Garment | Flattening, draped: Drape, folder: Path
 ) -> tuple[dict[str, Any], list[str]]:
     """Correct the pattern, and write it beside the first."""
+    from warpflat.core.optional_files import optional_file
     from warpflat.draping.correct_pattern import correct_pattern
-    from warpflat.draping.correction_picture import write_correction_picture
     from warpflat.fabric.library import find_fabric
     from warpflat.garment.garment import Garment
     from warpflat.garment.pattern_files import garment_files, surface_files
@@ -71,10 +71,12 @@ def _write_correction(
         other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
         found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
         drawing = pattern_options(settings.pattern, None)
-    files = []
+    files = list[str]()
     if settings.output.picture:
-        files.append("corrected.png")
-        write_correction_picture(folder / files[-1], found)
+        with optional_file(folder / "corrected.png", files) as path:
+            from warpflat.draping.correction_picture import write_correction_picture
+
+            write_correction_picture(path, found)
     corrected, name = found.apply(garment), f"{scene.name}.corrected"
     # The PDF and the JSON have one name in a folder, which is the first pattern's.
     drawing = replace(drawing, formats=[each for each in drawing.formats if each in ("dxf", "svg")], cloth=None)

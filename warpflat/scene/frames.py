@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from itertools import chain, pairwise
 from pathlib import Path
 from types import TracebackType
@@ -14,7 +14,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.atomic_files import require_writable
+from warpflat.core.optional_files import optional_file
 from warpflat.scene.frames_keys import FilmStage, Frame, Key, KeyFile
 from warpflat.scene.schema import OutputTable
 from warpflat.surface.half_edges import half_edges
@@ -53,6 +53,11 @@ class Film:
     """Records the layouts of several pieces while they relax, and writes `frames.usdc` at the end of its ``with`` block.
 
     All pieces have the same frames: a stage takes as many as the piece that needs the most, and a piece without that stage stands still.
+    A film that cannot be made is left out; see :func:`warpflat.core.optional_files.optional_file`.
+
+    Attributes:
+        files: after the block: the names of the files that it has written.
+        recorders: of the pieces, by name.
     """
 
     def __init__(
@@ -65,6 +70,7 @@ class Film:
             surfaces: the pieces, uncut.
             mannequin: on which they lie; it is written as `mannequin.usdc`, to which the frames refer.
         """
+        self.files: list[str] = []
         self._mannequin = mannequin
         self._stack = ExitStack()
         self._folder, self._output = folder, output
@@ -87,8 +93,7 @@ class Film:
             InputError: the place cannot be written.
         """
         if self.wanted:
-            require_writable(self._folder / "frames.usdc")
-            with ExitStack() as stack:
+            with optional_file(self._folder / "frames.usdc", []), ExitStack() as stack:
                 self._keys = stack.enter_context(KeyFile(self._folder))
                 for name, surface in self._surfaces.items():
                     self.recorders[name] = FrameRecorder(self._keys, surface, self._schedule)
@@ -103,11 +108,13 @@ class Film:
         self._stack.__exit__(kind, error, trace)
 
     def _write_at_end(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
+        if kind is not None or self._keys.failed:
+            return
+        with optional_file(self._folder / "frames.usdc", self.files) as path:
             from warpflat.export.usd import FrameWriter
 
             report_activity("writing the film")
-            with FrameWriter(self._folder / "frames.usdc", scale=self._scale()) as writer:
+            with FrameWriter(path, scale=self._scale()) as writer:
                 if self._mannequin is not None:
                     self._show_mannequin(writer, self._mannequin)
                 for name, surface in self._surfaces.items():
@@ -226,46 +233,60 @@ class FrameRecorder:
 
     def __call__(self, progress: Progress) -> None:
         """Keep the layout if the schedule asks for it, and if the piece has moved."""
-        if self._keys is None:
-            return
-        begins = self._ended or progress.surface.faces is not self._faces
-        if not begins and not self._schedule.is_due(progress.step, progress.max_steps):
-            return
-        positions = progress.positions()
-        if begins:
-            self._begin_stage("relax" if progress.stage == "develop" else progress.stage, progress.surface, positions)
-            self._schedule.is_due(progress.step, progress.max_steps)
-        elif not self._has_moved(positions):
-            return
-        measures = {"step": progress.step, "model_energy_j": progress.model_energy}
-        self._keep(positions, progress.face_energy_density(), measures)
+        with self._recording() as keeps:
+            begins = self._ended or progress.surface.faces is not self._faces
+            if not keeps or (not begins and not self._schedule.is_due(progress.step, progress.max_steps)):
+                return
+            positions = progress.positions()
+            if begins:
+                name = "relax" if progress.stage == "develop" else progress.stage
+                self._begin_stage(name, progress.surface, positions)
+                self._schedule.is_due(progress.step, progress.max_steps)
+            elif not self._has_moved(positions):
+                return
+            measures = {"step": progress.step, "model_energy_j": progress.model_energy}
+            self._keep(positions, progress.face_energy_density(), measures)
 
     def record_result(self, result: Flattening) -> None:
         """Keep the layout of a finished result, with its measures, as the end of a stage."""
-        if self._keys is None:
-            return
-        if self._ended:
-            # What led here was not seen: it is shown as the way from the end of the stage before.
-            surface, before = result.network.surface, self._last
-            self._begin_stage(result.stages[-1].name, surface, before if len(before) else result.positions)
-            if len(before):
-                self._keep(before, self._end_density, {"step": 0})
-        self._keep(
-            result.positions,
-            result.face_energy_density,
-            {"step": result.stages[-1].steps, **result.layout_measures},
-        )
-        self._ended, self._end_density = True, result.face_energy_density
+        with self._recording() as keeps:
+            if not keeps:
+                return
+            if self._ended:
+                # What led here was not seen: it is shown as the way from the end of the stage before.
+                surface, before = result.network.surface, self._last
+                self._begin_stage(result.stages[-1].name, surface, before if len(before) else result.positions)
+                if len(before):
+                    self._keep(before, self._end_density, {"step": 0})
+            self._keep(
+                result.positions,
+                result.face_energy_density,
+                {"step": result.stages[-1].steps, **result.layout_measures},
+            )
+            self._ended, self._end_density = True, result.face_energy_density
 
     def record_cut_line(self, result: Flattening, plan: CutPlan) -> None:
         """Keep the layout in which the line of the next cut is drawn on the piece."""
         self._plans.append(plan)
-        if self._keys is None:
+        with self._recording() as keeps:
+            if not keeps:
+                return
+            self._begin_stage(f"cut:{plan.name}", result.network.surface, result.positions, still=True)
+            measures = {"step": 0, "model_energy_j": result.stages[-1].model_energy_j}
+            self._keep(result.positions, result.face_energy_density, measures)
+            self._ended = True
+
+    @contextmanager
+    def _recording(self) -> Iterator[bool]:
+        """Tell whether layouts are kept; after an error in the block the film is left out."""
+        if self._keys is None or self._keys.failed:
+            yield False
             return
-        self._begin_stage(f"cut:{plan.name}", result.network.surface, result.positions, still=True)
-        measures = {"step": 0, "model_energy_j": result.stages[-1].model_energy_j}
-        self._keep(result.positions, result.face_energy_density, measures)
-        self._ended = True
+        self._keys.failed = True  # until the block has ended well
+        kept = list[str]()
+        with optional_file(self._keys.film, kept):
+            yield True
+        self._keys.failed = not kept
 
     def _begin_stage(self, name: str, surface: Surface, positions: FloatArray, *, still: bool = False) -> None:
         self._schedule = self._new_schedule()

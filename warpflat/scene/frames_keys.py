@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import CannotWriteError
 from warpflat.export.geometry import Polylines
 
 __all__ = ["FilmStage", "Frame", "Key", "KeyFile"]
@@ -79,12 +79,18 @@ class FilmStage:
 
 
 class KeyFile:
-    """A file without a name, in which computed layouts are kept until the end of the run; used in a ``with`` block."""
+    """A file without a name, in which computed layouts are kept until the end of the run; used in a ``with`` block.
+
+    Attributes:
+        film: the file that is made of them.
+        failed: whether a layout could not be kept.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._file = cast(BinaryIO, TemporaryFile(dir=folder, buffering=0))  # noqa: SIM115 (open as long as the film)
         self._end = 0
-        self._folder = folder
+        self.film = folder / "frames.usdc"
+        self.failed = False
 
     def __enter__(self) -> KeyFile:
         return self
@@ -111,7 +117,7 @@ class KeyFile:
                     self._end, left = self._end + written, left[written:]
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            raise InputError(f"cannot write {self._folder / 'frames.usdc'}: {reason}") from error
+            raise CannotWriteError(f"cannot write {self.film}: {reason}") from error
         return key
 
     def positions(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:

@@ -283,7 +283,8 @@ def drape_outside(
     cloth, notes = _fabric(job, fabric)
     options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
     at = {entry.name: entry.at for entry in job.sewing.pieces if entry.at is not None}
-    with output_folder(out, ["metrics.json", "drape.png", "drape.webp", "frames.usdc"], sources=job.sources) as folder:
+    names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc"]
+    with output_folder(out, names, sources=job.sources, guard=True) as folder:
         require_own_metrics(folder)
         report_activity("draping")
         with errors_named(job.name):
@@ -294,10 +295,10 @@ def drape_outside(
             draped, more = drape_pattern(
                 pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
             )
-        files = [*write_drape_files(draped, folder, frames=True), "frames.usdc", "metrics.json"]
+        files = [*write_drape_files(draped, folder, frames=True), "metrics.json"]
         body = {} if job.body is None else {"mannequin": job.body.metrics()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": draped.measures()})
-        metrics, stale = remove_stale(folder, measured, name=job.name, files=files)
+        metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)
     return SceneResult(metrics=metrics, files=tuple(files), notes=(*notes, *more, *stale))
 
 

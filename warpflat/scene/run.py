@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
     from warpflat.scene.frames import Film, FrameRecorder
     from warpflat.scene.schema import SceneTable
+    from warpflat.surface.border_seams import NamedSeam
 
 # From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
 _MANY = 500_000
@@ -77,7 +79,7 @@ def run_scene(
     from warpflat.core.manifest import require_own_metrics
 
     sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
-    with output_folder(out, files_of_run(scene), sources=sources) as folder:
+    with output_folder(out, files_of_run(scene), sources=sources, guard=True) as folder:
         require_own_metrics(folder)
         if scene.settings.mannequin is not None:
             from warpflat.scene.run_garment import run_garment
@@ -124,9 +126,8 @@ def _run_surface(
     _check_edges(scene, sequences, drawing)
     surfaces = [sequence.surface for sequence in sequences]
     notes = [note for sequence in sequences for note in sequence.notes]
-    wanted = FrameSchedule(settings.output).wanted
     vertices = sum(len(surface.vertices) for surface in surfaces)
-    require_memory_for_run(vertices, frames=wanted)
+    require_memory_for_run(vertices, frames=FrameSchedule(settings.output).wanted)
     with ExitStack() as beside:
         with Film(folder, settings.output, surfaces) as film:
 
@@ -145,6 +146,7 @@ def _run_surface(
                 whole = pieces
                 if sewn is None and len(pieces) > 1:
                     notes.append("no borders meet in space, vertex by vertex: the pieces are not sewn to each other")
+            notes = [*_unsewn(whole, seams), *notes]
             notes += [message for piece in whole for message in piece.messages]
             fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
             pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
@@ -162,8 +164,7 @@ def _run_surface(
             pattern=pattern,
             fit=fit,
             more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
-            files=drape_files,
-            frames=wanted,
+            files=dict.fromkeys([*drape_files, *film.files]),
             notes=notes,
         )
 
@@ -295,6 +296,18 @@ def _flatten_pieces(
     for piece in sewn.pieces:
         film.recorders[piece.surface.name].record_result(piece)
     return sewn.pieces, sewn
+
+
+def _unsewn(pieces: Sequence[Flattening], seams: Sequence[NamedSeam]) -> list[str]:
+    """Return notes on borders that run along each other and are not sewn; at most three, and how many more there are."""
+    from warpflat.garment.sew_pieces import unsewn_borders
+
+    surfaces = {piece.surface.name: piece.network.surface for piece in pieces}
+    named = [surface.lines[side] for surface in surfaces.values() for seam in seams for side in seam.sides]
+    without = {(min(edge), max(edge)) for line in named for edge in pairwise(line.tolist())}
+    found = unsewn_borders(surfaces, without=without)
+    more = [f"{len(found) - 3} more stretches of border run along others and are not sewn"] if len(found) > 3 else []
+    return [*found[:3], *more]
 
 
 def _check_edges(scene: Scene, sequences: Sequence[CutSequence], drawing: PatternOptions) -> None:

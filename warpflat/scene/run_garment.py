@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
+from warpflat.core.atomic_files import files_written
 from warpflat.core.beside import Beside
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
+from warpflat.core.optional_files import optional_file
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
@@ -209,8 +211,17 @@ def _run_plan(
             require_open_darts(scene, graded.values())
             drafted = partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out)
             pattern = beside.enter_context(Beside(drafted, "drafting the pattern"))
-        draped = write_drape(scene, garment, out, device=device)
-        return _finish(plan, garment, graded, out, draped=draped, pictures=pictures, pattern=pattern)
+        draped, files = write_drape(scene, garment, out, device=device)
+        return _finish(
+            plan,
+            garment,
+            graded,
+            out,
+            draped=draped,
+            files=list(dict.fromkeys([*files, *film.files])),
+            pictures=pictures,
+            pattern=pattern,
+        )
 
 
 def _advised(plan: GarmentPlan, garment: Garment) -> dict[str, Flattening]:
@@ -267,11 +278,12 @@ def _write_pieces(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
     files = garment.write_files(out, picture=settings.output.picture)
     if not settings.output.picture or (settings.wear is None and (wearer is None or not wearer.is_stretched)):
         return files
-    from warpflat.flattening.fit_picture import write_wear_sheet
+    with optional_file(out / "wear.png", files) as path:
+        from warpflat.flattening.fit_picture import write_wear_sheet
 
-    on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
-    write_wear_sheet(out / "wear.png", list(garment.pieces.values()), title=garment.name, on_body=on_body)
-    return [*files, "wear.png"]
+        on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
+        write_wear_sheet(path, list(garment.pieces.values()), title=garment.name, on_body=on_body)
+    return files
 
 
 def _own_size(plan: GarmentPlan) -> str:
@@ -292,11 +304,12 @@ def _write_pattern(plan: GarmentPlan, sizes: Mapping[str, Garment], out: Path) -
     )
     if not (settings.output.picture and pattern.walked):
         return pattern
-    from warpflat.export.picture_walked import write_walked_picture
+    files = list(pattern.files)
+    with optional_file(out / "walked.png", files) as path:
+        from warpflat.export.picture_walked import write_walked_picture
 
-    file = "walked.png"
-    write_walked_picture(out / file, pattern.walked, title=scene.name)
-    return replace(pattern, files=(*pattern.files, file))
+        write_walked_picture(path, pattern.walked, title=scene.name)
+    return replace(pattern, files=tuple(files))
 
 
 def _finish(
@@ -305,7 +318,8 @@ def _finish(
     graded: Mapping[str, Garment],
     out: Path,
     *,
-    draped: tuple[dict[str, Any], list[str]],
+    draped: Mapping[str, Any],
+    files: Sequence[str],
     pictures: Beside[list[str]],
     pattern: Beside[WrittenPattern],
 ) -> SceneResult:
@@ -316,26 +330,28 @@ def _finish(
         garment: in the mannequin's own size.
         graded: the garment in the other sizes of the pattern.
         out: an existing folder.
-        draped: entries and files of the drape.
+        draped: entries of the drape.
+        files: of the drape, and the film if there is one.
         pictures, pattern: write the pieces with their pictures, and the pattern.
     """
     from warpflat.export.letters import note_on_names
 
     scene, settings = plan.scene, plan.scene.settings
-    measured, film = garment.metrics(), packed_film(scene, out)
-    files, images = [*draped[1], "metrics.json"], packed_pictures(scene, out, draped[1])
-    if FrameSchedule(settings.output).wanted:
-        files.append("frames.usdc")
+    measured, film = garment.metrics(), packed_film(scene, out, files)
+    images = packed_pictures(scene, out, files)
     drawn = pictures.result()
-    files = [*drawn, *files]
+    files = [*drawn, *files, "metrics.json"]
     images |= packed_pictures(scene, out, drawn)  # while the pattern is drafted
     written = pattern.result()
-    measured |= {**_metrics_of_sizes(graded), **draped[0], **written.metrics}
+    measured |= {**_metrics_of_sizes(graded), **draped, **written.metrics}
     if settings.mannequin is not None:
         measured["mannequin"] = {**measured["mannequin"], "table": settings.mannequin.model_dump(exclude_defaults=True)}
     files += written.files
     files += [*review_files(scene, measured, out, tuple(files), film, images)]
-    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
+    drape = settings.drape is not None
+    # The body belongs to the film.
+    known = [*files, *([MANNEQUIN] if any(name == MANNEQUIN for _, name in files_written()) else [])]
+    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=known, drape=drape)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *written.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=tuple(files), notes=notes)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from warpflat.scene.frames import FrameSchedule
 
 if TYPE_CHECKING:
     from warpflat.core.beside import Beside
@@ -65,18 +63,18 @@ def measure_fit(
     """
     from warpflat.core.activity import report_activity
     from warpflat.core.atomic_files import file_in
+    from warpflat.core.optional_files import optional_file
     from warpflat.cutting.remedies import advise
 
     report_activity("measuring how it fits")
     advised = [advise(piece) for piece in pieces]
-    files = []
+    files = list[str]()
     if scene.settings.wear is not None and scene.settings.output.picture:
-        from warpflat.flattening.fit_picture import write_wear_picture
-
         for piece in advised:
-            picture = file_in(folder, piece.surface.name, ".wear.png")
-            write_wear_picture(picture, piece)
-            files.append(picture.name)
+            with optional_file(file_in(folder, piece.surface.name, ".wear.png"), files) as picture:
+                from warpflat.flattening.fit_picture import write_wear_picture
+
+                write_wear_picture(picture, piece)
     return {piece.surface.name: piece.measures for piece in advised}, files
 
 
@@ -89,8 +87,7 @@ def write_surface(
     pattern: Beside[WrittenPattern],
     fit: Beside[tuple[dict[str, dict[str, Any]], list[str]]],
     more: Mapping[str, Any],
-    files: Sequence[str] = (),
-    frames: bool,
+    files: Iterable[str] = (),
     notes: Sequence[str],
 ) -> SceneResult:
     """Write the last files of a flattened surface when all others are there, and remove what earlier runs have left.
@@ -102,8 +99,7 @@ def write_surface(
         pictures, pattern: write the pieces with their picture, and the pattern.
         fit: measures how the pieces fit.
         more: entries of `metrics.json` besides the pieces.
-        files: that have been written already, by name.
-        frames: whether `frames.usdc` has been written.
+        files: that have been written already, by name, `frames.usdc` among them if there is a film.
         notes: what was repaired or chosen until now.
 
     Raises:
@@ -114,40 +110,49 @@ def write_surface(
     from warpflat.flattening.result import run_metrics
 
     settings = scene.settings
-    film = packed_film(scene, folder)
-    files = [*files, *pictures.result()]
+    files = list(files)
+    film = packed_film(scene, folder, files)
+    files += pictures.result()
     entries, worn = fit.result()
     files += [*worn, "metrics.json"]
-    if frames:
-        files.append("frames.usdc")
     images = packed_pictures(scene, folder, files)  # while the pattern is written
     drawn = pattern.result()
     measured = {**run_metrics(entries, pieces[0].network.device, more), **drawn.metrics}
     files += [*drawn.files, *review_files(scene, measured, folder, (*files, *drawn.files), film, images)]
-    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files)
+    drape = settings.drape is not None
+    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files, drape=drape)
     name_notes = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
     notes = (*notes, *drawn.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
 
 
-def packed_film(scene: Scene, folder: Path) -> Mapping[str, Any] | None:
-    """Return the film that has been written, packed for `review.html`; None if the scene wants no such page, or it is too large for one."""
-    output = scene.settings.output
-    if not (output.picture and output.review and FrameSchedule(output).wanted):
-        return None
-    from warpflat.review.page import pack_frames
+def packed_film(scene: Scene, folder: Path, files: Sequence[str]) -> Mapping[str, Any] | None:
+    """Return the film, if it is among the files that have been written, packed for `review.html`.
 
-    return pack_frames(folder)
+    It is None if the scene wants no such page, or the film is too large for one, or cannot be packed, which is a note.
+    """
+    from warpflat.core.optional_files import optional_file
+
+    output, packed = scene.settings.output, None
+    if output.picture and output.review and "frames.usdc" in files:
+        with optional_file(folder / "review.html", [], part="the film"):
+            from warpflat.review.page import pack_frames
+
+            packed = pack_frames(folder)
+    return packed
 
 
 def packed_pictures(scene: Scene, folder: Path, files: Sequence[str]) -> dict[str, str]:
     """Return the pictures among the files that have been written, packed for `review.html` if the scene wants it."""
-    output = scene.settings.output
-    if not (output.picture and output.review):
-        return {}
-    from warpflat.review.page import pack_pictures
+    from warpflat.core.optional_files import optional_file
 
-    return pack_pictures(folder, files)
+    output, packed = scene.settings.output, dict[str, str]()
+    if output.picture and output.review:
+        with optional_file(folder / "review.html", []):
+            from warpflat.review.page import pack_pictures
+
+            packed = pack_pictures(folder, files)
+    return packed
 
 
 def review_files(
@@ -168,9 +173,12 @@ def review_files(
         film: of :func:`packed_film`.
         pictures: of :func:`packed_pictures`.
     """
-    output = scene.settings.output
-    if not (output.picture and output.review):
-        return []
-    from warpflat.review.page import write_review
+    from warpflat.core.optional_files import optional_file
 
-    return [write_review(folder, metrics, files, name=scene.name, film=lambda: film, pictures=pictures)]
+    output, written = scene.settings.output, list[str]()
+    if output.picture and output.review:
+        with optional_file(folder / "review.html", written):
+            from warpflat.review.page import write_review
+
+            write_review(folder, metrics, files, name=scene.name, film=lambda: film, pictures=pictures)
+    return written

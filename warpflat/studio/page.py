@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import io
-import socket
 import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import numpy as np
 import viser
@@ -22,8 +20,10 @@ from warpflat.draping.result import Drape
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.scene.load import Scene
 from warpflat.studio.cut_tables import cut_along, cut_between, cuttable_lines
+from warpflat.studio.door import Door
 from warpflat.studio.frame import PieceFrame
 from warpflat.studio.maps import Scale, drape_gaps, drape_scale, piece_scale
+from warpflat.studio.messages import read_message
 from warpflat.studio.panel import Actions, Panel
 from warpflat.studio.pick import Hit, nearest_line
 from warpflat.studio.save import free_name
@@ -40,18 +40,22 @@ _BETWEEN, _BETWEEN_WORDS = 0.1, 0.02
 
 
 class Page:
-    """A studio in the browser."""
+    """A studio in the browser.
+
+    Attributes:
+        url: of the page, with the token that lets in.
+    """
 
     def __init__(self, scene: Scene, *, host: str, port: int, out: Path) -> None:
         """Serve a scene's studio.
 
         Raises:
-            InputError: the port is taken.
+            InputError: the port is taken, or the address is not of this machine.
         """
+        self.door = Door(host, port)
         self._worker = Worker()
         self.session = Session(scene, self._worker, out=out, on_change=self._changed, on_frame=self._take)
-        self.server = _serve(host, port)
-        self.url = f"http://{host}:{self.server.get_port()}"
+        self.server, self.url = _serve(self.door, self.session), self.door.url
         self._kind = "energy"
         self._drape_of: Step | None = None  # whose drape has been asked for
         self.scale: Scale | None = None
@@ -258,7 +262,9 @@ class Page:
 
     def _try_part(self, part: tuple[float, float]) -> None:
         picked, solution = self._picked, self.session.solution
-        if picked is not None and solution is not None:
+        if picked is None or solution is None:
+            self.session.tell("pick a line first; the part is one of a line")
+        else:
             self._try(lambda: cut_along(solution, *picked, part))
 
     def _try(self, table: Callable[[], dict[str, Any]]) -> None:
@@ -281,40 +287,18 @@ def _runs(frame: PieceFrame) -> dict[str, IntArray]:
     return {name: np.asarray(ids) for name, ids in frame.surface.lines.items() if len(ids) > 1}
 
 
-def _serve(host: str, port: int) -> viser.ViserServer:
-    """Start a server on this address and no other.
-
-    Raises:
-        InputError: the port is taken, or the address is not of this machine.
-    """
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            trial.bind((host, port))
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise InputError(f"cannot serve on {host}:{port}: {reason}; give another --port, or --host") from None
+def _serve(door: Door, session: Session) -> viser.ViserServer:
+    """Start a server behind a door; what a page says wrongly, and what fails of what it asks for, is one line of the session."""
     # It greets on standard output, which is for results.
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host=host, port=port, label="warpflat studio", verbose=False)
-    _refuse_other_sites(server)
-    # A page that anybody may open through a foreign machine is nothing that a click should make.
-    server.request_share_url = lambda *_, **__: None
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        door.guard(lambda said: read_message(said, server.gui._gui_input_handle_from_uuid), session.tell),
+    ):
+        server = viser.ViserServer(label="warpflat studio", verbose=False)
+    # Each callback of viser goes through here.
+    submit = server._thread_executor.submit
+    server._thread_executor.submit = lambda act, *event: submit(session.attempt, lambda: act(*event))
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(340)
     return server
-
-
-def _refuse_other_sites(server: viser.ViserServer) -> None:
-    """Close connections that a page of another site has opened: a browser lets any page talk to this machine."""
-    websocket = server._websock_server
-
-    async def check(connection: Any) -> None:
-        live = websocket._live_connections[connection.client_id]
-        headers = live.request.headers
-        origin = headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != headers.get("Host"):
-            await live.close(1008, "the studio talks to its own page only")
-
-    websocket.on_client_connect(check)

@@ -9,7 +9,7 @@ from typing import Any
 
 from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name, plain_name
+from warpflat.core.file_names import check_file_name, make_file_name, plain_name
 from warpflat.core.toml_file import document_as_toml
 from warpflat.flattening.progress import Progress
 from warpflat.scene.load import Scene, load_scene
@@ -52,7 +52,7 @@ def scene_file(scene: Scene, name: str) -> Path:
         InputError: no file can bear it.
     """
     try:
-        return scene.folder / f"{plain_name(name.strip().removesuffix('.toml'))}.toml"
+        return scene.folder / f"{check_file_name(plain_name(name.strip().removesuffix('.toml')))}.toml"
     except ValueError as error:
         raise InputError(f"name: {error}") from None
 

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from warpflat.core.activity import activity_listener
 from warpflat.core.errors import InputError
+from warpflat.core.text import one_line
 from warpflat.draping.drape_garment import drape
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.result import Drape
@@ -334,9 +335,24 @@ class Session:
         self._run("saving", job, to_its_end=True)
 
     def tell(self, error: str) -> None:
-        """Show a mistake."""
-        self.error = error
+        """Show a mistake, in one line."""
+        self.error = one_line(error)
         self._on_change()
+
+    def attempt(self, act: Callable[[], None]) -> None:
+        """Do what is asked for; a mistake of the user becomes one line, and so does a fault of the program."""
+        try:
+            act()
+        except Superseded:
+            raise
+        except InputError as error:
+            self.tell(str(error))
+        except OSError as error:
+            self.tell(f"cannot read or write {error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
+        except Exception as error:
+            # The page must not fall silent over a fault of the program.
+            traceback.print_exc(file=sys.stderr)
+            self.tell(f"fault of the program: {type(error).__name__}: {error}; see the console")
 
     def is_taken(self, name: str) -> bool:
         """Return whether there is a scene of a name already."""
@@ -397,19 +413,14 @@ class Session:
                 self._on_change()
                 ticket.go_on()
 
-            try:
+            def listened() -> None:
                 with activity_listener(listen):
                     if activity:
                         listen(activity)
                     job(ticket)
-            except InputError as error:
-                self.error = str(error)
-            except Superseded:
-                raise
-            except Exception as error:
-                # The page must not fall silent over a fault of the program.
-                traceback.print_exc(file=sys.stderr)
-                self.error = f"fault of the program: {type(error).__name__}: {error}; see the console"
+
+            try:
+                self.attempt(listened)
             finally:
                 self.activity = ""
                 self._on_change()

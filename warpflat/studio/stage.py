@@ -222,7 +222,8 @@ class Stage:
         half = np.tan(0.5 * _FOV)
         away = _ROOM * max(0.5 * height / half, 0.5 * width / (half * aspect))
         angle = np.radians(side)
-        with client.atomic():
+        # A page that is closed in this moment is none to be warned of.
+        with client.atomic(), client._websock_connection.get_message_buffer().sanctioned_dead_writes():
             client.camera.fov = _FOV
             client.camera.up_direction = (0.0, 1.0, 0.0)
             # Moving a camera moves what it looks at along with it.

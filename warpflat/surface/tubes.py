@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.connectivity import border_loops
+from warpflat.surface.connectivity import border_loops, components
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
@@ -13,15 +13,24 @@ __all__ = ["tube_borders"]
 
 
 def tube_borders(surface: Surface) -> list[IntArray]:
-    """Return the borders around which the surface is a tube, each a row of vertices; the longest border is none of them.
+    """Return the borders around which the surface is a tube, each a row of vertices; the longest of a connected part is none of them.
 
     A flat ring turns once around at each of its borders, a tube at neither.
     """
     loops = border_loops(surface.faces, surface.vertices)
     if len(loops) < 2:
         return []
+    part = np.zeros(len(surface.vertices), dtype=np.int32)
+    part[surface.faces] = components(surface.faces)[:, None]
+    longest: dict[int, int] = {}
+    for number, loop in enumerate(loops):
+        longest.setdefault(int(part[loop[0]]), number)
     angle = _corner_angles(surface)
-    return [loop for loop in loops[1:] if float((np.pi - angle[loop]).sum()) > -np.pi]
+    return [
+        loop
+        for number, loop in enumerate(loops)
+        if number not in longest.values() and float((np.pi - angle[loop]).sum()) > -np.pi
+    ]
 
 
 def _corner_angles(surface: Surface) -> FloatArray:

@@ -16,6 +16,7 @@ from warpflat.core.text import format_count
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
 
 __all__ = ["read_pieces"]
@@ -73,8 +74,16 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
         notes.append(f"{format_count(closed, 'closed part')}, such as a button, left out")
     if small:
         notes.append(f"{format_count(small, 'part')} of less than {1e3 * POSSIBLE[0]:g} mm left out")
-    found[0] = replace(found[0], notes=(*notes, *found[0].notes))
-    return _named_apart(found)
+    named = _named_apart(found)
+    layers = [Layer(surface.vertices, surface.faces) for surface in named]
+    doubled = doubled_layers(layers)
+    notes += [
+        f"{layers[number].describe()} of {named[number].name} dropped: a second layer that lies on {named[other].name} everywhere"
+        for number, other in doubled.items()
+    ]
+    # Without its second layer a piece may be alone of its name.
+    kept = _named_apart([surface for number, surface in enumerate(found) if number not in doubled])
+    return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
 
 
 def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:

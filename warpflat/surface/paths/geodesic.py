@@ -46,14 +46,14 @@ def distance_from(surface: Surface, line: ArrayLike) -> FloatArray:
     return _GeodesicField(surface, _short_triangles(surface), path).distance
 
 
-def _short_triangles(surface: Surface) -> IntArray:
-    """Return the faces as triangles (#T by 3), quads split along their shorter diagonal."""
+def _short_triangles(surface: Surface, *, distinct: bool = False) -> IntArray:
+    """Return the faces as triangles (#T by 3), quads split along their shorter diagonal; `distinct` as of :func:`triangulate`."""
     if not surface.is_quad.any():
         return np.ascontiguousarray(surface.faces[:, :3])
     lengths, quads = unfold_quad_diagonals(surface.vertices, surface.faces)
     other = np.zeros(len(surface.faces), dtype=bool)
     other[quads] = lengths[:, 1] < lengths[:, 0] * (1 - 1e-9)
-    return triangulate(surface.faces, other_diagonal=other)[0]
+    return triangulate(surface.faces, other_diagonal=other, distinct=distinct)[0]
 
 
 def signed_distance_and_station(
@@ -137,8 +137,11 @@ def _ahead(surface: Surface, path: list[int]) -> list[int]:
     reach = 2 * float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
     if size == 0:
         return []
-    tracer = potpourri3d.GeodesicTracer(surface.vertices, _short_triangles(surface))
-    trace = np.asarray(tracer.trace_geodesic_from_vertex(path[-1], direction / size * reach))
+    try:
+        tracer = potpourri3d.GeodesicTracer(surface.vertices, _short_triangles(surface, distinct=True))
+        trace = np.asarray(tracer.trace_geodesic_from_vertex(path[-1], direction / size * reach))
+    except RuntimeError:  # of the library: the triangles are no manifold
+        return []
     if len(trace) < 2 or not np.isfinite(trace).all():
         return []
     try:

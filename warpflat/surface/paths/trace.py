@@ -73,7 +73,7 @@ class SurfacePath:
 def path_triangles(surface: Surface) -> tuple[IntArray, IntArray]:
     """Return the triangles that paths run over: #T by 3 vertices, and #T, the face of each.
 
-    A quad is split along its corners 0-2, or along 1-3 where only that diagonal lies inside it.
+    A quad is split along its corners 0-2, or along 1-3 where only that diagonal lies inside it, or no other edge has its ends.
     """
     corner = surface.vertices[surface.faces]
 
@@ -82,7 +82,8 @@ def path_triangles(surface: Surface) -> tuple[IntArray, IntArray]:
         two = np.cross(corner[:, c] - corner[:, a], corner[:, d] - corner[:, a])
         return np.einsum("ij,ij->i", one, two) < 0
 
-    return triangulate(surface.faces, other_diagonal=folds(0, 1, 2, 3) & ~folds(1, 2, 3, 0))
+    inside = folds(0, 1, 2, 3) & ~folds(1, 2, 3, 0)
+    return triangulate(surface.faces, other_diagonal=inside, distinct=True)
 
 
 def make_path(surface: Surface, places: Sequence[Place], *, closed: bool = False) -> SurfacePath:
@@ -192,8 +193,14 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
     part = np.concatenate([part, [part[next(iter(place))] for place in inserted.values()]]).astype(np.int64)
     keep = part == part[stops[0]]
     number = np.cumsum(keep) - 1
-    solver = potpourri3d.EdgeFlipGeodesicSolver(positions[keep], number[triangles[keep[triangles[:, 0]]]])
-    drawn = solver.find_geodesic_path(int(number[stops[0]]), int(number[stops[1]]))
+    try:
+        solver = potpourri3d.EdgeFlipGeodesicSolver(positions[keep], number[triangles[keep[triangles[:, 0]]]])
+        drawn = solver.find_geodesic_path(int(number[stops[0]]), int(number[stops[1]]))
+    except RuntimeError:  # of the library: the triangles are no manifold
+        raise InputError(
+            f"no straight path can be drawn from {describe_place(ends[0])} to {describe_place(ends[1])}: faces of the part meet in more "
+            "than an edge; give triangles there"
+        ) from None
     walked = _retrace(positions, triangles, np.asarray(drawn), stops[0], stops[1])
     return make_path(surface, simplify_places([_in_old_vertices(place, inserted) for place in walked]))
 

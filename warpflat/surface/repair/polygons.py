@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.surface.half_edges import HalfEdges
 from warpflat.surface.vectors import cross, dot, points_at
 
 __all__ = [
@@ -18,8 +19,8 @@ __all__ = [
     "list_some",
     "pad_corners",
     "pad_polygons",
-    "split_non_convex_quads",
     "split_polygons",
+    "split_quads",
 ]
 
 # Entries of the table of faces, faces times the largest count of corners: a gigabyte.
@@ -170,44 +171,75 @@ def _plane_axes(normal: FloatArray) -> FloatArray:
     return np.array([v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in (first, second)])
 
 
-def split_non_convex_quads(
-    vertices: FloatArray, faces: IntArray, origin: IntArray, tolerance: float
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Return quads with a straight or inward corner, cut into two triangles from that corner.
+def split_quads(
+    vertices: FloatArray, he: HalfEdges, origin: IntArray, tolerance: float
+) -> tuple[IntArray, IntArray, dict[str, IntArray]]:
+    """Cut quads into two triangles that cannot lie flat as they are.
 
-    The corner triangle there would have no area, or a negative one, and could not be distinguished from a flipped one.
+    - At a straight or inward corner the corner triangle has no area, or a negative one, and could not be distinguished from a flipped
+      one: the quad is cut from that corner.
+    - A quad whose sides cross, or whose halves meet at less than a right angle, is cut along the diagonal at which they lie flatter.
+    - Two quads that alone surround a vertex (a doublet) cannot both be convex in the plane, and cut across it they would share their
+      diagonal: both are cut from that vertex.
 
     Args:
         vertices: #V by 3, positions [m].
-        faces: #F by 4.
+        he: half-edges of the faces.
         origin: #F, the input face of each.
         tolerance: a corner counts as straight if its height over the diagonal before it is below this share of the
             quad's mean edge.
 
     Returns:
-        Faces, origins, and the input faces that were cut.
-
-    Raises:
-        InputError: naming the quad whose sides cross.
+        Faces, origins, and the input faces that were cut, by what they were.
     """
+    faces = he.faces
     quads = np.flatnonzero(faces[:, 3] >= 0)
     height, inward, thin, crossed = _quad_corners(vertices[faces[quads]], tolerance)
-    if crossed.any():
-        raise InputError(
-            f"face {origin[quads[np.argmax(crossed)]]} (counted from 0) is a quad whose sides cross, or is folded by more than "
-            "90 degrees; list its corners in order around it, or give triangles"
-        )
-    cut = inward.any(axis=1) & ~thin
+    in_two = np.bincount(faces.ravel() + 1)[1:] == 2
+    in_two[he.edges[he.count != 2].ravel()] = False
+    lonely = in_two[faces[quads]]
+    doublet = lonely.any(axis=1) & ~crossed & ~(inward.any(axis=1) & ~thin)
+    cut = (inward.any(axis=1) & ~thin) | crossed | doublet
     if not cut.any():
-        return faces, origin, np.empty(0, dtype=np.int32)
+        return faces, origin, {}
     rows, corner = quads[cut], np.argmin(height[cut], axis=1)
+    folded, paired = crossed[cut], doublet[cut]
+    corner[folded] = _flatter_diagonals(vertices[faces[rows[folded]]], tolerance)
+    corner[paired] = np.argmax(lonely[doublet], axis=1)
     turned = faces[rows][np.arange(len(rows))[:, None], (corner[:, None] + np.arange(4)) % 4]
     none = np.full(len(rows), -1, dtype=np.int32)
     out = faces.copy()
     out[rows] = np.column_stack([turned[:, :3], none])
     second = np.column_stack([turned[:, 0], turned[:, 2], turned[:, 3], none])
     # Each second half directly behind its first keeps the order of the input faces.
-    return np.insert(out, rows + 1, second, axis=0), np.insert(origin, rows + 1, origin[rows]), origin[rows]
+    faces, of = np.insert(out, rows + 1, second, axis=0), np.insert(origin, rows + 1, origin[rows])
+    kinds = {
+        "with a straight or inward corner": ~folded & ~paired,
+        "folded over, or with crossing sides,": folded,
+        "that meet another at a vertex of no other face": paired,
+    }
+    return faces, of, {what: origin[rows[which]] for what, which in kinds.items() if which.any()}
+
+
+def _flatter_diagonals(p: FloatArray, tolerance: float) -> IndexArray:
+    """Return #Q, the diagonal (0 for corners 0-2, 1 for 1-3) at which the halves of a quad lie flatter; of two alike the shorter.
+
+    Args:
+        p: #Q by 4 by 3, their corners [m].
+        tolerance: a half is a sliver below this share of the quad's mean edge, squared.
+    """
+    side = np.roll(p, -1, axis=1) - p
+    # The normal of each corner triangle; corners 1 and 3 are the halves along 0-2.
+    normal = np.cross(np.roll(side, 1, axis=1), side)
+    size = np.linalg.norm(normal, axis=2)
+    unit = normal / np.maximum(size, np.finfo(float).tiny)[..., None]
+    bent = np.stack([np.einsum("qi,qi->q", unit[:, k], unit[:, k + 2]) for k in (1, 0)], axis=1)
+    thin = np.stack([np.minimum(size[:, k], size[:, k + 2]) for k in (1, 0)], axis=1)
+    mean = np.linalg.norm(side, axis=2).mean(axis=1, keepdims=True)
+    flatness = np.where(thin > tolerance * mean**2, bent.round(6), -2.0)
+    first, second = (np.linalg.norm(p[:, k + 2] - p[:, k], axis=1) for k in (0, 1))
+    better, equal = flatness[:, 1] > flatness[:, 0], flatness[:, 1] == flatness[:, 0]
+    return (better | (equal & (second < first))).astype(np.intp)
 
 
 def find_crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
@@ -232,7 +264,7 @@ def _quad_corners(p: FloatArray, tolerance: float) -> tuple[NDArray[Any], ...]:
 
     Args:
         p: #Q by 4 by 3, their corners [m].
-        tolerance: see :func:`split_non_convex_quads`.
+        tolerance: see :func:`split_quads`.
 
     Returns:
         #Q by 4, the height of each corner over the diagonal before it [m]; #Q by 4, true where it is straight or inward; #Q, true for

@@ -21,13 +21,14 @@ from warpflat.core.text import format_count
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.mesh_lines import checked_line, renumber_lines
 from warpflat.surface.repair.polygons import (
     distinct_corners,
     list_some,
     pad_polygons,
-    split_non_convex_quads,
     split_polygons,
+    split_quads,
 )
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
@@ -167,6 +168,7 @@ def _checked_surface(
     paths = {key: checked_line(key, line, len(positions)) for key, line in lines.items()}
     place = _weld(mesh, weld, split_corners, component is not None)
     _drop_double_faces(mesh)
+    _drop_double_layers(mesh)
     _choose_component(mesh, component)
     _refuse_crowded_edges(mesh)
     faces, turned = orient(mesh.half_edges)
@@ -296,6 +298,25 @@ def _drop_double_faces(mesh: _Mesh) -> None:
     mesh.keep(keep)
 
 
+def _drop_double_layers(mesh: _Mesh) -> None:
+    """Drop parts that lie on another part everywhere, with vertices of their own."""
+    count = int(mesh.part.max()) + 1
+    if count == 1:
+        return
+    layers = []
+    for number in range(count):
+        faces = mesh.faces[mesh.part == number]
+        used, place = np.unique(faces, return_inverse=True)
+        rows = place.reshape(faces.shape).astype(np.int32) - (used[0] < 0)
+        layers.append(Layer(mesh.vertices[used[used >= 0]], rows))
+    doubled = list(doubled_layers(layers))
+    if doubled:
+        mesh.notes += [
+            f"{layers[number].describe()} dropped: a second layer that lies on another part" for number in doubled
+        ]
+        mesh.keep(~np.isin(mesh.part, doubled))
+
+
 def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -> None:
     label = mesh.part
     sizes = np.bincount(label)
@@ -411,11 +432,9 @@ def _check_border(he: HalfEdges) -> None:
 
 def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: FloatArray, tolerance: float) -> Surface:
     """Merge slivers, drop the vertices that this leaves over, and put the surface together."""
-    mesh.faces, mesh.origin, cut = split_non_convex_quads(mesh.vertices, mesh.faces, mesh.origin, tolerance)
-    if len(cut):
-        mesh.notes.append(
-            f"{format_count(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
-        )
+    mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, tolerance)
+    for what, which in cut.items():
+        mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")
     before = len(mesh.vertices)
     faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.half_edges, lines, tolerance)
     if len(left):

@@ -1,0 +1,109 @@
+"""Kinds of the fuzz for geometry: scenes of garments with all tables, seams, and files of several pieces, layers and tubes."""
+
+from __future__ import annotations
+
+import functools
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from .promise import Case
+
+__all__ = ["GEOMETRY_SHARES", "garment_meshes", "geometry_case"]
+
+GEOMETRY_SHARES = {"form": 3, "tables": 6, "pieces": 6, "open": 4}
+"""How many of a hundred cases, or so, are of which kind: a form takes seconds."""
+
+_QUIET = "[output]\nframes = 0\npicture = false\nreview = false\n"
+_BODY = "[mannequin]\nsize = 'EU 40'\nresolution_mm = 40\n[relax]\nmax_steps = 30\n"
+_FORMS = (
+    "fabric = 'woven'\nform = 'a_line_skirt'\nshape = 'darts'\n"
+    + _BODY
+    + "[[openings]]\nkind = 'zip'\nseam = 'side left'\nlength_mm = 180\n[ease]\nwaist = 1.0\nhip = 4.0\n"
+    "[[cuts]]\npiece = 'front'\nline = 'princess front left'\nomit = true\n" + _QUIET,
+    "fabric = 'woven'\nform = {like = 'dress'}\n"
+    + _BODY
+    + "[[openings]]\nkind = 'buttons'\nseam = 'centre front'\nwidth_mm = 20\nbutton_mm = 18\nspacing_mm = 90\n"
+    "[[pockets]]\nkind = 'patch'\npiece = 'front_left'\nline = 'hip'\nbelow_mm = 20\nfrom_centre_mm = 70\n"
+    "[cloth]\ninterfacing = 'interfacing'\n" + _QUIET,
+)
+_SURFACES = (
+    "[surface]\nshape = 'cone'\nresolution = 7\n[[seams]]\nname = 'back'\nsides = ['left', 'right']\nfullness = 0.02\nlonger = 'left'\n"
+    "[[constraints]]\nline = 'bottom'\nlength_mm = 'body'\n" + _QUIET,
+    "[surface]\nfile = 'tube.obj'\nunits = 'm'\n[[cuts]]\nname = 'side'\nfrom = [0.1, 0.0, 0.0]\nto = [0.1, 0.3, 0.0]\n"
+    "[[cuts]]\nname = 'dart'\nfrom = [-0.1, 0.0, 0.0]\nto = [-0.1, 0.1, 0.0]\ntip_back = 0.01\n[relax]\nmax_steps = 30\n"
+    + _QUIET,
+    "[surface]\nfile = 'tube.obj'\nunits = 'm'\n[[cuts]]\nname = 'across'\nplane = {point = [0.1, 0.16, 0.0], normal = [0.0, 1.0, 0.0]}\n"
+    "[[cuts]]\nname = 'half'\nplane = {point = [0.0, 0.1, 0.1], normal = [1.0, 0.0, 0.0]}\n[relax]\nmax_steps = 30\n"
+    + _QUIET,
+    "fabric = 'woven'\n[surface]\nfile = 'pieces.obj'\nunits = 'm'\ncomponent = 'all'\n[relax]\nmax_steps = 30\n"
+    + _QUIET,
+    "[surface]\nshape = 'dome'\nresolution = 5\n[drape]\nmax_steps = 20\nfriction = 0.2\n" + _QUIET,
+)
+
+
+def _obj(parts: list[tuple[str, Any, Any]]) -> bytes:
+    rows, before = list[str](), 1
+    for name, points, quads in parts:
+        rows += [f"o {name}", *(f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points)]
+        rows += ["f " + " ".join(str(before + int(k)) for k in quad) for quad in quads]
+        before += len(points)
+    return "\n".join([*rows, ""]).encode()
+
+
+@functools.cache
+def garment_meshes() -> dict[str, bytes]:
+    """Meshes by name: a tube; two pieces that meet; doubled layers; shorts; a sheet with a doublet and a folded quad."""
+    rows, around = 7, 12
+    angle, height = 2 * np.pi * np.arange(around) / around, np.linspace(0, 0.3, rows)
+    wide = 0.1 + 0.02 * np.cos(angle)[None, :] * (height / 0.3)[:, None]
+    tube = np.stack([wide * np.cos(angle), np.repeat(height[:, None], around, 1), wide * np.sin(angle)], -1).reshape(
+        -1, 3
+    )
+    at = np.arange(rows * around).reshape(rows, around)
+    belt = np.stack([at[:-1], np.roll(at, -1, 1)[:-1], np.roll(at, -1, 1)[1:], at[1:]], -1).reshape(-1, 4)
+    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 0.3, 6), np.linspace(0, 0.4, 7)))
+    front = np.stack([u, v, 0.05 * np.sin(np.pi * u / 0.3)], -1)
+    grid = np.arange(42).reshape(7, 6)
+    sheet = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], -1).reshape(-1, 4)
+    back = front * [1, 1, -1]
+    slipped = front + 1e-6
+    cap = np.array([[-0.1, 0, 0], [0, -0.1, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.09]])
+    doublet = [[0, 1, 2, 4], [0, 4, 2, 3]]
+    folded = np.array([[0, 0, 0], [0.5, 0, 0.4], [0.1, 0.5, 0.1], [0.1, 0, 0], [0.4, 0.8, 1.2], [0, 1.2, 0.9]])
+    return {
+        "tube.obj": _obj([("tube", tube, belt)]),
+        "pieces.obj": _obj([("front", front, sheet), ("back", back, sheet[:, ::-1])]),
+        "double.obj": _obj([("outer", front, sheet), ("inner", slipped, sheet[:, ::-1])]),
+        "doublet.obj": _obj([("cap", cap, doublet)]),
+        "folded.obj": _obj([("sheet", folded, [[0, 1, 2, 3], [2, 1, 4, 5]])]),
+    }
+
+
+def geometry_case(kind: str, random: Random) -> Case:
+    """A damaged scene or mesh of a kind, and the command that reads it."""
+    from .mutations import _MUCH_WORK, _damaged_toml, damaged_bytes
+    from .seeds import BARE
+
+    meshes = garment_meshes()
+    if kind in ("form", "tables"):
+        content = _MUCH_WORK.sub(
+            rb"\g<1>5", _damaged_toml(random, random.choice(_FORMS if kind == "form" else _SURFACES))
+        )
+        files = {**meshes, "odd.scene.toml": content}
+        seconds = 120.0 if b"mannequin" in content else 40.0
+        run = ("run", "odd.scene.toml", "--out", "out", "--quiet")
+        return Case(kind, files, run, subject="odd.scene.toml", leaves="out/metrics.json", seconds=seconds)
+    name = random.choice(list(meshes))
+    command = ["flatten", "odd.obj", "--units", random.choice(("m", "m", "cm")), "--out", "out", *BARE]
+    if kind == "pieces":
+        command += ["--component", "all"]
+    else:
+        name = random.choice(("tube.obj", name))
+        ends = [random.choice((random.randrange(84), 0, 72, 10**6)) for _ in range(2)]
+        command += ["--open", ",".join(map(str, ends))]
+    content = damaged_bytes(random, meshes[name])
+    # A wrong vertex of --open is a fault of the command line.
+    subject = "odd.obj" if kind == "pieces" else ""
+    return Case(kind, {"odd.obj": content}, tuple(command), subject=subject, leaves="out/metrics.json", seconds=40.0)

@@ -1,0 +1,117 @@
+"""Layers of cloth that lie on each other: a second copy of a part, which is no piece of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.text import format_count
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["SAME_LAYER", "Layer", "doubled_layers", "lies_within"]
+
+#: Layers nowhere further apart than this [m] are one: thinner than any cloth.
+SAME_LAYER = 5e-5
+# Areas of one layer in two meshes agree within this share.
+_SAME_AREA = 0.02
+# Triangles that are tried as the nearest to a point, by their middles.
+_TRIED = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """One connected part: its vertices (#V by 3 [m]), all in use, and its faces (#F by 4)."""
+
+    vertices: FloatArray
+    faces: IntArray
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.vertices)
+
+    @property
+    def corners(self) -> FloatArray:
+        """#T by 3 by 3, the corners of its triangles [m]."""
+        return self.vertices[triangulate(self.faces)[0]]
+
+    @property
+    def area(self) -> float:
+        """Area [m2]."""
+        a, b, c = self.corners.transpose(1, 0, 2)
+        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+    def describe(self) -> str:
+        """Return how many faces of which area it has, in words."""
+        area = 1e4 * self.area
+        return f"{format_count(len(self.faces), 'face')} of {f'{area:,.0f}' if area >= 10 else f'{area:.2g}'} cm2"
+
+    def vertices_at(self, points: FloatArray, distance: float) -> tuple[IntArray, BoolArray]:
+        """Return the nearest vertex to each point (#P by 3 [m]), and whether it lies within a distance [m]."""
+        far, nearest = self._tree.query(points)
+        return np.asarray(nearest, dtype=np.int32), np.asarray(far <= distance)
+
+
+def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:
+    """Return the layers that lie on another one everywhere, each with that one.
+
+    A layer is doubled if each of its faces is one of the other's, or if both cover each other. The first of two that cover each other
+    stays.
+    """
+    lower, upper = (np.array([bound(layer.vertices, axis=0) for layer in layers]) for bound in (np.min, np.max))
+    doubled: dict[int, int] = {}
+    for number, layer in enumerate(layers):
+        inside = (lower[number] >= lower - SAME_LAYER) & (upper[number] <= upper + SAME_LAYER)
+        for other in np.flatnonzero(inside.all(axis=1)).tolist():
+            if other == number or other in doubled:
+                continue
+            fewer = len(layer.faces) < len(layers[other].faces)
+            if ((other < number or fewer) and _has_faces(layers[other], layer)) or (
+                other < number and _cover_each_other(layers[other], layer)
+            ):
+                doubled[number] = other
+                break
+    return doubled
+
+
+def lies_within(layer: Layer, other: Layer, distance: float) -> bool:
+    """Return whether each vertex of a layer is within a distance [m] of another one; some that are may count as further off."""
+    import trimesh
+    from scipy.spatial import cKDTree
+
+    if other.vertices_at(layer.vertices, distance)[1].all():
+        return True
+    corners = other.corners
+    count = min(_TRIED, len(corners))
+    _, tried = cKDTree(corners.mean(axis=1)).query(layer.vertices, k=count)
+    tried = np.asarray(tried).reshape(len(layer.vertices), count)
+    left = np.arange(len(layer.vertices))
+    for column in tried.T:
+        nearest = trimesh.triangles.closest_point(corners[column[left]], layer.vertices[left])
+        left = left[np.linalg.norm(nearest - layer.vertices[left], axis=1) > distance]
+        if len(left) == 0:
+            return True
+    return False
+
+
+def _has_faces(whole: Layer, part: Layer) -> bool:
+    place, near = whole.vertices_at(part.vertices, SAME_LAYER)
+    if not near.all():
+        return False
+    own = {tuple(sorted(face)) for face in whole.faces.tolist()}
+    return all(tuple(sorted(face)) in own for face in np.where(part.faces >= 0, place[part.faces], -1).tolist())
+
+
+def _cover_each_other(one: Layer, other: Layer) -> bool:
+    areas = one.area, other.area
+    return (
+        abs(areas[0] - areas[1]) <= _SAME_AREA * max(areas)
+        and lies_within(one, other, SAME_LAYER)
+        and lies_within(other, one, SAME_LAYER)
+    )
