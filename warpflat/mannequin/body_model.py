@@ -130,7 +130,8 @@ class BodyModel:
         """Return the vertices of a person, #V by 3 [m]."""
         rest = self.shaped(person.shape)
         turn, shift = self.frames(rest[self.count :], person.bend)
-        posed = np.einsum("vj,jab,vb->va", self.weights, turn, rest[: self.count], optimize=True) + self.weights @ shift
+        blended = (self.weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
+        posed = np.matmul(blended, rest[: self.count, :, None])[:, :, 0] + self.weights @ shift
         return person.scale * posed @ person.turn.T + person.place
 
     def unbend(self, person: Person, points: FloatArray, weights: FloatArray) -> FloatArray:
@@ -148,34 +149,50 @@ class BodyModel:
         back = np.linalg.solve(blended, (posed - weights @ shift)[:, :, None])[:, :, 0]
         return person.scale * back @ person.turn.T + person.place
 
-    def jacobian(self, person: Person, rows: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-        """Return some vertices of a person (#R by 3 [m]) and their derivatives (#R by 3 by #S + 3 #J + 7).
+    def only(self, rows: NDArray[np.int64]) -> BodyModel:
+        """Return the model with some vertices alone, without triangles; its joints move as before."""
+        kept = np.concatenate([rows, self.count + np.arange(len(self.parents))])
+        return replace(
+            self, mean=self.mean[kept], shapes=np.ascontiguousarray(self.shapes[:, kept]), weights=self.weights[rows],
+            triangles=np.zeros((0, 3), dtype=np.int64), mirror=np.zeros(0, dtype=np.int64), detail=self.detail[rows],
+        )  # fmt: skip
+
+    def turned(self, person: Person, normals: FloatArray) -> FloatArray:
+        """Return directions at the vertices (#V by 3), given in the standard pose, as they turn with the joints and the body."""
+        turn, _ = self.frames(self.shaped(person.shape)[self.count :], person.bend)
+        blended = (self.weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
+        out = np.matmul(blended, normals[:, :, None])[:, :, 0] @ person.turn.T
+        return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12))
+
+    @cached_property
+    def _by_shape(self) -> FloatArray:
+        return np.ascontiguousarray(self.shapes[:, : self.count].transpose(1, 2, 0))
+
+    def jacobian(self, person: Person) -> tuple[FloatArray, FloatArray]:
+        """Return the vertices of a person (#V by 3 [m]) and their derivatives (#V by 3 by #S + 3 #J + 7).
 
         Parameters are the shapes, a small rotation [rad] at each joint in the body's own axes, one of the whole body in the axes of
         space, its place [m], and the logarithm of its scale.
         """
         n, joints, shapes = self.count, len(self.parents), len(self.shapes)
-        weights, count = self.weights[rows], len(rows)
         rest = self.shaped(person.shape)
         turn, shift = self.frames(rest[n:], person.bend)
-        out = np.empty((count, 3, shapes + 3 * joints + 7))
+        out = np.empty((n, 3, shapes + 3 * joints + 7))
         spin = person.scale * person.turn
         # Shapes move the vertices, and the joints about which they are bent.
         move = np.zeros((joints + 1, shapes, 3))
         for joint, parent in enumerate(self.parents):
             move[joint] = move[parent] + self.shapes[:, n + joint] @ (turn[parent] - turn[joint]).T
-        blended = (weights @ turn.reshape(joints + 1, 9)).reshape(count, 3, 3)
-        by_shape = np.matmul(blended, self.shapes[:, rows].transpose(1, 2, 0))
-        by_shape += (weights @ move.reshape(joints + 1, -1)).reshape(count, shapes, 3).transpose(0, 2, 1)
-        out[:, :, :shapes] = np.matmul(spin, by_shape)
+        spun = spin @ (self.weights @ turn.reshape(joints + 1, 9)).reshape(n, 3, 3)
+        about = (self.weights @ (move @ spin.T).transpose(0, 2, 1).reshape(joints + 1, -1)).reshape(n, 3, shapes)
+        out[:, :, :shapes] = np.matmul(spun, self._by_shape) + about
         # A joint turns all that hangs from it about its own place.
-        each = rest[rows] @ turn.transpose(0, 2, 1) + shift[:, None]
-        each *= weights.T[:, :, None]
+        each = (rest[:n] @ turn.transpose(0, 2, 1) + shift[:, None]) * self.weights.T[:, :, None]
         at = np.einsum("jab,jb->ja", turn[self.parents], rest[n:]) + shift[self.parents]
-        hung = np.tensordot(self.below, each, 1) - (self.below @ weights.T)[:, :, None] * at[:, None]
-        for joint in range(joints):
-            first = shapes + 3 * joint
-            out[:, :, first : first + 3] = np.matmul(spin, -_cross(hung[joint]))
+        hung = (self.below @ each.reshape(joints + 1, -1)).reshape(joints, n, 3)
+        hung -= (self.below @ self.weights.T)[:, :, None] * at[:, None]
+        by_joint = np.matmul(spin, -_cross(hung.transpose(1, 0, 2).reshape(-1, 3)))
+        out[:, :, shapes : shapes + 3 * joints] = by_joint.reshape(n, joints, 3, 3).transpose(0, 2, 1, 3).reshape(n, 3, -1)
         posed = each.sum(axis=0) @ spin.T
         out[:, :, -7:-4] = -_cross(posed)
         out[:, :, -4:-1] = np.eye(3)
