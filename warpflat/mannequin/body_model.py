@@ -48,9 +48,11 @@ class Person:
     scale: float
     place: FloatArray
 
-    def standing(self) -> Person:
-        """Return the person in the standard pose: arms and legs a little apart, joints straight."""
-        return replace(self, bend=np.tile(np.eye(3), (len(self.bend), 1, 1)))
+    def standing(self, most: float = 0.0) -> Person:
+        """Return the person with arms and legs a little apart and no joint bent by more than `most` [rad]."""
+        vectors = rotation_vector(self.bend)
+        angles = np.linalg.norm(vectors, axis=1, keepdims=True)
+        return replace(self, bend=rotation(vectors * np.minimum(1.0, most / np.maximum(angles, 1e-12))))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,20 +136,24 @@ class BodyModel:
         posed = np.matmul(blended, rest[: self.count, :, None])[:, :, 0] + self.weights @ shift
         return person.scale * posed @ person.turn.T + person.place
 
-    def unbend(self, person: Person, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return points on a person as they lie when the person stands in the standard pose.
+    def rebend(self, person: Person, other: Person, points: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return points on a person as they lie on the same person in another pose.
 
         Args:
             person: in the present pose.
+            other: the same shape in the other pose.
             points: #P by 3 [m].
             weights: #P by #J + 1, shares of the joints in each point.
         """
-        rest = self.shaped(person.shape)
-        turn, shift = self.frames(rest[self.count :], person.bend)
+        joints = self.shaped(person.shape)[self.count :]
+        turn, shift = self.frames(joints, person.bend)
         posed = (points - person.place) @ person.turn / person.scale
-        blended = np.einsum("pj,jab->pab", weights, turn)
-        back = np.linalg.solve(blended, (posed - weights @ shift)[:, :, None])[:, :, 0]
-        return person.scale * back @ person.turn.T + person.place
+        blended = (weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
+        rest = np.linalg.solve(blended, (posed - weights @ shift)[:, :, None])
+        turn, shift = self.frames(joints, other.bend)
+        blended = (weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
+        posed = np.matmul(blended, rest)[:, :, 0] + weights @ shift
+        return np.asarray(other.scale * posed @ other.turn.T + other.place)
 
     def only(self, rows: NDArray[np.int64]) -> BodyModel:
         """Return the model with some vertices alone, without triangles; its joints move as before."""

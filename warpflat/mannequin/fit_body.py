@@ -30,11 +30,13 @@ _ALIKE = 0.35
 _FROM_SCAN = 0.7
 # A step bends no joint by more than this [rad].
 _MOST_BEND = 0.35
+# One in so many vertices of head, hands and feet counts.
+_THIN = 4
 # How much the body's vertices count together, however many they are.
 _VERTICES = 2_600.0
 # Stages of the starts: steps, weight of the preferences, distance [m] at which a place counts a quarter, whether shapes may
 # change, how many starts go on; and of the best one.
-_FIRST = ((2, 0.6, 0.12, False, 4), (3, 0.6, 0.12, True, 2), (5, 0.15, 0.06, True, 1))
+_FIRST = ((2, 0.6, 0.12, False, 3), (3, 0.6, 0.12, True, 2), (3, 0.15, 0.06, True, 1))
 _LAST = ((8, 0.04, 0.03),)
 # Bends of the arms [rad] from which the fit starts, about the axis to the front: as the model stands, raised, hanging, overhead.
 _ARMS = (0.0, 0.5, -0.5, 0.9)
@@ -115,7 +117,8 @@ def fit_body(vertices: FloatArray, triangles: NDArray[np.int64]) -> FittedBody:
     scan = _Scan(
         mesh=mesh, points=np.einsum("pk,pka->pa", share, vertices[triangles[face]]), normals=mesh.normals[face]
     )
-    plain = np.flatnonzero(~model.detail)
+    # Head, hands and feet count less: hair, shoes and fingers differ from the model's.
+    plain = np.concatenate([np.flatnonzero(~model.detail), np.flatnonzero(model.detail)[::_THIN]])
     normals = vertex_normals(model.mean[: model.count], model.triangles)
     few = plain[:: max(1, len(plain) // _FEW)]
     coarse, fine = model.only(few), model.only(plain)

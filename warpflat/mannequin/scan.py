@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.closest import Closest
@@ -22,6 +23,7 @@ from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_n
 from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
 from warpflat.mannequin.scan_spread import guess_by_noise
 from warpflat.mannequin.slicer import Slicer
+from warpflat.mannequin.stand_body import stand_body
 from warpflat.mannequin.table_body import PRINCESS
 
 __all__ = ["ScanFound", "blueprint_from_scan"]
@@ -31,6 +33,10 @@ _UP_SIGMA = 1.5
 _HARMONICS = 28
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
+# Arms raised from plumb by more than this [radians] are lowered.
+_RAISED = np.radians(70.0)
+# Girths of the scan and of the model laid on it are alike within this share.
+_ALIKE = 0.06
 # How far a side seam follows the waves of front and back at the waist.
 _OFF_PLUMB = 0.5
 
@@ -68,7 +74,41 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         InputError: if the mesh is not a body that stands on two legs with its arms off the trunk, or has a measure that no body has.
     """
     slicer, notes = turn_scan_upright(vertices, faces, options)
-    body = _slice_body(slicer, options)
+    refusal: InputError | None = None
+    body: _SlicedBody | None = None
+    try:
+        body = _slice_body(slicer, options)
+    except InputError as error:
+        refusal = error
+    # What the shape alone does not show, or shows in a pose in which no tape is laid, the model fitted to the scan tells.
+    if body is None or _guesses(body) or max(_raised(body)) > _RAISED:
+        stood = stand_body(slicer.vertices, slicer.triangles, slicer.scanned)
+        fitted = None
+        if stood.unsure is None:
+            try:
+                fitted = _slice_body(stood.slicer(), options, fitted=True)
+            except InputError as error:
+                refusal = refusal or error
+        if body is None and fitted is None:
+            assert refusal is not None
+            raise refusal
+        if fitted is not None and (
+            body is None or len(_guesses(fitted)) < len(_guesses(body)) or max(_raised(body)) > _RAISED
+        ):
+            why = (
+                str(refusal).removeprefix("scan: ").split(";")[0]
+                if body is None
+                else f"its arms are raised by {np.degrees(max(_raised(body))):.0f} degrees"
+                if max(_raised(body)) > _RAISED
+                else f"its shape leaves {' and '.join(_guesses(body))} a guess"
+            )
+            notes.append(
+                f"the mannequin is that of a body model laid on the scan, standing ({why}); before, it lay "
+                f"{1000.0 * float(np.mean(stood.fit.distance[np.isfinite(stood.fit.distance)])):.1f} mm off the scan in the mean"
+            )
+            tapes = body.measures if body is not None and _agree(body, fitted) else fitted.measures
+            body, slicer = replace(fitted, measures=tapes), stood.slicer()
+    assert body is not None
     trunk, legs, levels = body.trunk, body.legs, body.levels
     plumb, apart = plumb_legs(trunk, legs)
     profile = _profiles(plumb, levels, body.underarms)
@@ -103,10 +143,30 @@ class _SlicedBody:
     notes: tuple[str, ...]
 
 
-def _slice_body(slicer: Slicer, options: ScanOptions) -> _SlicedBody:
+def _guesses(body: _SlicedBody) -> list[str]:
+    """Return the levels of the trunk, but the bust, whose places the shape does not show."""
+    return [name for name in ("underbust", "waist", "hip") if body.measures[name].guess is not None]
+
+
+def _raised(body: _SlicedBody) -> list[float]:
+    """Return how far each upper arm is raised from plumb [radians]."""
+    found = []
+    for arm in body.upper.arms.values():
+        upper = arm.way[(arm.shares > 0.2) & (arm.shares < arm.elbow)].mean(axis=0)
+        found.append(float(np.arccos(np.clip(-upper[1] / np.linalg.norm(upper), -1.0, 1.0))))
+    return found
+
+
+def _agree(one: _SlicedBody, other: _SlicedBody) -> bool:
+    """Return whether the tapes around the trunk agree, so that those around the scan itself can be believed."""
+    names = [name for name in ("neck", "bust", "underbust", "waist", "hip") if one.measures[name].guess is None]
+    return all(abs(one.measures[n].girth / other.measures[n].girth - 1.0) < _ALIKE for n in names)
+
+
+def _slice_body(slicer: Slicer, options: ScanOptions, *, fitted: bool = False) -> _SlicedBody:
     trunk = trunk_sections(slicer)
     levels, notes = find_levels(trunk, options.landmarks)
-    check_girths(trunk, levels)
+    check_girths(trunk, levels, leaps=not fitted)
     legs = slice_legs(slicer, trunk, levels["hip"])
     of_legs, _ = leg_levels(legs)
     levels |= {name: of_legs[name] for name in ("knee", "ankle") if name not in options.landmarks}

@@ -6,7 +6,7 @@ carried on smoothly. So each scan becomes one closed mesh whose vertices are the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -16,18 +16,26 @@ from scipy.sparse import csr_array
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.mannequin.body_model import BodyModel
 from warpflat.mannequin.fit_body import FittedBody, Mesh, fit_body, vertex_normals
+from warpflat.mannequin.slicer import Slicer
 
 __all__ = ["StandingBody", "finer_body", "lay_on_scan", "stand_body"]
 
 # Moves onto the scan: how stiff the move is, and how far a place may lie [m].
 _STAGES = ((0.5, 0.05), (0.1, 0.04), (0.02, 0.03), (0.004, 0.03), (0.004, 0.03))
+# Head, hands and feet have few vertices, which follow the scan's lips, fingers and toes not so closely: so much stiffer.
+_DETAIL = 30.0
+# A standing body's joints are bent by no more than this [rad].
+_BENT = np.radians(12.0)
+# A fit is no good beyond a mean distance [m]; if less than a share of the scan lies beside it [m]; or if the scan shows less than a
+# share of a limb, or of a band [m] of the trunk with more than a few vertices.
+_FAR, _BESIDE, _SHARED, _SEEN, _BAND, _FEW = 0.012, 0.08, 0.7, 0.5, 0.02, 12
 # Surfaces face the same way where their normals' product is larger than this.
 _ALIKE = 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StandingBody:
-    """A scan's body in the standard pose, facing +Z, the pelvis over the origin, its lowest point at y = 0.
+    """A scan's body in nearly the standard pose, facing +Z, the pelvis in the midplane, its lowest point at y = 0.
 
     Attributes:
         vertices: #V by 3 [m]. triangles: #T by 3.
@@ -35,6 +43,7 @@ class StandingBody:
         weights: #V by #J + 1, share of each joint in a vertex.
         seen: #V, whether the scan shows the body there.
         fit: of the model.
+        unsure: why the scan is no such body; None if it is.
     """
 
     vertices: FloatArray
@@ -43,6 +52,13 @@ class StandingBody:
     weights: FloatArray
     seen: BoolArray
     fit: FittedBody
+    unsure: str | None
+
+    def slicer(self) -> Slicer:
+        """Return the plane sections of the standing body; what the scan does not show counts as patches over holes."""
+        shown = self.seen[self.triangles].any(axis=1)
+        order = np.argsort(~shown, kind="stable")
+        return Slicer(self.vertices, self.triangles[order], scanned=int(shown.sum()))
 
 
 @lru_cache(maxsize=1)
@@ -92,7 +108,8 @@ def _bending() -> csr_array:
     both = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
     near = coo_array((np.ones(len(both)), both.T), shape=(n, n)).tocsr()
     even = diags_array(np.ones(n)) - diags_array(1.0 / np.maximum(near.sum(axis=1), 1.0)) @ near
-    return (even.T @ even).tocsr()
+    stiff = np.where(matrix @ BodyModel.load().detail > 0.5, _DETAIL, 1.0)
+    return (even.T @ diags_array(stiff) @ even).tocsr()
 
 
 def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -135,9 +152,37 @@ def stand_body(vertices: FloatArray, triangles: NDArray[np.int64], scanned: int 
     model, (finer, faces) = BodyModel.load(), finer_body()
     weights = finer @ model.weights
     patched = np.arange(len(triangles)) >= (len(triangles) if scanned is None else scanned)
-    posed, seen = lay_on_scan(finer @ model.vertices(fit.person), Mesh(vertices, triangles), patched)
-    standing = model.unbend(fit.person, posed, weights)
-    upright = replace(fit.person, turn=np.eye(3), place=np.zeros(3))
-    standing = (standing - fit.person.place) @ fit.person.turn @ upright.turn.T
-    standing[:, 1] -= standing[:, 1].min()
-    return StandingBody(vertices=standing, triangles=faces, posed=posed, weights=weights, seen=seen, fit=fit)
+    mesh = Mesh(vertices, triangles)
+    posed, seen = lay_on_scan(finer @ model.vertices(fit.person), mesh, patched)
+    standing = model.rebend(fit.person, fit.person.standing(_BENT), posed, weights)
+    standing -= [float(fit.person.place[0]), standing[:, 1].min(), 0.0]
+    unsure = _unsure(fit, mesh, model.vertices(fit.person), standing, weights, seen)
+    return StandingBody(
+        vertices=standing, triangles=faces, posed=posed, weights=weights, seen=seen, fit=fit, unsure=unsure
+    )
+
+
+def _unsure(
+    fit: FittedBody, scan: Mesh, model: FloatArray, standing: FloatArray, weights: FloatArray, seen: BoolArray
+) -> str | None:
+    """Return why a fit is no good: it lies far from the scan, or one of the two has parts that the other has not."""
+    mean = float(fit.distance[np.isfinite(fit.distance)].mean())
+    if mean > _FAR:
+        return f"the body model lies {1000.0 * mean:.0f} mm off the scan in the mean"
+    near = np.linalg.norm(Mesh(model, BodyModel.load().triangles).closest(scan.vertices)[2] - scan.vertices, axis=1) < _BESIDE
+    shared = float(scan.area @ near[scan.triangles].mean(axis=1) / scan.area.sum())
+    if shared < _SHARED:
+        return f"{100.0 * (1.0 - shared):.0f} % of the scan is no part of a standing body"
+    names = (*BodyModel.load().joints, "pelvis")
+    part = np.argmax(weights, axis=1)
+    for number, name in enumerate(names):
+        share = float(seen[part == number].mean())
+        if share < _SEEN and not name.startswith("foot"):
+            return f"the scan does not show the body at {name}"
+    trunk = np.isin(part, [names.index("spine03"), names.index("pelvis")])
+    bands = np.floor(standing[trunk, 1] / _BAND).astype(int)
+    shown = np.bincount(bands, seen[trunk]) / np.maximum(np.bincount(bands), 1)
+    shown[np.bincount(bands) < _FEW] = 1.0
+    if shown.min() < _SEEN:
+        return f"the scan does not show the trunk at {_BAND * float(np.argmin(shown)):.2f} m"
+    return None
