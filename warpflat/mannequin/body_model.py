@@ -12,10 +12,14 @@ from importlib.resources import files
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from warpflat.core.arrays import FloatArray
 
 __all__ = ["BodyModel", "Person", "rotation", "rotation_vector"]
+
+# Blended rotations shrink what they turn; where to this share, a point's distance from the model means nothing in another pose.
+_FOLDED = 0.8
 
 
 def rotation(vectors: FloatArray) -> FloatArray:
@@ -136,24 +140,31 @@ class BodyModel:
         posed = np.matmul(blended, rest[: self.count, :, None])[:, :, 0] + self.weights @ shift
         return person.scale * posed @ person.turn.T + person.place
 
-    def rebend(self, person: Person, other: Person, points: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return points on a person as they lie on the same person in another pose.
+    def rebend(
+        self, person: Person, other: Person, finer: csr_array, points: FloatArray
+    ) -> FloatArray:
+        """Return points laid on a person as they lie on the same person in another pose.
+
+        What a point stands off the model turns with its joints. Where a joint is bent far between the poses, skinning is wrong by as
+        much as the points stand off, and they are drawn to the model.
 
         Args:
             person: in the present pose.
             other: the same shape in the other pose.
+            finer: #P by #V, the model's place of each point.
             points: #P by 3 [m].
-            weights: #P by #J + 1, shares of the joints in each point.
         """
-        joints = self.shaped(person.shape)[self.count :]
-        turn, shift = self.frames(joints, person.bend)
-        posed = (points - person.place) @ person.turn / person.scale
-        blended = (weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
-        rest = np.linalg.solve(blended, (posed - weights @ shift)[:, :, None])
-        turn, shift = self.frames(joints, other.bend)
-        blended = (weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
-        posed = np.matmul(blended, rest)[:, :, 0] + weights @ shift
-        return np.asarray(other.scale * posed @ other.turn.T + other.place)
+        joints, weights = self.shaped(person.shape)[self.count :], finer @ self.weights
+        turns = []
+        for each in (person, other):
+            turn, _ = self.frames(joints, each.bend)
+            turns.append(each.turn @ turn)
+        between = (weights @ (turns[1] @ turns[0].transpose(0, 2, 1)).reshape(-1, 9)).reshape(-1, 3, 3)
+        u, size, v = np.linalg.svd(between)
+        off = points - finer @ self.vertices(person)
+        follows = np.clip((size[:, -1] - _FOLDED) / (1.0 - _FOLDED), 0.0, 1.0)
+        turned = np.matmul(u @ v, off[:, :, None])[:, :, 0]
+        return np.asarray(finer @ self.vertices(other) + follows[:, None] * other.scale / person.scale * turned)
 
     def only(self, rows: NDArray[np.int64]) -> BodyModel:
         """Return the model with some vertices alone, without triangles; its joints move as before."""

@@ -35,8 +35,10 @@ _HARMONICS = 28
 _ARM_LEAN = np.radians(11.0)
 # Arms raised from plumb by more than this [radians] are lowered.
 _RAISED = np.radians(70.0)
+# Armpits lie higher than this share of the stature.
+_ARMPIT = 0.73
 # Girths of the scan and of the model laid on it are alike within this share.
-_ALIKE = 0.06
+_ALIKE = 0.10
 # How far a side seam follows the waves of front and back at the waist.
 _OFF_PLUMB = 0.5
 
@@ -81,19 +83,18 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     except InputError as error:
         refusal = error
     # What the shape alone does not show, or shows in a pose in which no tape is laid, the model fitted to the scan tells.
-    if body is None or _guesses(body) or max(_raised(body)) > _RAISED:
+    if body is None or _guesses(body) or max(_raised(body)) > _RAISED or _low(body):
         stood = stand_body(slicer.vertices, slicer.triangles, slicer.scanned)
-        fitted = None
-        if stood.unsure is None:
+        fitted, unsure = None, stood.unsure
+        if unsure is None:
             try:
                 fitted = _slice_body(stood.slicer(), options, fitted=True)
             except InputError as error:
-                refusal = refusal or error
+                unsure = f"laid on the scan it has no tapes: {str(error).removeprefix('scan: ')}"
         if body is None and fitted is None:
-            assert refusal is not None
-            raise refusal
+            raise InputError(f"{refusal}; a body model does not fit, either: {unsure}")
         if fitted is not None and (
-            body is None or len(_guesses(fitted)) < len(_guesses(body)) or max(_raised(body)) > _RAISED
+            body is None or len(_guesses(fitted)) < len(_guesses(body)) or max(_raised(body)) > _RAISED or _low(body)
         ):
             why = (
                 str(refusal).removeprefix("scan: ").split(";")[0]
@@ -106,7 +107,8 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
                 f"the mannequin is that of a body model laid on the scan, standing ({why}); before, it lay "
                 f"{1000.0 * float(np.mean(stood.fit.distance[np.isfinite(stood.fit.distance)])):.1f} mm off the scan in the mean"
             )
-            tapes = body.measures if body is not None and _agree(body, fitted) else fitted.measures
+            believed = body is not None and not _guesses(body) and _agree(body, fitted)
+            tapes = body.measures if body is not None and believed else fitted.measures
             body, slicer = replace(fitted, measures=tapes), stood.slicer()
     assert body is not None
     trunk, legs, levels = body.trunk, body.legs, body.levels
@@ -157,9 +159,14 @@ def _raised(body: _SlicedBody) -> list[float]:
     return found
 
 
+def _low(body: _SlicedBody) -> bool:
+    """Return whether arms and trunk part so far down that a web or cloth must join them."""
+    return body.levels["armpit"] < _ARMPIT * body.trunk.stature
+
+
 def _agree(one: _SlicedBody, other: _SlicedBody) -> bool:
     """Return whether the tapes around the trunk agree, so that those around the scan itself can be believed."""
-    names = [name for name in ("neck", "bust", "underbust", "waist", "hip") if one.measures[name].guess is None]
+    names = ("neck", "bust", "underbust", "waist", "hip")
     return all(abs(one.measures[n].girth / other.measures[n].girth - 1.0) < _ALIKE for n in names)
 
 
@@ -175,7 +182,7 @@ def _slice_body(slicer: Slicer, options: ScanOptions, *, fitted: bool = False) -
     upper = slice_neck_and_arms(slicer, trunk, levels, underarms)
     return _SlicedBody(
         trunk=trunk, legs=legs, upper=upper, levels=levels, underarms=underarms, notes=tuple(notes),
-        measures=body_measures(slicer, trunk, levels, legs, upper.arms, upper.neck, notes),
+        measures=body_measures(slicer, trunk, levels, legs, upper.arms, upper.neck, notes, fitted=fitted),
     )  # fmt: skip
 
 

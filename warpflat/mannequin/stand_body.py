@@ -25,10 +25,14 @@ _STAGES = ((0.5, 0.05), (0.1, 0.04), (0.02, 0.03), (0.004, 0.03), (0.004, 0.03))
 # Head, hands and feet have few vertices, which follow the scan's lips, fingers and toes not so closely: so much stiffer.
 _DETAIL = 30.0
 # A standing body's joints are bent by no more than this [rad].
-_BENT = np.radians(12.0)
+_BENT = np.radians(8.0)
 # A fit is no good beyond a mean distance [m]; if less than a share of the scan lies beside it [m]; or if the scan shows less than a
 # share of a limb, or of a band [m] of the trunk with more than a few vertices.
-_FAR, _BESIDE, _SHARED, _SEEN, _BAND, _FEW = 0.012, 0.08, 0.7, 0.5, 0.02, 12
+_FAR, _BESIDE, _FLOOR, _SHARED, _SEEN, _BAND, _FEW = 0.012, 0.08, 0.05, 0.7, 0.5, 0.02, 12
+_PARTS = {
+    "spine03": "the chest", "pelvis": "the pelvis", "neck01": "a head", "clavicle": "two shoulders", "upperarm01": "two upper arms",
+    "lowerarm01": "two forearms", "upperleg01": "two thighs", "lowerleg01": "two calves",
+}  # fmt: skip
 # Surfaces face the same way where their normals' product is larger than this.
 _ALIKE = 0.5
 
@@ -154,7 +158,8 @@ def stand_body(vertices: FloatArray, triangles: NDArray[np.int64], scanned: int 
     patched = np.arange(len(triangles)) >= (len(triangles) if scanned is None else scanned)
     mesh = Mesh(vertices, triangles)
     posed, seen = lay_on_scan(finer @ model.vertices(fit.person), mesh, patched)
-    standing = model.rebend(fit.person, fit.person.standing(_BENT), posed, weights)
+    other = fit.person.standing(_BENT)
+    standing = model.rebend(fit.person, other, finer, posed)
     standing -= [float(fit.person.place[0]), standing[:, 1].min(), 0.0]
     unsure = _unsure(fit, mesh, model.vertices(fit.person), standing, weights, seen)
     return StandingBody(
@@ -170,15 +175,20 @@ def _unsure(
     if mean > _FAR:
         return f"the body model lies {1000.0 * mean:.0f} mm off the scan in the mean"
     near = np.linalg.norm(Mesh(model, BodyModel.load().triangles).closest(scan.vertices)[2] - scan.vertices, axis=1) < _BESIDE
-    shared = float(scan.area @ near[scan.triangles].mean(axis=1) / scan.area.sum())
+    # A floor is no part of the body, either.
+    area = scan.area * (scan.vertices[scan.triangles, 1].max(axis=1) > scan.vertices[:, 1].min() + _FLOOR)
+    shared = float(area @ near[scan.triangles].mean(axis=1) / area.sum())
     if shared < _SHARED:
         return f"{100.0 * (1.0 - shared):.0f} % of the scan is no part of a standing body"
     names = (*BodyModel.load().joints, "pelvis")
     part = np.argmax(weights, axis=1)
+    triangles = finer_body()[1]
+    size = np.bincount(triangles.ravel(), np.repeat(Mesh(standing, triangles).area, 3), len(standing))
+    plain = finer_body()[0] @ BodyModel.load().detail < 0.5
     for number, name in enumerate(names):
-        share = float(seen[part == number].mean())
-        if share < _SEEN and not name.startswith("foot"):
-            return f"the scan does not show the body at {name}"
+        which = (part == number) & (plain | (name == "neck01"))
+        if float(size[which] @ seen[which]) < _SEEN * float(size[which].sum()) and not name.startswith("foot"):
+            return f"the scan does not show {_PARTS[name.split('.')[0]]}"
     trunk = np.isin(part, [names.index("spine03"), names.index("pelvis")])
     bands = np.floor(standing[trunk, 1] / _BAND).astype(int)
     shown = np.bincount(bands, seen[trunk]) / np.maximum(np.bincount(bands), 1)
