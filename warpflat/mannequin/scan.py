@@ -84,7 +84,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         refusal = error
     # What the shape alone does not show, or shows in a pose in which no tape is laid, the model fitted to the scan tells.
     if body is None or _guesses(body) or max(_raised(body)) > _RAISED or _low(body):
-        stood = stand_body(slicer.vertices, slicer.triangles, slicer.scanned)
+        stood = stand_body(slicer.vertices, slicer.triangles, slicer.scanned, faces_ahead=options.facing is not None)
         fitted, unsure = None, stood.unsure
         if unsure is None:
             try:
@@ -102,12 +102,16 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
                 else f"its arms are raised by {np.degrees(max(_raised(body))):.0f} degrees"
                 if max(_raised(body)) > _RAISED
                 else f"its shape leaves {' and '.join(_guesses(body))} a guess"
+                if _guesses(body)
+                else "a web joins its arms to the trunk"
             )
             notes.append(
                 f"the mannequin is that of a body model laid on the scan, standing ({why}); before, it lay "
                 f"{1000.0 * float(np.mean(stood.fit.distance[np.isfinite(stood.fit.distance)])):.1f} mm off the scan in the mean"
             )
             believed = body is not None and not _guesses(body) and _agree(body, fitted)
+            if stood.turned:
+                notes.append("the body model fits the scan only with front and back exchanged; give scan.facing if this is wrong")
             tapes = body.measures if body is not None and believed else fitted.measures
             body, slicer = replace(fitted, measures=tapes), stood.slicer()
     assert body is not None

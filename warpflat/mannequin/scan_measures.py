@@ -284,6 +284,8 @@ def _biceps(arm: ScanArm, armpit: FloatArray, beyond: float) -> ScanMeasure:
     The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
     """
     rows = (arm.shares > 0.2) & (arm.shares < arm.elbow - 0.04)
+    if not rows.any():
+        raise InputError(f"scan: no upper arm between the armpit at {armpit[1]:.2f} m and the elbow; give landmarks")
     way = arm.way[rows].mean(axis=0)
     way /= np.linalg.norm(way)
     middle = arm.line[rows].mean(axis=0)

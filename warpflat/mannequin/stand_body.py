@@ -6,7 +6,7 @@ carried on smoothly. So each scan becomes one closed mesh whose vertices are the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,7 +21,11 @@ from warpflat.mannequin.slicer import Slicer
 __all__ = ["StandingBody", "finer_body", "lay_on_scan", "stand_body"]
 
 # Moves onto the scan: how stiff the move is, and how far a place may lie [m].
-_STAGES = ((0.5, 0.05), (0.1, 0.04), (0.02, 0.03), (0.004, 0.03), (0.004, 0.03))
+_STAGES = ((0.5, 0.03), (0.1, 0.025), (0.02, 0.02), (0.004, 0.02), (0.004, 0.02))
+# How much the model counts where the scan shows nothing.
+_HOME = 0.02
+# Where arms join the trunk a place may lie so much less far, as a share.
+_WEB = 0.7
 # Head, hands and feet have few vertices, which follow the scan's lips, fingers and toes not so closely: so much stiffer.
 _DETAIL = 30.0
 # A standing body's joints are bent by no more than this [rad].
@@ -31,7 +35,7 @@ _BENT = np.radians(8.0)
 _FAR, _BESIDE, _FLOOR, _SHARED, _SEEN, _BAND, _FEW = 0.012, 0.08, 0.05, 0.7, 0.5, 0.02, 12
 _PARTS = {
     "spine03": "the chest", "pelvis": "the pelvis", "neck01": "a head", "clavicle": "two shoulders", "upperarm01": "two upper arms",
-    "lowerarm01": "two forearms", "upperleg01": "two thighs", "lowerleg01": "two calves",
+    "upperleg01": "two thighs", "lowerleg01": "two calves",
 }  # fmt: skip
 # Surfaces face the same way where their normals' product is larger than this.
 _ALIKE = 0.5
@@ -48,6 +52,7 @@ class StandingBody:
         seen: #V, whether the scan shows the body there.
         fit: of the model.
         unsure: why the scan is no such body; None if it is.
+        turned: whether the scan faces -Z.
     """
 
     vertices: FloatArray
@@ -57,6 +62,7 @@ class StandingBody:
     seen: BoolArray
     fit: FittedBody
     unsure: str | None
+    turned: bool = False
 
     def slicer(self) -> Slicer:
         """Return the plane sections of the standing body; what the scan does not show counts as patches over holes."""
@@ -127,9 +133,18 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import splu
 
-    _, triangles = finer_body()
+    finer, triangles = finer_body()
     bending, points, seen = _bending(), start, np.zeros(len(start), dtype=bool)
-    for stiffness, reach in _STAGES:
+    model = BodyModel.load()
+    weights = finer @ model.weights
+    arms, near = (
+        weights[:, [i for i, name in enumerate(model.joints) if name.split(".")[0] in names]].sum(axis=1)
+        for names in (("upperarm01",), ("spine03", "clavicle"))
+    )
+    # Scanners and cloth span webs between arms and trunk.
+    nearer = 1.0 - _WEB * np.minimum(1.0, 4.0 * arms * near)
+    for stiffness, far_at_most in _STAGES:
+        reach = far_at_most * nearer
         normals = vertex_normals(points, triangles)
         found, _, place = mesh.closest(points)
         away = place - points
@@ -138,20 +153,34 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
         alike = np.einsum("va,va->v", normals, mesh.normals[found]) > _ALIKE
         # Beside the border of a hole the nearest place does not lie along the normal.
         seen = alike & (far < reach) & (np.abs(along) > 0.8 * far - 0.002) & ~patched[found]
-        weight = np.where(seen, 1.0 / (1.0 + (far / reach) ** 2) ** 2, 0.0)
-        system = diags_array(weight + 1e-6) + stiffness * bending
+        # What the scan does not show goes back to the model.
+        along = np.where(seen, along, np.einsum("va,va->v", start - points, normals))
+        weight = np.where(seen, 1.0 / (1.0 + (far / reach) ** 2) ** 2, _HOME)
+        system = diags_array(weight) + stiffness * bending
         points = points + splu(system.tocsc()).solve(weight * along)[:, None] * normals
     return points, seen
 
 
-def stand_body(vertices: FloatArray, triangles: NDArray[np.int64], scanned: int | None = None) -> StandingBody:
-    """Fit the model to an upright scan that faces +Z, lay it on the scan, and undo its pose.
+def stand_body(
+    vertices: FloatArray, triangles: NDArray[np.int64], scanned: int | None = None, *, faces_ahead: bool = False
+) -> StandingBody:
+    """Fit the model to an upright scan, lay it on the scan, and undo its pose.
 
     Args:
         vertices: #V by 3 [m].
         triangles: #T by 3, their normals outward.
         scanned: triangles from this one on close holes; None for none.
+        faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
     """
+    found = _stand(vertices, triangles, scanned)
+    if found.unsure is not None and not faces_ahead:
+        turned = _stand(vertices * [-1.0, 1.0, -1.0], triangles, scanned)
+        if turned.unsure is None:
+            return replace(turned, turned=True)
+    return found
+
+
+def _stand(vertices: FloatArray, triangles: NDArray[np.int64], scanned: int | None) -> StandingBody:
     fit = fit_body(vertices, triangles)
     model, (finer, faces) = BodyModel.load(), finer_body()
     weights = finer @ model.weights
@@ -187,12 +216,13 @@ def _unsure(
     plain = finer_body()[0] @ BodyModel.load().detail < 0.5
     for number, name in enumerate(names):
         which = (part == number) & (plain | (name == "neck01"))
-        if float(size[which] @ seen[which]) < _SEEN * float(size[which].sum()) and not name.startswith("foot"):
-            return f"the scan does not show {_PARTS[name.split('.')[0]]}"
+        shown = _PARTS.get(name.split(".")[0])
+        if shown and float(size[which] @ seen[which]) < _SEEN * float(size[which].sum()):
+            return f"the scan does not show {shown}"
     trunk = np.isin(part, [names.index("spine03"), names.index("pelvis")])
     bands = np.floor(standing[trunk, 1] / _BAND).astype(int)
-    shown = np.bincount(bands, seen[trunk]) / np.maximum(np.bincount(bands), 1)
-    shown[np.bincount(bands) < _FEW] = 1.0
-    if shown.min() < _SEEN:
-        return f"the scan does not show the trunk at {_BAND * float(np.argmin(shown)):.2f} m"
+    count = np.bincount(bands)
+    share = np.where(count < _FEW, 1.0, np.bincount(bands, seen[trunk]) / np.maximum(count, 1))
+    if share.min() < _SEEN:
+        return f"the scan does not show the trunk at {_BAND * float(np.argmin(share)):.2f} m"
     return None
