@@ -109,10 +109,14 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
                 f"the mannequin is that of a body model laid on the scan, standing ({why}); before, it lay "
                 f"{1000.0 * float(np.mean(stood.fit.distance[np.isfinite(stood.fit.distance)])):.1f} mm off the scan in the mean"
             )
-            believed = body is not None and not _guesses(body) and _agree(body, fitted)
-            if stood.turned:
-                notes.append("the body model fits the scan only with front and back exchanged; give scan.facing if this is wrong")
-            tapes = body.measures if body is not None and believed else fitted.measures
+            # A tape of the scan itself stays where the two agree.
+            tapes = dict(fitted.measures)
+            if body is not None:
+                tapes |= {
+                    name: tape
+                    for name, tape in body.measures.items()
+                    if tape.guess is None and (name not in tapes or abs(tape.girth / tapes[name].girth - 1.0) < _ALIKE)
+                }
             body, slicer = replace(fitted, measures=tapes), stood.slicer()
     assert body is not None
     trunk, legs, levels = body.trunk, body.legs, body.levels
@@ -166,12 +170,6 @@ def _raised(body: _SlicedBody) -> list[float]:
 def _low(body: _SlicedBody) -> bool:
     """Return whether arms and trunk part so far down that a web or cloth must join them."""
     return body.levels["armpit"] < _ARMPIT * body.trunk.stature
-
-
-def _agree(one: _SlicedBody, other: _SlicedBody) -> bool:
-    """Return whether the tapes around the trunk agree, so that those around the scan itself can be believed."""
-    names = ("neck", "bust", "underbust", "waist", "hip")
-    return all(abs(one.measures[n].girth / other.measures[n].girth - 1.0) < _ALIKE for n in names)
 
 
 def _slice_body(slicer: Slicer, options: ScanOptions, *, fitted: bool = False) -> _SlicedBody:
