@@ -140,9 +140,7 @@ class BodyModel:
         posed = np.matmul(blended, rest[: self.count, :, None])[:, :, 0] + self.weights @ shift
         return person.scale * posed @ person.turn.T + person.place
 
-    def rebend(
-        self, person: Person, other: Person, finer: csr_array, points: FloatArray
-    ) -> FloatArray:
+    def rebend(self, person: Person, other: Person, finer: csr_array, points: FloatArray) -> FloatArray:
         """Return points laid on a person as they lie on the same person in another pose.
 
         What a point stands off the model turns with its joints. Where a joint is bent far between the poses, skinning is wrong by as
@@ -209,7 +207,9 @@ class BodyModel:
         hung = (self.below @ each.reshape(joints + 1, -1)).reshape(joints, n, 3)
         hung -= (self.below @ self.weights.T)[:, :, None] * at[:, None]
         by_joint = np.matmul(spin, -_cross(hung.transpose(1, 0, 2).reshape(-1, 3)))
-        out[:, :, shapes : shapes + 3 * joints] = by_joint.reshape(n, joints, 3, 3).transpose(0, 2, 1, 3).reshape(n, 3, -1)
+        out[:, :, shapes : shapes + 3 * joints] = (
+            by_joint.reshape(n, joints, 3, 3).transpose(0, 2, 1, 3).reshape(n, 3, -1)
+        )
         posed = each.sum(axis=0) @ spin.T
         out[:, :, -7:-4] = -_cross(posed)
         out[:, :, -4:-1] = np.eye(3)

@@ -203,7 +203,10 @@ def _unsure(
     mean = float(fit.distance[np.isfinite(fit.distance)].mean())
     if mean > _FAR:
         return f"the body model lies {1000.0 * mean:.0f} mm off the scan in the mean"
-    near = np.linalg.norm(Mesh(model, BodyModel.load().triangles).closest(scan.vertices)[2] - scan.vertices, axis=1) < _BESIDE
+    near = (
+        np.linalg.norm(Mesh(model, BodyModel.load().triangles).closest(scan.vertices)[2] - scan.vertices, axis=1)
+        < _BESIDE
+    )
     # A floor is no part of the body, either.
     area = scan.area * (scan.vertices[scan.triangles, 1].max(axis=1) > scan.vertices[:, 1].min() + _FLOOR)
     shared = float(area @ near[scan.triangles].mean(axis=1) / area.sum())

@@ -31,8 +31,9 @@ JOINTS = {
 #: Edges in head, hands and feet are collapsed while shorter than this [m].
 DETAIL = 0.024
 FACE = (
-    "head jaw eye oculi orbicularis levator oris risorius temporalis special tongue finger metacarpal wrist toe foot neck03"
-).split()
+    "head", "jaw", "eye", "oculi", "orbicularis", "levator", "oris", "risorius", "temporalis", "special", "tongue", "finger",
+    "metacarpal", "wrist", "toe", "foot", "neck03",
+)  # fmt: skip
 
 
 def main(wheel: str, out: str) -> None:
@@ -55,7 +56,9 @@ def main(wheel: str, out: str) -> None:
     bodies[:, :, 1] -= low[:, None]
     bodies /= height[:, None, None]
     # The pelvis stands over the origin.
-    hips = np.mean([bodies[:, cubes[rig[f"upperleg01.{side}"]["head"]["cube_name"]]].mean(axis=1) for side in "LR"], axis=0)
+    hips = np.mean(
+        [bodies[:, cubes[rig[f"upperleg01.{side}"]["head"]["cube_name"]]].mean(axis=1) for side in "LR"], axis=0
+    )
     bodies -= hips[:, None] * [1.0, 0.0, 1.0]
     mean = bodies.mean(axis=0)
     flat = (bodies - mean).reshape(SAMPLES, -1)
@@ -65,7 +68,7 @@ def main(wheel: str, out: str) -> None:
     left = flat - (flat @ basis[:SHAPES].T) @ basis[:SHAPES]
     left = left.reshape(SAMPLES, -1, 3)[:, on_body]
     print(f"rms left by {SHAPES} shapes: {1e3 * 1.7 * np.sqrt((left**2).sum(-1).mean()):.2f} mm of a body of 1.7 m")
-    joints = [name for name in JOINTS]
+    joints = list(JOINTS)
     joint_vertices = [cubes[rig[name]["head"]["cube_name"]] for name in joints]
     weights, detail = gather_weights(skin, rig, joints, len(vertices))
     triangles = thin(mean, quads, detail, mirror)
@@ -74,7 +77,9 @@ def main(wheel: str, out: str) -> None:
     number[used] = np.arange(len(used))
     # Every point is stored once more as joints: the mean of a cube's corners is linear in the shapes, too.
     points = np.concatenate([mean[used], [mean[each].mean(axis=0) for each in joint_vertices]])
-    moved = np.concatenate([shapes[:, used], np.stack([shapes[:, each].mean(axis=1) for each in joint_vertices], axis=1)], axis=1)
+    moved = np.concatenate(
+        [shapes[:, used], np.stack([shapes[:, each].mean(axis=1) for each in joint_vertices], axis=1)], axis=1
+    )
     scale = np.abs(moved).max(axis=(1, 2)) / 32767.0
     np.savez_compressed(
         out,
@@ -84,13 +89,15 @@ def main(wheel: str, out: str) -> None:
         triangles=number[triangles].astype(np.uint16),
         weights=np.round(255 * weights[used]).astype(np.uint8),
         joints=np.array(joints),
-        parents=np.array([-1 if JOINTS[name] is None else joints.index(JOINTS[name]) for name in joints], dtype=np.int8),
+        parents=np.array([joints.index(parent) if parent else -1 for parent in JOINTS.values()], dtype=np.int8),
         heights=np.quantile(height, [0.0, 0.5, 1.0]),
         source=used.astype(np.uint16),
         mirror=number[mirror[used]].astype(np.uint16),
         detail=detail[used],
     )
-    print(f"{len(used)} vertices, {len(triangles)} triangles, heights {np.round(height.min(), 2)} to {np.round(height.max(), 2)} m")
+    print(
+        f"{len(used)} vertices, {len(triangles)} triangles, heights {np.round(height.min(), 2)} to {np.round(height.max(), 2)} m"
+    )
 
 
 def read_base(text: str) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +135,9 @@ class Targets:
         self._files, self._count = files, count
         prefix = ROOT + "targets/"
         self._names = {
-            name[len(prefix) : -len(".target.gz")] for name in files.namelist() if name.startswith(prefix) and name.endswith(".target.gz")
+            name[len(prefix) : -len(".target.gz")]
+            for name in files.namelist()
+            if name.startswith(prefix) and name.endswith(".target.gz")
         }
         self._read: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         local = [
@@ -191,7 +200,10 @@ class Targets:
                     for w, of_w in weight.items():
                         each = of_sex * of_age * of_m * of_w
                         add(f"macrodetails/universal-{sex}-{age}-{m}-{w}", each)
-                        add(f"macrodetails/height/{sex}-{age}-{m}-{w}-{'max' if tall > 0 else 'min'}height", each * abs(tall))
+                        add(
+                            f"macrodetails/height/{sex}-{age}-{m}-{w}-{'max' if tall > 0 else 'min'}height",
+                            each * abs(tall),
+                        )
                         side = "ideal" if proportion > 0 else "uncommon"
                         add(f"macrodetails/proportions/{sex}-{age}-{m}-{w}-{side}proportions", each * abs(proportion))
                         if sex == "female":
@@ -219,7 +231,9 @@ def mirror_of(vertices: np.ndarray) -> np.ndarray:
     return index
 
 
-def gather_weights(skin: dict[str, Any], rig: dict[str, Any], joints: list[str], count: int) -> tuple[np.ndarray, np.ndarray]:
+def gather_weights(
+    skin: dict[str, Any], rig: dict[str, Any], joints: list[str], count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return weights by joint (the last column is the pelvis, which never bends), and which vertices are of head, hands or feet."""
     weights, detail = np.zeros((count, len(joints) + 1)), np.zeros(count)
     for bone, rows in skin.items():
@@ -229,7 +243,7 @@ def gather_weights(skin: dict[str, Any], rig: dict[str, Any], joints: list[str],
         column = joints.index(at) if at else len(joints)
         for index, value in rows:
             weights[int(index), column] += value
-            detail[int(index)] += value * bone.startswith(tuple(FACE))
+            detail[int(index)] += value * bone.startswith(FACE)
     total = weights.sum(axis=1, keepdims=True)
     weights[total[:, 0] < 1e-6, -1] = 1.0
     return weights / weights.sum(axis=1, keepdims=True), detail / np.maximum(total[:, 0], 1e-9) > 0.5
@@ -276,7 +290,10 @@ def thin(points: np.ndarray, quads: np.ndarray, detail: np.ndarray, mirror: np.n
         if len(common) != len(shared):
             continue
         moved = [number for number in around[drop] if number not in shared]
-        normal = [np.cross(points[faces[n][1]] - points[faces[n][0]], points[faces[n][2]] - points[faces[n][0]]) for n in moved]
+        normal = [
+            np.cross(points[faces[n][1]] - points[faces[n][0]], points[faces[n][2]] - points[faces[n][0]])
+            for n in moved
+        ]
         after = [[keep if v == drop else v for v in faces[n]] for n in moved]
         turned = [np.cross(points[f[1]] - points[f[0]], points[f[2]] - points[f[0]]) for f in after]
         if any(a @ b <= 0.2 * np.linalg.norm(a) * np.linalg.norm(b) for a, b in zip(normal, turned, strict=True)):
