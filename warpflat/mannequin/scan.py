@@ -75,6 +75,8 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     Raises:
         InputError: if the mesh is not a body that stands on two legs with its arms off the trunk, or has a measure that no body has.
     """
+    from scipy.spatial import QhullError
+
     slicer, notes = turn_scan_upright(vertices, faces, options)
     refusal: InputError | None = None
     body: _SlicedBody | None = None
@@ -82,6 +84,9 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         body = _slice_body(slicer, options)
     except InputError as error:
         refusal = error
+    except (ValueError, IndexError, QhullError) as error:
+        # Sections of a torn or twisted mesh may hold too few points for any step of the way.
+        refusal = InputError(f"scan: its plane sections are too broken to be measured ({error}); repair the mesh")
     # What the shape alone does not show, or shows in a pose in which no tape is laid, the model fitted to the scan tells.
     if body is None or _guesses(body) or max(_raised(body)) > _RAISED or _low(body):
         stood = stand_body(slicer.vertices, slicer.triangles, slicer.scanned, faces_ahead=options.facing is not None)
@@ -89,7 +94,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         if unsure is None:
             try:
                 fitted = _slice_body(stood.slicer(), options, fitted=True)
-            except InputError as error:
+            except (InputError, ValueError, IndexError, QhullError) as error:
                 unsure = f"laid on the scan it has no tapes: {str(error).removeprefix('scan: ')}"
         if body is None and fitted is None:
             raise InputError(f"{refusal}; a body model does not fit, either: {unsure}")
@@ -112,9 +117,10 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
             # A tape of the scan itself stays where the two agree.
             tapes = dict(fitted.measures)
             if body is not None:
+                of_scan = guess_by_noise(slicer, body.measures, lambda copy: _slice_body(copy, options).measures)
                 tapes |= {
                     name: tape
-                    for name, tape in body.measures.items()
+                    for name, tape in of_scan.items()
                     if tape.guess is None and (name not in tapes or abs(tape.girth / tapes[name].girth - 1.0) < _ALIKE)
                 }
             body, slicer = replace(fitted, measures=tapes), stood.slicer()

@@ -168,10 +168,13 @@ def stand_body(
 
     Args:
         vertices: #V by 3 [m].
-        triangles: #T by 3, their normals outward.
+        triangles: #T by 3, their normals all outward or all inward.
         scanned: triangles from this one on close holes; None for none.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
     """
+    corners = vertices[triangles]
+    if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
+        triangles = triangles[:, ::-1]
     found = _stand(vertices, triangles, scanned)
     if found.unsure is not None and not faces_ahead:
         turned = _stand(vertices * [-1.0, 1.0, -1.0], triangles, scanned)
