@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.closest import Closest
@@ -22,6 +23,7 @@ from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_n
 from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
 from warpflat.mannequin.scan_spread import guess_by_noise
 from warpflat.mannequin.slicer import Slicer
+from warpflat.mannequin.stand_body import stand_body
 from warpflat.mannequin.table_body import PRINCESS
 
 __all__ = ["ScanFound", "blueprint_from_scan"]
@@ -31,6 +33,12 @@ _UP_SIGMA = 1.5
 _HARMONICS = 28
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
+# Arms raised from plumb by more than this [radians] are lowered.
+_RAISED = np.radians(70.0)
+# Armpits lie higher than this share of the stature.
+_ARMPIT = 0.73
+# Girths of the scan and of the model laid on it are alike within this share.
+_ALIKE = 0.10
 # How far a side seam follows the waves of front and back at the waist.
 _OFF_PLUMB = 0.5
 
@@ -67,8 +75,56 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     Raises:
         InputError: if the mesh is not a body that stands on two legs with its arms off the trunk, or has a measure that no body has.
     """
+    from scipy.spatial import QhullError
+
     slicer, notes = turn_scan_upright(vertices, faces, options)
-    body = _slice_body(slicer, options)
+    refusal: InputError | None = None
+    body: _SlicedBody | None = None
+    try:
+        body = _slice_body(slicer, options)
+    except InputError as error:
+        refusal = error
+    except (ValueError, IndexError, QhullError) as error:
+        # Sections of a torn or twisted mesh may hold too few points for any step of the way.
+        refusal = InputError(f"scan: its plane sections are too broken to be measured ({error}); repair the mesh")
+    # What the shape alone does not show, or shows in a pose in which no tape is laid, the model fitted to the scan tells.
+    if body is None or _guesses(body) or max(_raised(body)) > _RAISED or _low(body):
+        stood = stand_body(slicer.vertices, slicer.triangles, slicer.scanned, faces_ahead=options.facing is not None)
+        fitted, unsure = None, stood.unsure
+        if unsure is None:
+            try:
+                fitted = _slice_body(stood.slicer(), options, fitted=True)
+            except (InputError, ValueError, IndexError, QhullError) as error:
+                unsure = f"laid on the scan it has no tapes: {str(error).removeprefix('scan: ')}"
+        if body is None and fitted is None:
+            raise InputError(f"{refusal}; a body model does not fit, either: {unsure}")
+        if fitted is not None and (
+            body is None or len(_guesses(fitted)) < len(_guesses(body)) or max(_raised(body)) > _RAISED or _low(body)
+        ):
+            why = (
+                str(refusal).removeprefix("scan: ").split(";")[0]
+                if body is None
+                else f"its arms are raised by {np.degrees(max(_raised(body))):.0f} degrees"
+                if max(_raised(body)) > _RAISED
+                else f"its shape leaves {' and '.join(_guesses(body))} a guess"
+                if _guesses(body)
+                else "a web joins its arms to the trunk"
+            )
+            notes.append(
+                f"the mannequin is that of a body model laid on the scan, standing ({why}); before, it lay "
+                f"{1000.0 * float(np.mean(stood.fit.distance[np.isfinite(stood.fit.distance)])):.1f} mm off the scan in the mean"
+            )
+            # A tape of the scan itself stays where the two agree.
+            tapes = dict(fitted.measures)
+            if body is not None:
+                of_scan = guess_by_noise(slicer, body.measures, lambda copy: _slice_body(copy, options).measures)
+                tapes |= {
+                    name: tape
+                    for name, tape in of_scan.items()
+                    if tape.guess is None and (name not in tapes or abs(tape.girth / tapes[name].girth - 1.0) < _ALIKE)
+                }
+            body, slicer = replace(fitted, measures=tapes), stood.slicer()
+    assert body is not None
     trunk, legs, levels = body.trunk, body.legs, body.levels
     plumb, apart = plumb_legs(trunk, legs)
     profile = _profiles(plumb, levels, body.underarms)
@@ -103,10 +159,29 @@ class _SlicedBody:
     notes: tuple[str, ...]
 
 
-def _slice_body(slicer: Slicer, options: ScanOptions) -> _SlicedBody:
+def _guesses(body: _SlicedBody) -> list[str]:
+    """Return the levels of the trunk, but the bust, whose places the shape does not show."""
+    return [name for name in ("underbust", "waist", "hip") if body.measures[name].guess is not None]
+
+
+def _raised(body: _SlicedBody) -> list[float]:
+    """Return how far each upper arm is raised from plumb [radians]."""
+    found = []
+    for arm in body.upper.arms.values():
+        upper = arm.way[(arm.shares > 0.2) & (arm.shares < arm.elbow)].mean(axis=0)
+        found.append(float(np.arccos(np.clip(-upper[1] / np.linalg.norm(upper), -1.0, 1.0))))
+    return found
+
+
+def _low(body: _SlicedBody) -> bool:
+    """Return whether arms and trunk part so far down that a web or cloth must join them."""
+    return body.levels["armpit"] < _ARMPIT * body.trunk.stature
+
+
+def _slice_body(slicer: Slicer, options: ScanOptions, *, fitted: bool = False) -> _SlicedBody:
     trunk = trunk_sections(slicer)
     levels, notes = find_levels(trunk, options.landmarks)
-    check_girths(trunk, levels)
+    check_girths(trunk, levels, leaps=not fitted)
     legs = slice_legs(slicer, trunk, levels["hip"])
     of_legs, _ = leg_levels(legs)
     levels |= {name: of_legs[name] for name in ("knee", "ankle") if name not in options.landmarks}
@@ -115,7 +190,7 @@ def _slice_body(slicer: Slicer, options: ScanOptions) -> _SlicedBody:
     upper = slice_neck_and_arms(slicer, trunk, levels, underarms)
     return _SlicedBody(
         trunk=trunk, legs=legs, upper=upper, levels=levels, underarms=underarms, notes=tuple(notes),
-        measures=body_measures(slicer, trunk, levels, legs, upper.arms, upper.neck, notes),
+        measures=body_measures(slicer, trunk, levels, legs, upper.arms, upper.neck, notes, fitted=fitted),
     )  # fmt: skip
 
 

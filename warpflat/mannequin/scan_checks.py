@@ -17,12 +17,13 @@ _LEVELS = ("bust", "underbust", "waist", "hip")
 _STEP = 0.10
 
 
-def check_girths(trunk: TrunkSections, levels: Mapping[str, float]) -> None:
+def check_girths(trunk: TrunkSections, levels: Mapping[str, float], *, leaps: bool = True) -> None:
     """Check the girths of the trunk against each other.
 
     Args:
         trunk: the sections.
         levels: heights [m].
+        leaps: whether the girth may not leap; it does under a hanging bust.
 
     Raises:
         InputError: for two levels whose girths no body has together, or a girth that leaps between hip and bust.
@@ -30,7 +31,7 @@ def check_girths(trunk: TrunkSections, levels: Mapping[str, float]) -> None:
     rows = np.flatnonzero((trunk.y > levels["hip"]) & (trunk.y < levels["bust"]))
     change = np.abs(np.diff(trunk.girth[rows])) / trunk.girth[rows[:-1]]
     worst = int(np.argmax(change))
-    if change[worst] > _STEP:
+    if leaps and change[worst] > _STEP:
         a, b = rows[worst], rows[worst + 1]
         raise InputError(
             f"scan: the trunk's girth leaps from {trunk.girth[a]:.2f} to {trunk.girth[b]:.2f} m between {trunk.y[a]:.3f} and "

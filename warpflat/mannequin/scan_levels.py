@@ -24,6 +24,8 @@ _ABOVE_CROTCH = 0.58
 _NECK = 0.91
 # How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
 _BELOW_ARMPIT = 0.006
+# The girth leaps by more than this share from one section to the next.
+_LEAP = 0.06
 # Where outlines of the front run, as shares of the stature off the midplane; bust points lie a fifth of the bust apart.
 _OUTLINES, _BUST_POINT = np.linspace(0.03, 0.08, 6), 0.1
 # The outline is smoothed by so many rows. A fold bends it by so much over a way of one stature, a flat chest by half of it.
@@ -303,6 +305,11 @@ def _bust(t: TrunkSections, waist: float, armpit: float, notes: list[str]) -> fl
 
 def _underbust(t: TrunkSections, waist: float, bust: float, armpit: float, notes: list[str]) -> float:
     """Return the height of the fold under the bust: where the outline over the bust point bends forward most."""
+    # Under a hanging bust the tape lies where the girth leaps.
+    below = np.flatnonzero((t.y > waist) & (t.y < bust))
+    leap = np.diff(t.girth[below]) / t.girth[below[:-1]] if len(below) > 1 else np.zeros(1)
+    if leap.max() > _LEAP:
+        return float(t.y[below[int(np.argmax(leap))]])
     apart = _BUST_POINT * float(np.interp(bust, t.y, t.girth)) / t.stature
     outline = smooth(np.array([np.interp(apart, _OUTLINES, row) for row in t.outlines]), _FOLD_SIGMA)
     bend = np.gradient(np.gradient(outline, t.y), t.y) * t.stature

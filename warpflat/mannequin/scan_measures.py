@@ -123,7 +123,7 @@ def _fullest(y: FloatArray, girth: FloatArray, near: float, reach: float) -> flo
 
 def body_measures(
     slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], legs: LegSections, arms: Mapping[str, ScanArm],
-    neck: float, notes: Sequence[str],
+    neck: float, notes: Sequence[str], *, fitted: bool = False,
 ) -> dict[str, ScanMeasure]:  # fmt: skip
     """Return the tapes that the scan has room for, by name, from the head down.
 
@@ -135,6 +135,7 @@ def body_measures(
         arms: the sliced arms, by side.
         neck: length of the neck base [m].
         notes: what was found so far, guesses of the trunk's levels among it.
+        fitted: whether the body is a model laid on the scan: its fingers and toes may not be the scan's.
 
     Raises:
         InputError: for a girth that no body has, with its place.
@@ -170,6 +171,9 @@ def body_measures(
         foot = _foot(slicer, trunk.stature, side)
         if foot is not None:
             found[f"foot {side}"] = foot
+    if fitted:
+        ends = [name for name in found if name.startswith(("hand", "foot"))]
+        found = {n: m for n, m in found.items() if n not in ends or _is_possible(n, m, trunk.stature)}
     _check(found, trunk.stature)
     return found
 
@@ -193,10 +197,15 @@ def missing_note(measures: Mapping[str, ScanMeasure]) -> list[str]:
     return [f"the scan shows no {' and no '.join(missing)}{floor}"]
 
 
+def _is_possible(name: str, measure: ScanMeasure, stature: float) -> bool:
+    low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
+    return low * stature <= measure.girth <= high * stature
+
+
 def _check(found: Mapping[str, ScanMeasure], stature: float) -> None:
     for name, measure in found.items():
         low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
-        if not low * stature <= measure.girth <= high * stature:
+        if not _is_possible(name, measure, stature):
             raise InputError(
                 f"scan: {name} {measure.girth:.3f} m at {measure.height:.2f} m above the floor, of a body {stature:.2f} m tall: "
                 f"{low * stature:.2f} to {high * stature:.2f} m is possible; repair the mesh there"
@@ -275,6 +284,8 @@ def _biceps(arm: ScanArm, armpit: FloatArray, beyond: float) -> ScanMeasure:
     The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
     """
     rows = (arm.shares > 0.2) & (arm.shares < arm.elbow - 0.04)
+    if not rows.any():
+        raise InputError(f"scan: no upper arm between the armpit at {armpit[1]:.2f} m and the elbow; give landmarks")
     way = arm.way[rows].mean(axis=0)
     way /= np.linalg.norm(way)
     middle = arm.line[rows].mean(axis=0)

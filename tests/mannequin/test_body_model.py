@@ -1,0 +1,204 @@
+"""The statistical body: its derivatives, its poses, its fit to meshes, and scans that are read from it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from body_copies import copy_of_body
+from body_tapes import armpit_and_crotch
+
+from warpflat.core.errors import InputError
+from warpflat.mannequin.body_model import BodyModel, Person, rotation
+from warpflat.mannequin.fit_body import Mesh, fit_body
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.stand_body import finer_body, stand_body
+from warpflat.surface.io.read import read_scan
+
+needs_bodies = pytest.mark.skipif(
+    "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"
+)
+
+
+def _person(random: np.random.Generator, spread: float, bend: float) -> Person:
+    model = BodyModel.load()
+    return Person(
+        shape=spread * random.normal(size=len(model.shapes)),
+        bend=rotation(bend * random.normal(size=(len(model.joints), 3))),
+        turn=np.eye(3),
+        scale=1.65,
+        place=np.zeros(3),
+    )
+
+
+def test_derivatives_are_those_of_differences() -> None:
+    model, random = BodyModel.load(), np.random.default_rng(1)
+    person = replace(
+        _person(random, 1.0, 0.3), turn=rotation(random.normal(size=(1, 3)))[0], place=random.normal(size=3)
+    )
+    rows = np.arange(0, model.count, 97)
+    some = model.only(rows)
+    places, jacobian = some.jacobian(person)
+    np.testing.assert_allclose(places, model.vertices(person)[rows], atol=1e-12)
+    step = 1e-6 * np.eye(jacobian.shape[2])
+    differences = [(some.vertices(some.moved(person, s)) - some.vertices(some.moved(person, -s))) / 2e-6 for s in step]
+    np.testing.assert_allclose(jacobian, np.stack(differences, axis=2), atol=2e-8)
+
+
+def test_another_pose_keeps_what_lies_on_the_body() -> None:
+    model, random = BodyModel.load(), np.random.default_rng(2)
+    finer, triangles = finer_body()
+    person = _person(random, 0.7, 0.4)
+    standing = person.standing()
+    on_skin = finer @ model.vertices(person)
+    np.testing.assert_allclose(
+        model.rebend(person, standing, finer, on_skin), finer @ model.vertices(standing), atol=1e-12
+    )
+    # What stands off a straight limb stands off as far in the other pose.
+    calf = finer @ model.weights[:, model.joints.index("lowerleg01.L")] > 1.0 - 1e-12
+    away = 0.01 * random.normal(size=on_skin.shape)
+    moved = model.rebend(person, standing, finer, on_skin + away) - finer @ model.vertices(standing)
+    np.testing.assert_allclose(np.linalg.norm(moved[calf], axis=1), np.linalg.norm(away[calf], axis=1), rtol=1e-9)
+    mesh = trimesh.Trimesh(on_skin, triangles, process=False)
+    assert mesh.is_winding_consistent
+    assert mesh.volume > 0.02
+    assert not len(trimesh.grouping.group_rows(mesh.edges_sorted, require_count=1))
+
+
+def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
+    random = np.random.default_rng(3)
+    vertices, triangles = random.normal(size=(60, 3)), random.permutation(60).reshape(20, 3)
+    points = random.normal(size=(50, 3))
+    found, weights, places = Mesh(vertices, triangles).closest(points)
+    given = trimesh.Trimesh(vertices, triangles, process=False)
+    for point, face, weight, place in zip(points, found, weights, places, strict=True):
+        each = trimesh.triangles.closest_point(given.triangles, np.tile(point, (20, 1)))
+        far = np.linalg.norm(each - point, axis=1)
+        assert np.linalg.norm(place - point) == pytest.approx(far.min(), abs=1e-5)
+        assert far[face] == pytest.approx(far.min(), abs=1e-5)
+        np.testing.assert_allclose(weight @ vertices[triangles[face]], place, atol=1e-5)
+
+
+@pytest.mark.parametrize("arms", [0.0, 0.8, -0.5])
+def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
+    model, random = BodyModel.load(), np.random.default_rng(4)
+    person = _person(random, 0.6, 0.08)
+    bend = np.zeros((len(model.joints), 3))
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        bend[model.joints.index(f"upperarm01.{side}"), 2] = sign * arms
+    person = replace(person, bend=person.bend @ rotation(bend))
+    wanted = model.vertices(person)
+    wanted -= [0.0, wanted[:, 1].min(), 0.0]
+    fit = fit_body(wanted, model.triangles)
+    plain = ~model.detail
+    found = np.isfinite(fit.distance)
+    assert found[plain].mean() > 0.98
+    assert fit.distance[plain & found].mean() < 0.003
+    assert np.linalg.norm(model.vertices(fit.person) - wanted, axis=1)[plain].mean() < 0.012
+    stood = stand_body(wanted, model.triangles)
+    assert stood.unsure is None
+    assert np.quantile(Mesh(wanted, model.triangles).closest(stood.posed)[2] - stood.posed, 0.9) < 0.001
+
+
+def _body(name: str) -> tuple[np.ndarray, np.ndarray]:
+    points, faces = read_scan(Path(os.environ["WARPFLAT_DATA"]) / f"body_{name}.obj")
+    points = np.asarray(points, float)
+    return points - [0.0, points[:, 1].min(), 0.0], np.asarray(faces)
+
+
+def _tapes(points: np.ndarray, faces: np.ndarray) -> tuple[dict[str, float], tuple[str, ...]]:
+    body = Mannequin.from_scan(points, faces, resolution_mm=25.0)
+    return {name: tape.girth for name, tape in body.measures.items()}, body.notes
+
+
+@needs_bodies
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("gc_mean_female", {"bust": 0.974, "underbust": 0.807, "waist": 0.803}),
+        ("hanging_bust", {"underbust": 0.650, "hip": 1.002}),
+    ],
+)
+def test_bodies_whose_shape_does_not_show_the_levels_are_read_from_the_model(
+    name: str, wanted: dict[str, float]
+) -> None:
+    girths, notes = _tapes(*_body(name))
+    for tape, girth in wanted.items():
+        assert girths[tape] == pytest.approx(girth, abs=0.009), tape
+    assert sum("a body model laid on the scan" in note for note in notes) == 1
+
+
+def _without(which: Callable[[np.ndarray], np.ndarray], points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    return faces[~which(points[faces[:, :3]].mean(axis=1))]
+
+
+@needs_bodies
+@pytest.mark.parametrize("case", ["arms as separate meshes", "no forearms", "legs apart", "floor", "T-pose"])
+def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
+    points, faces = _body("female")
+    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    marks = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
+    armpit, _, half = marks
+    if case == "arms as separate meshes":
+        faces = _without(
+            lambda at: (
+                (np.abs(np.abs(at[:, 0]) - half - 0.16 * np.maximum(at[:, 1] - armpit, 0.0) - 0.015) < 0.015)
+                & (at[:, 1] > armpit - 0.06)
+            ),
+            points,
+            faces,
+        )
+    elif case == "no forearms":
+        reach = np.abs(points[:, 0]).max()
+        faces = _without(lambda at: np.abs(at[:, 0]) > reach - 0.17, points, faces)
+    elif case == "legs apart":
+        # As far apart as the rules, which look for legs near the midplane, no longer find them.
+        joint = np.array([0.0, 0.53 * points[:, 1].max(), 0.0])
+        for sign in (1.0, -1.0):
+            c, s = np.cos(np.radians(12.0)), np.sin(np.radians(12.0))
+            turn = np.array([[c, sign * s, 0.0], [-sign * s, c, 0.0], [0.0, 0.0, 1.0]])
+            low = np.clip((joint[1] + 0.03 - points[:, 1]) / 0.12, 0.0, 1.0) * (sign * points[:, 0] > 0.0)
+            low = low * (np.abs(points[:, 0]) < 0.26)
+            points = points + low[:, None] * ((points - joint) @ turn.T + joint - points)
+    elif case == "floor":
+        floor = trimesh.creation.box((0.8, 0.02, 0.8))
+        for _ in range(4):
+            floor = floor.subdivide()
+        new = np.column_stack([floor.faces + len(points), np.full(len(floor.faces), -1)])
+        points, faces = np.concatenate([points, floor.vertices - [0.0, 0.01, 0.0]]), np.concatenate([faces, new])
+    else:
+        points, _ = copy_of_body(points, faces, "arms up", *marks)
+    girths, notes = _tapes(points, faces)
+    assert any("a body model laid on the scan" in note for note in notes)
+    wanted = {"bust": 0.845, "underbust": 0.702, "waist": 0.652, "hip": 0.904}
+    if case == "legs apart":
+        del wanted["hip"]
+    for tape, girth in wanted.items():
+        assert girths[tape] == pytest.approx(girth, abs=0.012), tape
+
+
+@needs_bodies
+def test_sleeves_of_a_t_pose_hang_from_the_shoulders() -> None:
+    points, faces = _body("female")
+    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    marks = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
+    posed, _ = copy_of_body(points, faces, "arms up", *marks)
+    body = Mannequin.from_scan(posed, faces, resolution_mm=25.0)
+    assert any("its arms are raised by" in note for note in body.notes)
+    scan, _ = body.scan
+    wide, tall = np.abs(scan[:, 0]).max(), scan[:, 1].max()
+    hand = scan[np.abs(scan[:, 0]) > 0.95 * wide]
+    assert hand[:, 1].mean() < 0.72 * tall
+
+
+@needs_bodies
+def test_one_arm_is_refused_in_one_line() -> None:
+    points, faces = _body("female")
+    faces = _without(lambda at: (at[:, 0] > 0.2) & (at[:, 1] > 0.5 * points[:, 1].max()), points, faces)
+    with pytest.raises(InputError, match="a body model does not fit, either: the scan does not show two upper arms"):
+        Mannequin.from_scan(points, faces, resolution_mm=25.0)
