@@ -10,6 +10,7 @@ from typing import TypeGuard
 from warpflat.core.text import one_line, quote_value
 
 __all__ = [
+    "SIGNALS",
     "CannotWriteError",
     "InputError",
     "expect",
@@ -25,6 +26,9 @@ __all__ = [
 MOST_LISTED = 40
 #: Letters of a word by which the nearest one is found: comparing takes their square.
 LONGEST_COMPARED = 200
+
+#: Signals that have asked the program to end. A library may make an error of its own of one, which is no fault of a picture.
+SIGNALS: list[int] = []
 
 
 class InputError(ValueError):

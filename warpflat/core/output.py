@@ -36,14 +36,13 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.errors import CannotWriteError, InputError, expect, system_reason
+from warpflat.core.errors import SIGNALS, CannotWriteError, InputError, expect, system_reason
 from warpflat.core.file_names import check_file_name
 from warpflat.core.input_files import file_digest, listening_to_reads, read_result
 from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.text import one_line
 
 __all__ = [
-    "SIGNALS",
     "NotOursError",
     "atomic_path",
     "expect_files",
@@ -90,9 +89,6 @@ _NAMELESS = (
     "frames.usdc", "picture.png", "wear.png", "drape.png", "drape.webp", "corrected.png", "walked.png", "pattern.pdf", "pattern.json",
     "review.html", "film.webp", "contact_sheet.png",
 )  # fmt: skip
-
-#: Signals that have asked the program to end. A library may make an error of its own of one, which is no fault of a picture.
-SIGNALS: list[int] = []
 
 #: Called with the path of a file that was left out, and the note on it.
 Listener = Callable[[Path, str], object]
