@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -61,8 +62,8 @@ IMPLICIT_STEP, IMPLICIT_STEP_AT_REST = (1.0, 1.0, 1.0), (0.0, 1.0, 1.0)
 _TURNS = 4
 # Steps between two updates of a membrane's tangent stiffness.
 _MATRIX_INTERVAL = 100
-# The first steps are looked at after so many of them, and are at most so many: an iteration of L-BFGS takes as long as two to four.
-_FIRST_STEPS_PER_CHECK, _MOST_FIRST_STEPS = 3, 12
+# The first steps are looked at after so many of them, and are at most so many: an iteration of L-BFGS takes as long as three or four.
+_FIRST_STEPS_PER_CHECK, _MOST_FIRST_STEPS = 5, 20
 
 
 class Relaxation:
@@ -249,18 +250,18 @@ class Relaxation:
         else:
             self.position.assign(positions)
 
-    def energies(self, *, kinetic: bool = True) -> Energies:
-        """Return the energies of the present state [J]; that of the motion is 0 unless wanted."""
-        net, moving = self.network, 0.0
+    def energies(self) -> Energies:
+        """Return the energies of the present state [J]."""
+        net, kinetic = self.network, 0.0
         self._measure_potential.launch()
         springs, cells = self._total(self._vertex_energy), self._total(self._face_energy)
-        if kinetic and self.velocity.numpy().any():
+        if self.velocity.numpy().any():
             given, made = [net.mass, self.velocity], [self._vertex_energy]
             record(compute_kinetic_energy, dim=net.vertex_count, inputs=given, outputs=made, device=net.device).launch()
-            moving = self._total(self._vertex_energy)
+            kinetic = self._total(self._vertex_energy)
         if net.model == "springs":
-            return Energies(springs, cells, moving)
-        return Energies(cells, 0.0, moving)
+            return Energies(springs, cells, kinetic)
+        return Energies(cells, 0.0, kinetic)
 
     def evaluate(self) -> tuple[float, FloatArray]:
         """Return the energy of the cloth in the present layout [J], and the forces of cloth and seams, #V by 2 [N]; no step may follow."""
@@ -425,13 +426,15 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
             state.work_units += 1.0
             if each_step is not None:
                 each_step(state)
-        energies = state.energies(kinetic=False)
+        state.hold_grain()
+        energies = state.energies()
         now = energies.potential + network.seam_energy(state.position)
         # Eq. (11).
         gains = now < before and relative_change(before, now, count) > options.first_steps_gain
         change, before = relative_change(before, now, count), now
     state.takes_first_steps = False
     state.velocity.zero_()
+    state.load.zero_()
     if not before < first:
         state.place(start)
         energies = status.energies
@@ -449,7 +452,7 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
         restarts=state.restarts,
         energy_change=change,
         residual=math.nan,
-        energies=energies,
+        energies=replace(energies, kinetic=0.0),
         seconds=time.perf_counter() - began_at,
     )
 
