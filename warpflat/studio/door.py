@@ -138,11 +138,11 @@ class Door:
             options |= {"create_connection": Connection, "max_size": _LONGEST_MESSAGE, "logger": _quiet_logger()}
             return serve(handler, sock=self._socket, process_request=answer, **options)
 
-        websockets.asyncio.server.serve = guarded  # type: ignore[assignment,misc]
+        websockets.asyncio.server.serve = guarded
         try:
             yield
         finally:
-            websockets.asyncio.server.serve = serve  # type: ignore[misc]
+            websockets.asyncio.server.serve = serve
         if not served:
             raise RuntimeError(f"viser {viser.__version__} does not serve through websockets.asyncio.server.serve")
 
