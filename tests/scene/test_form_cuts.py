@@ -20,8 +20,8 @@ from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart, turn_d
 from warpflat.scene.form_ledger import form_ledger, with_cut
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import make_scene
+from warpflat.scene.plan import plan_garment
 from warpflat.scene.run import run_scene
-from warpflat.scene.run_garment import plan_garment
 
 BODICE = {"form": "bodice", "mannequin": {"size": "EU 38", "resolution_mm": 40}}
 FRONT = {"piece": "front", "line": "princess front left"}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from warpflat.cutting.ledger import Ledger
     from warpflat.scene.form_ledger import FormLedger
     from warpflat.scene.load import Scene
-    from warpflat.scene.write import SceneResult
+    from warpflat.scene.run import SceneResult
 
 __all__ = ["cuts"]
 
@@ -102,8 +102,8 @@ def _compare(
     from warpflat.core.toml_file import tables_as_toml
     from warpflat.cutting.ledger_picture import write_ledger_picture
     from warpflat.scene.cuts import cuts_of_entry
-    from warpflat.scene.form_ledger import form_ledger, with_cut
-    from warpflat.scene.run import files_of_run, run_scene, scene_ledger
+    from warpflat.scene.form_ledger import form_ledger, scene_ledger, with_cut
+    from warpflat.scene.run import files_of_run, run_scene
 
     is_form = loaded.settings.mannequin is not None
     files = ["ledger.json", "cuts.toml" if is_form else "ledger.png"]

@@ -14,7 +14,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name, quote_value
 from warpflat.flattening.applied_cut import seam_kind
-from warpflat.garment.closed_cuts import CLOSED, are_closed, close_cuts
+from warpflat.garment.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
@@ -26,7 +26,6 @@ from warpflat.surface.cut.dart import fish_eye_measure
 from warpflat.surface.cut.dart_legs import are_curved, pull_back, pull_back_eye
 
 if TYPE_CHECKING:
-    from warpflat.flattening.applied_cut import AppliedCut
     from warpflat.flattening.result import Flattening
     from warpflat.surface.border_seams import NamedSeam
     from warpflat.surface.cut.cut_mesh import Seam as Cut
@@ -124,13 +123,13 @@ def _piece(result: Flattening, size: str) -> Piece:
     """Return one piece with its cuts as darts, and its grain."""
     darts: dict[str, tuple[int, int, int]] = {}
     fisheyes: dict[str, Cut] = {}
-    tip_back = {title: cut.tip_back for title, cut, _ in _cuts(result)}
+    tip_back = {title: cut.tip_back for title, cut, _ in seams_of_cuts(result)}
     closed = _closed_cuts(result)
     faces, lines = result.faces, dict(result.network.surface.lines)
     if closed:
         faces, lines = close_cuts(faces, lines, closed, count=len(result.positions))
     loops = border_loops(faces)
-    for title, _, seam in _cuts(result):
+    for title, _, seam in seams_of_cuts(result):
         kind = seam_kind(seam)
         if title in closed:
             continue
@@ -168,17 +167,8 @@ def _piece(result: Flattening, size: str) -> Piece:
     return replace(piece, darts=drawn, grain=grain)
 
 
-def _cuts(result: Flattening) -> list[tuple[str, AppliedCut, Cut]]:
-    """Return the seams of all cuts, each with its name in the pattern and its cut."""
-    return [
-        (cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}", cut, seam)
-        for cut in result.cuts
-        for number, seam in enumerate(cut.seams, start=1)
-    ]
-
-
 def _closed_cuts(result: Flattening) -> dict[str, Cut]:
-    return {title: seam for title, _, seam in _cuts(result) if are_closed(result.positions, seam)}
+    return {title: seam for title, _, seam in seams_of_cuts(result) if are_closed(result.positions, seam)}
 
 
 def _clear_of_holes(grain: FloatArray, piece: Piece) -> FloatArray:

@@ -42,6 +42,7 @@ from warpflat.surface.cut.dart_legs import are_curved, open_length
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
     from warpflat.garment.garment import Garment as FlatGarment
+    from warpflat.mannequin.forms import FormResult
     from warpflat.mannequin.pieces import FormPiece
 
 __all__ = ["grain_of", "pattern_of_garment"]
@@ -74,14 +75,14 @@ def pattern_of_garment(
             crosses itself, or the sizes differ in their edges.
     """
     rules = rules or EdgeRules()
-    sample = next(iter(garments.values()))
+    sample, forms = next(iter(garments.values())), {size: _form_of(garment) for size, garment in garments.items()}
+    form = next(iter(forms.values()))
     if sample.wished is not None:
-        positions = {piece: each.positions for piece, each in sample.pieces.items()}
-        ease, eased = measure_ease(sample.form, sample.wished, positions)
+        ease, eased = measure_ease(form, sample.wished, sample.positions)
         rules = replace(rules, ease={**ease, **rules.ease, **{seam: ease[seam] for seam in eased}}, eased=eased)
     garments = _laid_upon_each_other(garments)
-    plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
-    form, plan = next(iter(garments.values())).form, next(iter(plans.values()))
+    plans = {size: plan_form(each, rules) for size, each in forms.items()}
+    plan = next(iter(plans.values()))
     bent = _bent_folds(garments)
     folds = {piece: edge for piece, edge in find_fold_lines(form, plan).items() if piece not in bent}
     opened = {name: piece.fold for name, piece in form.pieces.items() if piece.fold and name not in folds}
@@ -102,10 +103,7 @@ def pattern_of_garment(
     )
     pattern = Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
     placed = {
-        size: [
-            place_opening(garment.form, opening, {piece: flat.positions for piece, flat in garment.pieces.items()})
-            for opening in garment.openings
-        ]
+        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
         for size, garment in garments.items()
     }
     pattern = mark_openings(pattern, sample.openings, placed)
@@ -114,6 +112,12 @@ def pattern_of_garment(
     ]
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=_stands(pattern, sample.openings))
     return add_pockets(pattern, sample.pockets), notes
+
+
+def _form_of(garment: FlatGarment) -> FormResult:
+    if garment.form is None:
+        raise InputError(f"garment {garment.name!r} has no form; surface_files draws the pattern of a mesh")
+    return garment.form
 
 
 def _stands(pattern: Garment, openings: Sequence[Opening]) -> list[Stand]:
@@ -167,11 +171,12 @@ def _pieces(
     quantities: Mapping[str, int],
 ) -> tuple[Piece, ...]:
     """Return all pieces of one size; those in `opened` are halves that cannot lie on the fold and are cut twice."""
-    pleats = pleat_depths(garment.form)
+    form = _form_of(garment)
+    pleats = pleat_depths(form)
     return tuple(
         _piece(
             flat,
-            garment.form.pieces[name],
+            form.pieces[name],
             plan.edges[name],
             rules=rules,
             size=size,
@@ -237,7 +242,7 @@ def _bent_folds(garments: Mapping[str, FlatGarment]) -> dict[str, float]:
     bent: dict[str, float] = {}
     for garment in garments.values():
         for name, flat in garment.pieces.items():
-            piece = garment.form.pieces[name]
+            piece = _form_of(garment).pieces[name]
             if piece.fold is None:
                 continue
             points = flat.positions[piece.edges[piece.fold]]

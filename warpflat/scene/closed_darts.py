@@ -38,8 +38,8 @@ def without_closed_darts(scene: Scene, garments: Iterable[Garment]) -> tuple[Sce
     own = {place_of(table.model_dump()) for table in scene.settings.cuts}
     closed = []
     for garment in garments:
-        flat = {name: piece.positions for name, piece in garment.pieces.items()}
-        closed += [d for d in closed_darts(garment.form, flat) if d.place not in own and d not in closed]
+        found = [] if garment.form is None else closed_darts(garment.form, garment.positions)
+        closed += [d for d in found if d.place not in own and d not in closed]
     if scene.settings.shape != "darts":
         # A woven sleeve around a bent elbow has its dart in every shape.
         closed = [dart for dart in closed if ELBOW in dart.place]

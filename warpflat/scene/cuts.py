@@ -146,7 +146,7 @@ def plan_automatic_cuts(
     *,
     flatten: Callable[[Surface, RelaxOptions], Flattening],
     relax: RelaxOptions,
-) -> tuple[CutSequence, tuple[Ledger, ...]]:
+) -> CutSequence:
     """Find the best cuts with coarse relaxations; full ones decide later which of them are needed.
 
     Args:
@@ -156,7 +156,7 @@ def plan_automatic_cuts(
         relax: the scene's options.
 
     Returns:
-        The cuts, none where there is nothing to cut for or no line to cut along, as a note then says; the ledger of each round.
+        The cuts, none where there is nothing to cut for or no line to cut along, as a note then says.
 
     Raises:
         InputError: a cut that is made before is refused.
@@ -171,16 +171,15 @@ def plan_automatic_cuts(
     result = flatten_and_cut(sequence, flatten=flatten, relax=coarse_options(relax))
     why = "none would release energy without overlapping"
     try:
-        result, ledgers = cut_automatically(result, search, relax=relax, fully=False)
+        result, _ = cut_automatically(result, search, relax=relax, fully=False)
     except InputError as nowhere:
-        ledgers, why = (), str(nowhere)
+        why = str(nowhere)
     plans = tuple(CutPlan.from_applied(made) for made in result.cuts)
     found = [plan.name for plan in plans[len(sequence.plans) :]]
     note = f"cuts found: {'; '.join(found)}" if found else f"no cut was found: {why}"
-    planned = CutSequence(
+    return CutSequence(
         surface=result.surface, plans=plans, auto=auto, first_auto=len(sequence.plans), notes=(*sequence.notes, note)
     )
-    return planned, ledgers
 
 
 def flatten_and_cut(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.cutting.candidates import find_candidates, find_peaks
-from warpflat.cutting.ledger import RankedBy, coarse_options
+from warpflat.cutting.ledger import Ledger, RankedBy, coarse_options, make_ledger
 from warpflat.flattening.result import Flattening
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.mannequin.bricks import select_bricks
@@ -21,10 +22,11 @@ from warpflat.mannequin.forms import Form
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.part_pieces import princess_seams
+from warpflat.scene.cuts import flatten_and_cut
 from warpflat.scene.form import scene_form, scene_recipe
 from warpflat.scene.form_cuts import cut_of_dart, cuts_beside, place_of, scene_with
-from warpflat.scene.load import Scene
-from warpflat.scene.run_garment import GarmentPlan, plan_garment
+from warpflat.scene.load import Scene, errors_named, scene_relax_options
+from warpflat.scene.plan import GarmentPlan, flatten_surface, plan_garment, scene_cuts
 
 __all__ = [
     "FormEntry",
@@ -32,6 +34,7 @@ __all__ = [
     "FormTrial",
     "candidate_cuts",
     "form_ledger",
+    "scene_ledger",
     "trial_of_scene",
     "try_cuts",
     "with_cut",
@@ -160,7 +163,7 @@ def trial_of_scene(scene: Scene, *, device: str | None = None) -> FormTrial:
     """Flatten a scene's pieces one by one.
 
     Raises:
-        InputError: as :func:`warpflat.scene.run_garment.plan_garment`.
+        InputError: as :func:`warpflat.scene.plan.plan_garment`.
     """
     plan = plan_garment(scene, device=device)
     _, recipe = scene_recipe(scene, plan.mannequin)
@@ -300,6 +303,7 @@ def _try(base: FormTrial, cut: Mapping[str, Any]) -> FormEntry:
 
 def _mouth(garment: Garment, dart: PlacedDart) -> float:
     """Return how wide a dart opens at most [m], negative where its legs overlap."""
+    assert garment.form is not None
     piece, positions = garment.form.pieces[dart.piece], garment.pieces[dart.piece].positions
     left, right = (positions[leg] for leg in piece.legs()[dart.name])
     widest = int(np.linalg.norm(left - right, axis=1).argmax())
@@ -313,3 +317,23 @@ def _outside(pieces: Sequence[Flattening]) -> float:
     """Return the share of the cloth of some pieces that is strained beyond its limit."""
     areas = [float(piece.network.cell_arrays.area.sum()) for piece in pieces]
     return sum(piece.fit.outside * area for piece, area in zip(pieces, areas, strict=True)) / sum(areas)
+
+
+def scene_ledger(scene: Scene, *, by: RankedBy = "per_cm", device: str | None = None) -> Ledger:
+    """Try and rank candidates for the next cut of the scene's piece, after its own cuts and without its seams and constraints.
+
+    Raises:
+        InputError: as :func:`warpflat.scene.plan.scene_cuts`, or there is no candidate.
+    """
+    if scene.settings.mannequin is not None:
+        raise InputError(f"{scene.where}: is a form; warpflat.scene.form_ledger compares its cuts")
+    relax = scene_relax_options(scene)
+    sequence = scene_cuts(scene, device=device)
+    with errors_named(scene.where):
+        result = flatten_and_cut(sequence, flatten=partial(flatten_surface, scene, device=device), relax=relax)
+        ledger = make_ledger(result, relax=relax, by=by)
+    asked = [key for key in ("seams", "constraints") if getattr(scene.settings, key)]
+    if not asked:
+        return ledger
+    note = f"candidates are compared without the scene's {' and '.join(asked)}; a run keeps them, --apply too"
+    return replace(ledger, notes=(note,))
