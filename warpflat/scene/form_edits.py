@@ -15,8 +15,8 @@ from warpflat.core.toml_file import tables_as_toml
 from warpflat.garment.form_plan import plan_form
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.darts import FormDart
+from warpflat.scene.cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.form import scene_form, scene_recipe
-from warpflat.scene.form_cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import Scene
 from warpflat.scene.plan import plan_garment

@@ -32,9 +32,8 @@ from warpflat.mannequin.darts import dart_along
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
-from warpflat.scene.cuts import CutSequence, plan_automatic_cuts, plan_cuts
+from warpflat.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.scene.form import scene_form, scene_recipe
-from warpflat.scene.form_cuts import cut_of_dart
 from warpflat.scene.frames import FrameRecorder
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands

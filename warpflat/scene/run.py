@@ -30,10 +30,9 @@ from warpflat.garment.sew_pieces import unsewn_notes
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.review.page import pack_frames, pack_pictures, write_review
-from warpflat.scene.closed_darts import ClosedDarts, require_open_darts
 from warpflat.scene.cuts import CutSequence
 from warpflat.scene.drape import drape_names, write_drape
-from warpflat.scene.form_shaping import settle_shape
+from warpflat.scene.form_shaping import ClosedDarts, require_open_darts, settle_shape
 from warpflat.scene.frames import MANNEQUIN, Film, FrameSchedule
 from warpflat.scene.load import Scene
 from warpflat.scene.plan import GarmentPlan, MeshPlan, plan_scene
@@ -80,7 +79,7 @@ def run_scene(
         out: folder for the files, made if need be.
         on_progress: called after each step.
         device: Warp device, before the scene's own.
-        cuts: of a surface, to be made instead of the scene's own (see `warpflat.scene.cuts.cuts_of_entry`).
+        cuts: of a surface, to be made instead of the scene's own (see `warpflat.scene.ledger.cuts_of_entry`).
         built: gives the scene's mannequin and form, where they are built already.
 
     Raises:

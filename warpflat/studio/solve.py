@@ -17,10 +17,9 @@ from warpflat.garment.darts import measure_darts
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
-from warpflat.scene.closed_darts import without_closed_darts
 from warpflat.scene.cuts import CutSequence
 from warpflat.scene.form import scene_form
-from warpflat.scene.form_shaping import settle_shape
+from warpflat.scene.form_shaping import settle_shape, without_closed_darts
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_relax_options
 from warpflat.scene.plan import GarmentPlan, plan_garment, plan_mesh, scene_cuts
 from warpflat.scene.surface import scene_surface
