@@ -65,7 +65,7 @@ PARTS = {
     "walked.png": ("export.picture_walked:write_walked_picture",),
     "pattern, drafting": (
         "garment.to_pattern:pattern_of_garment",
-        "garment.surface_to_pattern:pattern_of_surface",
+        "garment.to_pattern:pattern_of_surface",
         "pattern.draft:draft_garment",
         "pattern.walked:walk_seams",
     ),

@@ -29,7 +29,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.garment import Garment as Flattened
 from warpflat.garment.garment import flatten_form
 from warpflat.garment.pattern_files import PatternOptions, export_patterns, surface_files
-from warpflat.garment.surface_to_pattern import check_edge_names, pattern_of_surface
+from warpflat.garment.to_pattern import check_edge_names, pattern_of_surface
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.curves import fit_curve

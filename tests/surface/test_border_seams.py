@@ -14,7 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.sew_pieces import sew_pieces
-from warpflat.garment.surface_to_pattern import pattern_of_surface
+from warpflat.garment.to_pattern import pattern_of_surface
 from warpflat.pattern.draft import draft_garment
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene

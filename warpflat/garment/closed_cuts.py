@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["CLOSED", "are_closed", "close_cuts", "seams_of_cuts"]
 
-#: A cut whose sides lie nearer to each other than this [m] everywhere is a line: patterns are drawn to 0.1 mm.
+#: A cut whose sides lie nearer to each other than this [m] everywhere is a line, and legs of a dart that overlap by no more before
+#: its tip are closed there: patterns are drawn to 0.1 mm.
 CLOSED = 1e-4
 
 

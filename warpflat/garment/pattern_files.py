@@ -113,20 +113,15 @@ def garment_files(
     Raises:
         InputError: a printed name is for no piece, or the folder cannot be written.
     """
-    from warpflat.garment.surface_to_pattern import pattern_of_surface
     from warpflat.garment.to_pattern import pattern_of_garment
 
     options, first = options or PatternOptions(), next(iter(garments.values()))
     if first.form is not None:
         check_names(options.names, first.parts)
-
-    def make() -> tuple[Pattern, tuple[str, ...]]:
-        if first.form is None:
-            parts = list(first.parts.values())
-            return pattern_of_surface(parts, name=name, rules=options.rules, seams=first.named_seams)
-        return pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size)
-
-    return _write_pattern(make, folder, name, options)
+    return _write_pattern(
+        lambda: pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size),
+        folder, name, options,
+    )  # fmt: skip
 
 
 def surface_files(
@@ -151,7 +146,7 @@ def surface_files(
     Raises:
         InputError: the folder cannot be written.
     """
-    from warpflat.garment.surface_to_pattern import pattern_of_surface
+    from warpflat.garment.to_pattern import pattern_of_surface
 
     options = options or PatternOptions()
     return _write_pattern(

@@ -26,7 +26,7 @@ from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.openings import Opening, place_opening
 from warpflat.garment.pattern_files import PatternOptions, check_names
 from warpflat.garment.sew_pieces import name_seams, sew_pieces
-from warpflat.garment.surface_to_pattern import check_edge_names
+from warpflat.garment.to_pattern import check_edge_names
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import dart_along
 from warpflat.mannequin.forms import FormResult
