@@ -52,7 +52,7 @@ def _judged(cases: Iterator[Case], *, workers: int, seconds: float | None) -> It
 def _save(case: Case, number: int) -> Path:
     """Leaves the odd file of a case, or its command line, where it can be run again and moved to tests/regressions."""
     FOUND.mkdir(exist_ok=True)
-    if case.kind in ("batch", "result", "folder"):
+    if case.kind in ("batch", "result", "folder", "form", "tables", "pieces", "open"):
         file = FOUND / f"{number}.folder.json"
         file.write_bytes(packed(case))
         return file

@@ -132,7 +132,9 @@ def flatten(
     try:
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
     except InputError as error:
-        raise InputError(re.sub(r'component = "(largest|all)"', r"--component \1", str(error))) from None
+        told = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
+        # What is said of no option is about the mesh.
+        raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", told)) from None
 
 
 def _safe_name(mesh: Path) -> str:

@@ -132,9 +132,12 @@ def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator
     Raises:
         InputError: whatever went wrong.
     """
+    import numpy as np
+
     form, place = FORMATS[kind], Place()
     try:
-        yield place
+        with np.errstate(all="ignore"):  # what is no number is refused where it is checked, not warned of on the way
+            yield place
     except InputError as error:
         told = str(error)
         # An error that names a file already, this one or one beside it, is not told of another.

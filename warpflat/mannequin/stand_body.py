@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.sparse import factor_symmetric
 from warpflat.mannequin.body_model import BodyModel
 from warpflat.mannequin.fit_body import FittedBody, Mesh, fit_body, vertex_normals
 from warpflat.mannequin.slicer import Slicer
@@ -131,7 +132,6 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
         patched: by triangle of the scan, whether it closes a hole.
     """
     from scipy.sparse import diags_array
-    from scipy.sparse.linalg import splu
 
     finer, triangles = finer_body()
     bending, points, seen = _bending(), start, np.zeros(len(start), dtype=bool)
@@ -157,7 +157,7 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
         along = np.where(seen, along, np.einsum("va,va->v", start - points, normals))
         weight = np.where(seen, 1.0 / (1.0 + (far / reach) ** 2) ** 2, _HOME)
         system = diags_array(weight) + stiffness * bending
-        points = points + splu(system.tocsc()).solve(weight * along)[:, None] * normals
+        points = points + factor_symmetric(system)(weight * along)[:, None] * normals
     return points, seen
 
 
@@ -175,16 +175,18 @@ def stand_body(
     corners = vertices[triangles]
     if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
         triangles = triangles[:, ::-1]
-    found = _stand(vertices, triangles, scanned)
+    found = _stand(fit_body(vertices, triangles), vertices, triangles, scanned)
     if found.unsure is not None and not faces_ahead:
-        turned = _stand(vertices * [-1.0, 1.0, -1.0], triangles, scanned)
-        if turned.unsure is None:
-            return replace(turned, turned=True)
+        vertices = vertices * [-1.0, 1.0, -1.0]
+        fit = fit_body(vertices, triangles)
+        if fit.cost < found.fit.cost:
+            turned = _stand(fit, vertices, triangles, scanned)
+            if turned.unsure is None:
+                return replace(turned, turned=True)
     return found
 
 
-def _stand(vertices: FloatArray, triangles: NDArray[np.int64], scanned: int | None) -> StandingBody:
-    fit = fit_body(vertices, triangles)
+def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], scanned: int | None) -> StandingBody:
     model, (finer, faces) = BodyModel.load(), finer_body()
     weights = finer @ model.weights
     patched = np.arange(len(triangles)) >= (len(triangles) if scanned is None else scanned)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.input_files import guarded
 from warpflat.scene.load import Scene, errors_named, expand_variables
 from warpflat.scene.schema import (
     BorderTable,
@@ -39,8 +41,7 @@ def scene_surface(scene: Scene) -> Surface:
         with errors_named(f"{scene.where}: surface"):
             surface = make_shape(table.shape, **(table.model_extra or {}))
     else:
-        with errors_named(f"{scene.where}: surface.file"):
-            path = scene.folder / expand_variables(table.file)
+        path = _file(scene, table)
         if table.component == "all":
             raise InputError(
                 f'{scene.where}: surface.component: this needs one piece; "all" is for `warpflat run` and `flatten`'
@@ -76,9 +77,15 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
     table = scene.settings.surface
     if not isinstance(table, FileSurface) or table.component != "all":
         return None
+    return read_pieces(_file(scene, table), units=table.units, name=scene.name)
+
+
+def _file(scene: Scene, table: FileSurface) -> Path:
     with errors_named(f"{scene.where}: surface.file"):
         path = scene.folder / expand_variables(table.file)
-    return read_pieces(path, units=table.units, name=scene.name)
+        with guarded(path, "mesh", missing="does not exist"):
+            path.stat()
+    return path
 
 
 def _line(surface: Surface, table: LineTable) -> IntArray:
