@@ -66,14 +66,7 @@ def cuts(
       warpflat cuts scenes/basic_block.toml --rotate "front_bodice.bust dart" "princess front left" --at "shoulder left"
       warpflat cuts scenes/basic_block.toml --turn "front_bodice.waist dart" seam
     """
-    from warpflat.cli.progress_bar import ProgressBar
-    from warpflat.cli.tables import ledger_table
-    from warpflat.core.output import optional_file, output_folder, write_report
-    from warpflat.core.toml_file import tables_as_toml
-    from warpflat.cutting.ledger_picture import write_ledger_picture
-    from warpflat.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.scene.load import load_scene
-    from warpflat.scene.run import files_of_run, run_scene
 
     loaded = load_scene(scene)
     start_warp_silently()
@@ -83,6 +76,14 @@ def cuts(
         return _edit(loaded, target, edits, at, quiet=quiet, as_json=as_json, device=device)
     if at is not None:
         raise InputError("--at belongs to --rotate and --split")
+    from warpflat.cli.progress_bar import ProgressBar
+    from warpflat.cli.tables import ledger_table
+    from warpflat.core.output import optional_file, output_folder, write_report
+    from warpflat.core.toml_file import tables_as_toml
+    from warpflat.cutting.ledger_picture import write_ledger_picture
+    from warpflat.scene.ledger import cuts_of_entry, scene_ledger, with_cut
+    from warpflat.scene.run import files_of_run, run_scene
+
     on_form = loaded.settings.mannequin is not None
     expected = ["ledger.json", "ledger.png", *(["cuts.toml"] if on_form else [])]
     expected += files_of_run(loaded) if apply is not None else []
