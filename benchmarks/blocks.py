@@ -30,7 +30,7 @@ import numpy as np
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import Garment
 from warpflat.scene.load import load_scene, make_scene
-from warpflat.scene.run_garment import plan_garment
+from warpflat.scene.plan import plan_garment
 
 SCENE = Path(__file__).parents[1] / "scenes" / "basic_block.toml"
 SIZES = ("EU 36", "EU 38", "EU 40", "EU 42", "EU 44")

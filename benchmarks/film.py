@@ -89,7 +89,7 @@ def child(scene: str, folder: str, compact: str) -> None:
     """Run a scene in this process as the program does; print the processor seconds of film and page, imports among them."""
     from warpflat.cli.run import start_warp_silently
     from warpflat.core.beside import work_beside
-    from warpflat.scene.form_cuts import scene_with
+    from warpflat.scene.cuts import scene_with
 
     spent, inside = {"film": 0.0, "page": 0.0}, []
 

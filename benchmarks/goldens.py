@@ -238,9 +238,9 @@ def pieces_of_a_file(folder: Path) -> Record:
     (folder / "halves.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
     pieces = warpflat.flatten_all(warpflat.read_pieces(folder / "halves.obj", units="m"), fabric="woven")
     sewn = warpflat.sew_pieces(pieces)
-    assert sewn is not None, "both halves meet at the centre"
+    assert sewn.sewn is not None, "both halves meet at the centre"
     lengths = {f"{seam.name} {n}": 1e3 * length for seam in sewn.seams for n, length in enumerate(seam.lengths)}
-    return pattern_record({piece.surface.name: piece for piece in sewn.pieces}, together=True, lengths=lengths)
+    return pattern_record(sewn.pieces, together=True, lengths=lengths)
 
 
 def derivatives(_: Path) -> Record:

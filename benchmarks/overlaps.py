@@ -24,7 +24,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.progress import CONTACT
 from warpflat.flattening.result import Flattening
-from warpflat.garment.surface_to_pattern import pattern_of_surface
+from warpflat.garment.to_pattern import pattern_of_surface
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.injective import border_edges_of, crack_edges_of
 from warpflat.surface.io.read import read_surface

@@ -19,7 +19,7 @@ from typing import Any
 
 from warpflat.garment.pattern_files import garment_files
 from warpflat.scene.load import load_scene, make_scene
-from warpflat.scene.run_garment import plan_garment
+from warpflat.scene.plan import plan_garment
 
 SCENES = Path(__file__).parents[1] / "scenes"
 GARMENTS = ("basic_block", "dress", "princess_dress", "zip_skirt", "trousers")

@@ -14,8 +14,7 @@ from warpflat.core.output import remove_stale
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.pattern_files import export_patterns
 from warpflat.scene.load import make_scene
-from warpflat.scene.run import run_scene
-from warpflat.scene.write import SceneResult
+from warpflat.scene.run import SceneResult, run_scene
 from warpflat.surface.shapes import make_shape
 
 PATTERN = {"cap.dxf", "cap.svg", "pattern.pdf", "pattern.json"}

@@ -242,7 +242,8 @@ def test_ledger_of_any_piece(piece: PicturePiece, names: list[str], data: st.Dat
     shape = piece.surface
     entries = [
         SimpleNamespace(
-            candidate=SimpleNamespace(name=name, paths=[np.arange(2)], drawn=[]),
+            name=name,
+            paths=[shape.vertices[:2]],
             per_cm=data.draw(st.sampled_from([0.0, -1.0, 1e-9, 3.0, 1e4])),
             released=0.1,
             model_energy_after=0.0,
@@ -259,7 +260,7 @@ def test_ledger_of_any_piece(piece: PicturePiece, names: list[str], data: st.Dat
         stages=[SimpleNamespace(strain_energy_j=1e3)],
         worn=SimpleNamespace(area=face_areas(shape.vertices, shape.faces)),
     )
-    ledger = SimpleNamespace(result=result, entries=entries, peaks=SimpleNamespace(words=[]))
+    ledger = SimpleNamespace(name=shape.name, pieces=[result], entries=entries, peaks=[])
     check_written(ledger_picture, ledger_picture.write_ledger_picture, ledger)
 
 

@@ -22,7 +22,7 @@ from warpflat.flattening import keep_apart
 from warpflat.flattening.edit import change_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
-from warpflat.garment.surface_to_pattern import pattern_of_surface
+from warpflat.garment.to_pattern import pattern_of_surface
 from warpflat.solver import contact
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.injective import is_injective

@@ -18,7 +18,7 @@ from warpflat.mannequin.shapes import shaped_form
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.half_pieces import halved
 from warpflat.scene.load import make_scene
-from warpflat.scene.run_garment import plan_garment
+from warpflat.scene.plan import plan_garment
 from warpflat.surface.cut.dart_legs import open_length
 from warpflat.surface.overlap import OVERLAP
 

@@ -16,8 +16,7 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.form_plan import plan_form
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.garment.surface_to_pattern import pattern_of_surface
-from warpflat.garment.to_pattern import pattern_of_garment
+from warpflat.garment.to_pattern import pattern_of_garment, pattern_of_surface
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.draft import draft_garment

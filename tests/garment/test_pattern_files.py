@@ -29,7 +29,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.garment import Garment as Flattened
 from warpflat.garment.garment import flatten_form
 from warpflat.garment.pattern_files import PatternOptions, export_patterns, surface_files
-from warpflat.garment.surface_to_pattern import check_edge_names, pattern_of_surface
+from warpflat.garment.to_pattern import check_edge_names, pattern_of_surface
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.curves import fit_curve
@@ -161,7 +161,7 @@ def test_a_misspelt_edge_of_a_surface_is_told_before_anything_is_flattened(
     def too_late(*_: object, **__: object) -> None:
         raise AssertionError("it was flattened first")
 
-    monkeypatch.setattr("warpflat.flattening.flatten_piece.flatten", too_late)
+    monkeypatch.setattr("warpflat.scene.plan.flatten", too_late)
     (tmp_path / "trial.toml").write_text(PARTED + text)
     with pytest.raises(InputError, match=rf"trial\.toml: pattern: {message}"):
         run_scene(load_scene(tmp_path / "trial.toml"), tmp_path / "out")
@@ -465,7 +465,7 @@ def test_another_size_that_went_wrong_is_a_warning(
         back = replace(back, positions=back.positions * [-1.0, 1.0])
         return replace(garment, pieces={"front": front, "back": back})
 
-    monkeypatch.setattr("warpflat.scene.run_garment.flatten_form", flattened)
+    monkeypatch.setattr("warpflat.scene.plan.flatten_form", flattened)
     (tmp_path / "scene.toml").write_text(NEST)
     assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), "--quiet"]) == 1
     warnings = capsys.readouterr().err.splitlines()

@@ -14,14 +14,13 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.export.read_pattern_json import read_pattern_json
 from warpflat.garment.pattern_files import PatternOptions, garment_files
-from warpflat.scene.closed_darts import without_closed_darts
 from warpflat.scene.form import scene_form
 from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart, turn_dart
-from warpflat.scene.form_ledger import form_ledger, with_cut
-from warpflat.scene.form_shaping import settle_shape
+from warpflat.scene.form_shaping import settle_shape, without_closed_darts
+from warpflat.scene.ledger import scene_ledger, with_cut
 from warpflat.scene.load import make_scene
+from warpflat.scene.plan import plan_garment
 from warpflat.scene.run import run_scene
-from warpflat.scene.run_garment import plan_garment
 
 BODICE = {"form": "bodice", "mannequin": {"size": "EU 38", "resolution_mm": 40}}
 FRONT = {"piece": "front", "line": "princess front left"}
@@ -33,7 +32,7 @@ def scene(**tables: object):
 
 @pytest.fixture(scope="module")
 def ledger():
-    return form_ledger(scene(), by="released")
+    return scene_ledger(scene(), by="released")
 
 
 def test_the_ledger_knows_the_darts_of_a_book_and_what_they_release(ledger):

@@ -185,7 +185,7 @@ def test_a_cut_that_does_not_open_is_a_line_of_a_whole_pattern(tmp_path: Path):
 
 
 def test_a_plane_all_through_may_be_given_by_any_of_its_points(tmp_path: Path):
-    from warpflat.scene.run import scene_cuts
+    from warpflat.scene.plan import scene_cuts
 
     def paths(point: list[float], **more: object):
         plane = {"point": point, "normal": [0.0, 1.0, 0.0], **more}

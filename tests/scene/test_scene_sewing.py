@@ -199,7 +199,7 @@ def test_an_oblique_grain_on_the_fold_is_told_before_anything_is_flattened(
     def too_late(*_: object, **__: object) -> None:
         raise AssertionError("it was flattened first")
 
-    monkeypatch.setattr("warpflat.scene.run_garment.flatten_form", too_late)
+    monkeypatch.setattr("warpflat.scene.plan.flatten_form", too_late)
     with pytest.raises(InputError, match=r"trial.toml: grain_angle: front, back on the fold, with the grain at 30 deg"):
         run_scene(scene(SKIRT, half=True, grain_angle=30.0), tmp_path)
     for sound in ({"half": True, "grain_angle": 90.0}, {"grain_angle": 30.0}):

@@ -15,7 +15,7 @@ import pytest
 from warpflat.core.errors import InputError
 from warpflat.core.toml_file import document_as_toml
 from warpflat.scene.load import load_scene, make_scene
-from warpflat.scene.run import flatten_scene, scene_cuts
+from warpflat.scene.plan import plan_mesh
 from warpflat.studio.cut_tables import cut_along, cut_between, cuttable_lines
 from warpflat.studio.frame import PieceFrame, Watch
 from warpflat.studio.maps import face_values, piece_scale, vertex_values
@@ -64,7 +64,7 @@ def bodice(folder: Path, **more: Any) -> Session:
 
 
 def from_scratch(session: Session) -> float:
-    result, _ = flatten_scene(session.scene, scene_cuts(session.scene))
+    result = next(iter(plan_mesh(session.scene).flatten().pieces.values()))
     return result.stages[-1].strain_energy_j
 
 

@@ -13,8 +13,8 @@ from scipy.spatial import Delaunay
 from warpflat.core.errors import InputError
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
-from warpflat.garment.sew_surface import sew_surface
-from warpflat.garment.surface_to_pattern import pattern_of_surface
+from warpflat.garment.sew_pieces import sew_pieces
+from warpflat.garment.to_pattern import pattern_of_surface
 from warpflat.pattern.draft import draft_garment
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
@@ -67,8 +67,8 @@ def alone() -> Flattening:
 def test_sides_of_other_vertices_are_sewn_by_arc_length(alone: Flattening):
     before = abs(lengths(alone, "front") - lengths(alone, "back"))
     assert before > 5e-4, "there is something to sew"
-    sewn = sew_surface(alone, seams=[UNDERARM])
-    assert sewn is not None
+    sewn = sew_pieces([alone], seams=[UNDERARM])
+    assert sewn.sewn is not None
     assert sewn.sewn.converged
     (seam,) = sewn.seams
     assert seam.sides == ("sleeve.front", "sleeve.back")
@@ -76,7 +76,7 @@ def test_sides_of_other_vertices_are_sewn_by_arc_length(alone: Flattening):
     assert seam.cost is not None
     assert seam.cost > 0
     # Not only in all: from end to end both lie at the same shares of their length, or nearly so.
-    result = sewn.result
+    result = sewn.pieces["sleeve"]
     (found,) = surface_seams(result.network.surface, [UNDERARM])
     assert found.joints is not None
     flat = [result.positions[ids] for ids in found.vertices]
@@ -89,9 +89,8 @@ def test_sides_of_other_vertices_are_sewn_by_arc_length(alone: Flattening):
 
 
 def test_the_pattern_sews_and_notches_what_was_named(alone: Flattening):
-    sewn = sew_surface(alone, seams=[UNDERARM])
-    assert sewn is not None
-    pattern, _ = pattern_of_surface([sewn.result], name="sleeve", seams=[UNDERARM])
+    sewn = sew_pieces([alone], seams=[UNDERARM])
+    pattern, _ = pattern_of_surface([sewn.pieces["sleeve"]], name="sleeve", seams=[UNDERARM])
     assert [seam.name for seam in pattern.seams] == ["underarm"]
     drafted = draft_garment(pattern)
     assert abs(drafted.seams[0].difference_mm) < 0.5
@@ -179,17 +178,17 @@ def band(resolution: int) -> Flattening:
 
 
 def test_a_band_free_of_strain_is_at_rest_when_it_is_sewn():
-    found = sew_surface(band(41), seams=[CENTRE_BACK], options=RelaxOptions(max_steps=500))
-    assert found is not None
+    found = sew_pieces([band(41)], seams=[CENTRE_BACK], options=RelaxOptions(max_steps=500))
+    assert found.sewn is not None
     assert found.sewn.converged
     assert found.sewn.largest_difference < 1e-6
 
 
 def test_a_band_free_of_strain_is_not_at_rest_while_a_seam_pulls():
-    found = sew_surface(band(17), seams=[replace(CENTRE_BACK, factor=1.001)])
-    assert found is not None
+    found = sew_pieces([band(17)], seams=[replace(CENTRE_BACK, factor=1.001)])
+    assert found.sewn is not None
     assert found.sewn.converged
-    left, right = (lengths(found.result, side) for side in CENTRE_BACK.sides)
+    left, right = (lengths(found.pieces["cone"], side) for side in CENTRE_BACK.sides)
     assert right / left == pytest.approx(1.001, abs=2e-5)
 
 

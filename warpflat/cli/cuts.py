@@ -13,10 +13,7 @@ from warpflat.cli.run import report_run, start_warp_silently
 from warpflat.core.errors import InputError
 
 if TYPE_CHECKING:
-    from warpflat.cutting.ledger import Ledger
-    from warpflat.scene.form_ledger import FormLedger
     from warpflat.scene.load import Scene
-    from warpflat.scene.write import SceneResult
 
 __all__ = ["cuts"]
 
@@ -56,8 +53,8 @@ def cuts(
 
     Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, paths
     that follow the energy and, on a form, the darts of a pattern book. Each is tried with a coarse relaxation, without the
-    scene's seams and constraints; --apply relaxes fully, with them. Writes ledger.json and ledger.png, on a form cuts.toml
-    instead of the picture, and with --apply all that a run leaves, too.
+    scene's seams and constraints; --apply relaxes fully, with them. Writes ledger.json and ledger.png, on a form cuts.toml,
+    too, and with --apply all that a run leaves.
 
     A form's dart, named as "piece.dart", can be rotated, split or turned into something else. The energies of the sewn
     garment before and after are told, and the scene's tables that make the change are printed.
@@ -69,7 +66,14 @@ def cuts(
       warpflat cuts scenes/basic_block.toml --rotate "front_bodice.bust dart" "princess front left" --at "shoulder left"
       warpflat cuts scenes/basic_block.toml --turn "front_bodice.waist dart" seam
     """
+    from warpflat.cli.progress_bar import ProgressBar
+    from warpflat.cli.tables import ledger_table
+    from warpflat.core.output import optional_file, output_folder, write_report
+    from warpflat.core.toml_file import tables_as_toml
+    from warpflat.cutting.ledger_picture import write_ledger_picture
+    from warpflat.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.scene.load import load_scene
+    from warpflat.scene.run import files_of_run, run_scene
 
     loaded = load_scene(scene)
     start_warp_silently()
@@ -79,70 +83,34 @@ def cuts(
         return _edit(loaded, target, edits, at, quiet=quiet, as_json=as_json, device=device)
     if at is not None:
         raise InputError("--at belongs to --rotate and --split")
-    ledger, folder, result = _compare(loaded, target, apply=apply, by=by, hidden=quiet or as_json, device=device)
+    on_form = loaded.settings.mannequin is not None
+    expected = ["ledger.json", "ledger.png", *(["cuts.toml"] if on_form else [])]
+    expected += files_of_run(loaded) if apply is not None else []
+    result, written = None, list[str]()
+    with (
+        ProgressBar(loaded.name, hidden=quiet or as_json) as bar,
+        output_folder(target, expected, sources=loaded.sources, guard=True) as folder,
+    ):
+        ledger = scene_ledger(loaded, by=by, device=device)
+        chosen = None if apply is None else ledger.entry(apply)
+        with optional_file(folder / "ledger.png", written) as path:
+            write_ledger_picture(path, ledger)
+        if on_form:
+            pasted = [tables_as_toml({"cuts": [entry.cut]}) for entry in ([chosen] if chosen else ledger.entries)]
+            _write_toml(folder, "Cuts, the best first: paste one into the scene.", pasted)
+            written.append("cuts.toml")
+        write_report(folder / "ledger.json", ledger.as_dict(), name="ledger", files=written)
+        if chosen is not None and chosen.cut:
+            result = run_scene(with_cut(loaded, chosen.cut), folder, on_progress=bar, device=device)
+        elif apply is not None:
+            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=cuts_of_entry(ledger, apply))
     if as_json and result is None:
         click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
     elif not (quiet or as_json):
-        _print_ledger(ledger, folder)
+        for note in ledger.notes:
+            click.echo(f"warpflat: note: {note}", err=True)
+        click.echo(f"{ledger_table(ledger)}\n{folder}: {', '.join(['ledger.json', *written])}")
     return DONE if result is None else report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
-
-
-def _compare(
-    loaded: Scene,
-    target: Path,
-    *,
-    apply: int | None,
-    by: Literal["per_cm", "released"],
-    hidden: bool,
-    device: str | None,
-) -> tuple[Ledger | FormLedger, Path, SceneResult | None]:
-    """Write the ledger of a scene, and run it with one of its cuts on demand."""
-    from warpflat.cli.progress_bar import ProgressBar
-    from warpflat.core.output import optional_file, output_folder, write_report
-    from warpflat.core.toml_file import tables_as_toml
-    from warpflat.cutting.ledger_picture import write_ledger_picture
-    from warpflat.scene.cuts import cuts_of_entry
-    from warpflat.scene.form_ledger import form_ledger, with_cut
-    from warpflat.scene.run import files_of_run, run_scene, scene_ledger
-
-    is_form = loaded.settings.mannequin is not None
-    files = ["ledger.json", "cuts.toml" if is_form else "ledger.png"]
-    files += files_of_run(loaded) if apply is not None else []
-    result: SceneResult | None = None
-    with (
-        ProgressBar(loaded.name, hidden=hidden) as bar,
-        output_folder(target, files, sources=loaded.sources, guard=True) as folder,
-    ):
-        if is_form:
-            own = form_ledger(loaded, by=by, device=device)
-            tables = [tables_as_toml({"cuts": [entry.cut]}) for entry in own.entries]
-            chosen = tables if apply is None else [tables_as_toml({"cuts": [own.cut(apply)]})]
-            _write_toml(folder, "Cuts, the best first: paste one into the scene.", chosen)
-            write_report(folder / "ledger.json", own.as_dict(), name="ledger", files=["cuts.toml"])
-            if apply is not None:
-                result = run_scene(with_cut(loaded, own.cut(apply)), folder, on_progress=bar, device=device)
-            return own, folder, result
-        ledger = scene_ledger(loaded, by=by, device=device)
-        drawn = list[str]()
-        with optional_file(folder / "ledger.png", drawn) as path:
-            write_ledger_picture(path, ledger)
-        write_report(folder / "ledger.json", ledger.as_dict(), name="ledger", files=drawn)
-        if apply is not None:
-            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=cuts_of_entry(ledger, apply))
-        return ledger, folder, result
-
-
-def _print_ledger(ledger: Ledger | FormLedger, folder: Path) -> None:
-    from warpflat.cli.tables import form_ledger_table, ledger_table
-    from warpflat.cutting.ledger import Ledger
-
-    for note in ledger.notes:
-        click.echo(f"warpflat: note: {note}", err=True)
-    if isinstance(ledger, Ledger):
-        drawn = ", ledger.png" if (folder / "ledger.png").exists() else ""
-        click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json{drawn}")
-    else:
-        click.echo(f"{form_ledger_table(ledger)}\n{folder}: ledger.json, cuts.toml")
 
 
 def _write_toml(folder: Path, words: str, tables: Sequence[str]) -> None:

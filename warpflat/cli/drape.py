@@ -11,7 +11,7 @@ from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, RUN_FILES, Com
 from warpflat.cli.run import run_and_report, start_warp_silently
 
 if TYPE_CHECKING:
-    from warpflat.scene.write import SceneResult
+    from warpflat.scene.run import SceneResult
 
 __all__ = ["drape"]
 

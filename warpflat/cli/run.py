@@ -13,7 +13,7 @@ from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, RUN_FILES, Com
 
 if TYPE_CHECKING:
     from warpflat.scene.load import Scene
-    from warpflat.scene.write import SceneResult
+    from warpflat.scene.run import SceneResult
 
 __all__ = ["report_run", "run", "run_and_report", "start_warp_silently"]
 

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Level
     from warpflat.mannequin.nearest_size import SizeDifference
     from warpflat.mannequin.scan_measures import ScanMeasure
-    from warpflat.scene.form_ledger import FormLedger
 
 __all__ = [
     "drape_lines",
@@ -23,7 +22,6 @@ __all__ = [
     "fabric_data",
     "fabric_sheet",
     "fabric_table",
-    "form_ledger_table",
     "ledger_table",
     "mannequin_table",
     "measures_table",
@@ -236,56 +234,30 @@ def _more(of: Mapping[str, float], name: str) -> str:
 
 
 def ledger_table(ledger: Ledger) -> str:
-    """Return the candidates of a ledger as text, best first, with the numbers that `--apply` takes."""
+    """Return the cuts of a ledger as text, best first, with the numbers that `--apply` takes."""
     from warpflat.cutting.ledger_picture import candidate_words
 
     head = (
-        "",
-        "cut",
-        "per cm",
-        "released",
-        "left",
-        "length",
-        "opening",
-        "angle",
-        "length error",
-        "area error",
+        "", "cut", "per cm", "released", "left", "length", "opening", "angle", "length error", "area error", "beyond the limit",
         "flips",
-    )
-    rows = []
-    for number, entry in enumerate(ledger.entries, start=1):
-        errors = (
-            f"{100 * entry.length_error_before:.2f} > {100 * entry.length_error:.2f} %",
-            f"{100 * entry.area_error_before:.2f} > {100 * entry.area_error:.2f} %",
-        )
-        rows.append((str(number), entry.candidate.name, *candidate_words(entry), *errors, str(entry.flipped_faces)))
-    peaks = "\n".join(f"peak {number}: {words}" for number, words in enumerate(ledger.peaks.words, start=1))
-    refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
-    note = "released and left: model energy, relaxed coarsely"
-    return "\n".join([peaks, _aligned(head, rows, left=(1,)), note, *refused])
-
-
-def form_ledger_table(ledger: FormLedger) -> str:
-    """Return the cuts of a form as text, best first, with the numbers that `--apply` takes."""
-    head = ("", "piece", "cut", "per cm", "released", "left", "length", "mouth", "beyond the limit", "flips")
+    )  # fmt: skip
     rows = [
         (
             str(number),
-            str(entry.cut["piece"]),
-            str(entry.cut["name"]),
-            f"{1e3 * entry.per_cm:.2f} mJ",
-            f"{1e3 * entry.released:.3g} mJ",
-            f"{100 * entry.model_energy_after / max(entry.model_energy_before, 1e-300):.0f} %",
-            f"{100 * entry.length:.1f} cm",
-            "seam" if entry.mouth is None else f"{1e3 * entry.mouth:.0f} mm",
+            entry.name,
+            *candidate_words(entry),
+            f"{100 * entry.length_error_before:.2f} > {100 * entry.length_error:.2f} %",
+            f"{100 * entry.area_error_before:.2f} > {100 * entry.area_error:.2f} %",
             f"{100 * entry.outside_before:.1f} > {100 * entry.outside_after:.1f} %",
             str(entry.flipped_faces),
         )
         for number, entry in enumerate(ledger.entries, start=1)
     ]
-    note = "released and left: model energy of the pieces that it changes; both sides of the body are cut"
+    peaks = [f"peak {number}: {place}" for number, place in enumerate(ledger.peaks, start=1)]
+    note = "released and left: model energy of the pieces that it changes, relaxed coarsely"
+    both = "; both sides of the body are cut" if any(entry.cut for entry in ledger.entries) else ""
     refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
-    return "\n".join([_aligned(head, rows, left=(1, 2)), note, *refused])
+    return "\n".join([*peaks, _aligned(head, rows, left=(1,)), f"{note}{both}", *refused])
 
 
 def edit_table(edit: Mapping[str, Any]) -> str:

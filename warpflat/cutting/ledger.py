@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from warpflat.core.activity import report_activity
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.cutting.candidates import Candidate, Peaks, find_candidates, find_peaks
+from warpflat.core.polyline import polyline_length
+from warpflat.cutting.candidates import Candidate, find_candidates, find_peaks
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.cut_plan import CutPlan
 from warpflat.cutting.refine_piece import refine_along
-from warpflat.flattening.applied_cut import seam_kind
 from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure
-from warpflat.surface.paths.edge_paths import path_length
 
 __all__ = [
     "AutoCut",
@@ -32,6 +32,7 @@ __all__ = [
     "cut_automatically",
     "evaluate",
     "make_ledger",
+    "try_all",
 ]
 
 RankedBy = Literal["per_cm", "released"]
@@ -39,25 +40,34 @@ RankedBy = Literal["per_cm", "released"]
 # Coarse options, which are enough to rank candidates: tolerances looser by this factor, and few steps.
 _LOOSER = 10.0
 _COARSE_STEPS = 600
+# A dart that takes in less is not sewn but eased in [m].
+_LEAST_MOUTH = 5e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LedgerEntry:
-    """A candidate that has been tried.
+    """A cut that has been tried on a mesh, or a dart or a seam on a form.
 
     Attributes:
-        candidate: the cut.
+        name: what it is called.
+        pieces: that it changes, by name.
+        paths: where it runs in space, each #P by 3 [m]; of a form's cut its mirror image, too.
         length: cut [m].
-        model_energy_before, model_energy_after: what is minimised, springs and guard [J]; both on the refined mesh, if the cut needs one.
+        model_energy_before, model_energy_after: what is minimised, springs and guard, of these pieces [J]; both on the refined mesh, if
+            the cut needs one.
         strain_energy_before, strain_energy_after: strain energy of the cloth as worn [J].
-        opening: widest gap of its cracks, at the border or, of a fish-eye dart, in its middle [m].
+        opening: widest gap of its cracks, at the border or, of a fish-eye dart, in its middle [m]; NaN of a form's seam.
         angle: of its widest dart [rad]; NaN if it parts the cloth. Negative: its sides overlap.
-        length_error, area_error, flipped_faces, pieces: after the cut.
+        length_error, area_error, flipped_faces: after the cut; the errors are the largest of these pieces.
         length_error_before, area_error_before: before it.
-        result: the piece with this cut, relaxed coarsely.
+        outside_before, outside_after: share of the cloth that is strained beyond the cloth's limit.
+        candidate, result: of a mesh: the path, and the piece with this cut, relaxed coarsely.
+        cut: of a form: its table in `[[cuts]]`.
     """
 
-    candidate: Candidate
+    name: str
+    pieces: tuple[str, ...]
+    paths: tuple[FloatArray, ...]
     length: float
     model_energy_before: float
     model_energy_after: float
@@ -69,8 +79,66 @@ class LedgerEntry:
     area_error: float
     length_error_before: float
     area_error_before: float
+    outside_before: float
+    outside_after: float
     flipped_faces: int
-    result: Flattening
+    candidate: Candidate | None = None
+    result: Flattening | None = None
+    cut: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def measure(
+        cls,
+        name: str,
+        before: Sequence[Flattening],
+        after: Sequence[Flattening],
+        *,
+        paths: Sequence[FloatArray],
+        cracks: Sequence[tuple[Flattening, IntArray, IntArray]],
+        **of_source: Any,
+    ) -> LedgerEntry:
+        """Measure a trial.
+
+        Args:
+            name: of the cut.
+            before, after: the pieces that it changes, and what has become of them.
+            paths: see the attributes.
+            cracks: each the piece in which it lies and the vertices along its two sides, as :func:`dart_measure` takes them.
+            of_source: `candidate`, `result`, `cut`.
+        """
+        widest = math.nan, math.nan
+        for piece, left, right in cracks:
+            first, last = left[0] == right[0], left[-1] == right[-1]
+            if first and last:
+                eye = fish_eye_measure(piece.positions, left, right)
+                crack = abs(eye.intake), min(eye.first_angle, eye.last_angle)
+            elif first or last:
+                dart = dart_measure(piece.positions, left, right)
+                crack = dart.opening, dart.angle
+            else:
+                crack = float(np.linalg.norm(piece.positions[left] - piece.positions[right], axis=1).max()), math.nan
+            widest = crack if math.isnan(widest[0]) or crack[0] > widest[0] else widest
+        old, new = ([piece.layout_measures for piece in pieces] for pieces in (before, after))
+        return cls(
+            name=name,
+            pieces=tuple(piece.surface.name for piece in before),
+            paths=tuple(paths),
+            length=sum(polyline_length(path) for path in paths),
+            model_energy_before=sum(piece.stages[-1].model_energy_j for piece in before),
+            model_energy_after=sum(piece.stages[-1].model_energy_j for piece in after),
+            strain_energy_before=sum(each["strain_energy_j"] for each in old),
+            strain_energy_after=sum(each["strain_energy_j"] for each in new),
+            opening=widest[0],
+            angle=widest[1],
+            length_error=max(each["length_error"] for each in new),
+            area_error=max(each["area_error"] for each in new),
+            length_error_before=max(each["length_error"] for each in old),
+            area_error_before=max(each["area_error"] for each in old),
+            outside_before=_share_outside(before),
+            outside_after=_share_outside(after),
+            flipped_faces=sum(each["flipped_faces"] for each in new),
+            **of_source,
+        )
 
     @property
     def released(self) -> float:
@@ -87,10 +155,22 @@ class LedgerEntry:
         """True if the sides of the widest dart overlap, so that it could not be sewn."""
         return self.angle < 0
 
+    @property
+    def mouth(self) -> float | None:
+        """How wide its widest dart opens [m], negative where the legs overlap; None of a seam."""
+        return None if math.isnan(self.angle) else math.copysign(self.opening, self.angle)
+
+    @property
+    def can_be_sewn(self) -> bool:
+        """Whether it opens by 5 mm or more, and leaves no flipped face."""
+        return not self.flipped_faces and (self.mouth is None or self.mouth > _LEAST_MOUTH)
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain data in SI units, but for `released_j_per_cm`."""
         return {
-            "name": self.candidate.name,
+            "name": self.name,
+            **({"cut": dict(self.cut)} if self.cut else {}),
+            "pieces": list(self.pieces),
             "length_m": self.length,
             "model_energy_before_j": self.model_energy_before,
             "model_energy_after_j": self.model_energy_after,
@@ -98,41 +178,80 @@ class LedgerEntry:
             "strain_energy_after_j": self.strain_energy_after,
             "released_j": self.released,
             "released_j_per_cm": self.per_cm,
-            "opening_m": self.opening,
+            "opening_m": None if math.isnan(self.opening) else self.opening,
+            "mouth_m": self.mouth,
             "angle_deg": None if math.isnan(self.angle) else math.degrees(self.angle),
             "length_error": [self.length_error_before, self.length_error],
             "area_error": [self.area_error_before, self.area_error],
+            "outside_before": self.outside_before,
+            "outside_after": self.outside_after,
             "flipped_faces": self.flipped_faces,
         }
 
 
+def _share_outside(pieces: Sequence[Flattening]) -> float:
+    """Return the share of the cloth of some pieces that is strained beyond its limit."""
+    areas = [float(piece.network.cell_arrays.area.sum()) for piece in pieces]
+    return sum(piece.fit.outside * area for piece, area in zip(pieces, areas, strict=True)) / sum(areas)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ledger:
-    """The candidates of a piece, the best first.
+    """The cuts that a garment could have next, the best first.
 
     Attributes:
-        result: the piece before the cut.
-        peaks: where its energy is.
+        name: of the piece, or of the form.
+        pieces: before the cut.
+        peaks: where their energy is, in words.
         entries: what each cut would do.
-        refused: candidates that could not be made, and why.
+        refused: cuts that could not be made, and why.
         notes: what the comparison leaves out, one sentence each.
     """
 
-    result: Flattening
-    peaks: Peaks
+    name: str
+    pieces: tuple[Flattening, ...]
+    peaks: tuple[str, ...]
     entries: tuple[LedgerEntry, ...]
     refused: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
 
+    def entry(self, number: int) -> LedgerEntry:
+        """Return the entry of a number (from 1).
+
+        Raises:
+            InputError: there is no such number.
+        """
+        if not 1 <= number <= len(self.entries):
+            raise InputError(f"there is no candidate {number}; valid: 1 to {len(self.entries)}")
+        return self.entries[number - 1]
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {
-            "piece": self.result.surface.name,
-            "peaks": list(self.peaks.words),
+            "piece": self.name,
+            "peaks": list(self.peaks),
             "entries": [entry.as_dict() for entry in self.entries],
             "refused": [{"name": name, "reason": reason} for name, reason in self.refused],
             "notes": list(self.notes),
         }
+
+
+Cut = TypeVar("Cut")
+
+
+def try_all(
+    cuts: Sequence[Cut], name_of: Callable[[Cut], str], evaluate: Callable[[Cut], LedgerEntry], *, by: RankedBy
+) -> tuple[tuple[LedgerEntry, ...], tuple[tuple[str, str], ...]]:
+    """Try cuts one after the other; return what each would do, the best first, and those that are refused, and why."""
+    entries, refused = list[LedgerEntry](), list[tuple[str, str]]()
+    for number, one in enumerate(cuts, 1):
+        report_activity(f"cut {number} of {len(cuts)}, {name_of(one)}")
+        try:
+            entries.append(evaluate(one))
+        except InputError as reason:
+            refused.append((name_of(one), str(reason)))
+    entries.sort(key=lambda entry: (not entry.can_be_sewn, -getattr(entry, by)))
+    return tuple(entries), tuple(refused)
 
 
 def coarse_options(options: RelaxOptions | None = None) -> RelaxOptions:
@@ -167,25 +286,17 @@ def make_ledger(
     """
     peaks = find_peaks(result)
     chosen = find_candidates(result, peaks) if candidates is None else candidates
-    entries, refused = [], []
-    for number, candidate in enumerate(chosen, 1):
-        report_activity(f"cut {number} of {len(chosen)}, {candidate.name}")
-        try:
-            entries.append(evaluate(result, candidate, relax=coarse_options(relax)))
-        except InputError as reason:
-            refused.append((candidate.name, str(reason)))
+    coarse = coarse_options(relax)
+    entries, refused = try_all(chosen, lambda one: one.name, lambda one: evaluate(result, one, relax=coarse), by=by)
     if not entries:
-        raise InputError(f"piece {result.surface.name!r} has no line to cut along: {_why_none(peaks, refused)}")
-    entries.sort(key=lambda entry: (entry.flipped_faces > 0, -getattr(entry, by)))
-    return Ledger(result=result, peaks=peaks, entries=tuple(entries), refused=tuple(refused))
-
-
-def _why_none(peaks: Peaks, refused: Sequence[tuple[str, str]]) -> str:
-    if refused:
-        return f"{refused[0][0]}: {refused[0][1]}"
-    return (
-        f"none passes near the peak of its energy ({peaks.words[0]}), and no way of any length leads there or inwards from the "
-        "border; draw a line through it"
+        why = (
+            f"{refused[0][0]}: {refused[0][1]}" if refused
+            else f"none passes near the peak of its energy ({peaks.words[0]}), and no way of any length leads there or inwards from "
+            "the border; draw a line through it"
+        )  # fmt: skip
+        raise InputError(f"piece {result.surface.name!r} has no line to cut along: {why}")
+    return Ledger(
+        name=result.surface.name, pieces=(result,), peaks=tuple(peaks.words), entries=entries, refused=refused
     )
 
 
@@ -207,41 +318,15 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
         surface = before.network.surface
         before = relax_cut(before, surface, before.positions, stage="refine", cuts=before.cuts, options=relax)
     after = cut(before, CutPlan(name=candidate.name, paths=tuple(paths)), relax=relax)
-    opening, angle = _widest(after)
-    old, new = before.layout_measures, after.layout_measures
-    return LedgerEntry(
+    return LedgerEntry.measure(
+        candidate.name,
+        [before],
+        [after],
+        paths=[before.surface.vertices[path] for path in paths],
+        cracks=[(after, seam.left, seam.right) for seam in after.cuts[-1].seams],
         candidate=candidate,
-        length=path_length(before.surface, paths),
-        model_energy_before=before.stages[-1].model_energy_j,
-        model_energy_after=after.stages[-1].model_energy_j,
-        strain_energy_before=old["strain_energy_j"],
-        strain_energy_after=new["strain_energy_j"],
-        opening=opening,
-        angle=angle,
-        length_error=new["length_error"],
-        area_error=new["area_error"],
-        length_error_before=old["length_error"],
-        area_error_before=old["area_error"],
-        flipped_faces=new["flipped_faces"],
         result=after,
     )
-
-
-def _widest(result: Flattening) -> tuple[float, float]:
-    """Return opening [m] and angle [rad] of the last cut's widest crack; the angle is NaN if the crack parts the cloth."""
-    found = []
-    for seam in result.cuts[-1].seams:
-        kind = seam_kind(seam)
-        if kind == "dart":
-            dart = dart_measure(result.positions, seam.left, seam.right)
-            found.append((dart.opening, dart.angle))
-        elif kind == "fish-eye":
-            eye = fish_eye_measure(result.positions, seam.left, seam.right)
-            found.append((abs(eye.intake), min(eye.first_angle, eye.last_angle)))
-        else:
-            gap = np.linalg.norm(result.positions[seam.left] - result.positions[seam.right], axis=1)
-            found.append((float(gap.max()), math.nan))
-    return max(found, key=lambda one: one[0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -312,6 +397,7 @@ def cut_automatically(
             break
         ledgers.append(ledger)
         tried = best.result
+        assert tried is not None
         if fully:
             tried = relax_cut(
                 replace(tried, stages=tried.stages[:-1], history=result.history),

@@ -117,7 +117,7 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
     """
     if isinstance(garment, Garment):
         pieces = dict(garment.pieces)
-        seams = [*_seams_of_form(garment.form), *seams]
+        seams = [*([] if garment.form is None else _seams_of_form(garment.form)), *seams]
     else:
         given = [garment] if isinstance(garment, Flattening) else list(garment)
         pieces = {piece.surface.name: piece for piece in given}

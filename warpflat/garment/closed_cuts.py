@@ -1,4 +1,4 @@
-"""Cuts that do not open, such as a placket in flat cloth: the pattern is whole there and has a line."""
+"""Cuts of a piece as they are sewn; those that do not open, such as a placket in flat cloth, are lines in the pattern."""
 
 from __future__ import annotations
 
@@ -12,12 +12,24 @@ from warpflat.flattening.applied_cut import seam_kind
 from warpflat.surface.connectivity import join_labels
 
 if TYPE_CHECKING:
+    from warpflat.flattening.applied_cut import AppliedCut
+    from warpflat.flattening.result import Flattening
     from warpflat.surface.cut.cut_mesh import Seam
 
-__all__ = ["CLOSED", "are_closed", "close_cuts"]
+__all__ = ["CLOSED", "are_closed", "close_cuts", "seams_of_cuts"]
 
-#: A cut whose sides lie nearer to each other than this [m] everywhere is a line: patterns are drawn to 0.1 mm.
+#: A cut whose sides lie nearer to each other than this [m] everywhere is a line, and legs of a dart that overlap by no more before
+#: its tip are closed there: patterns are drawn to 0.1 mm.
 CLOSED = 1e-4
+
+
+def seams_of_cuts(result: Flattening) -> list[tuple[str, AppliedCut, Seam]]:
+    """Return the seams of all cuts of a piece, each with its name in the pattern and its cut."""
+    return [
+        (cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}", cut, seam)
+        for cut in result.cuts
+        for number, seam in enumerate(cut.seams, start=1)
+    ]
 
 
 def are_closed(positions: FloatArray, seam: Seam) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.garment.closed_cuts import CLOSED
 from warpflat.garment.constraints import DartMouth
 from warpflat.garment.sewn import SeamPair
 from warpflat.surface.cut.dart_legs import open_length
@@ -18,11 +19,9 @@ if TYPE_CHECKING:
     from warpflat.mannequin.darts import FormDart
     from warpflat.mannequin.forms import FormResult
 
-__all__ = ["CLOSED", "closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
+__all__ = ["closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
 
 
-#: Legs of a dart that overlap by no more than this [m] before its tip are closed there.
-CLOSED = 1e-4
 # A mouth narrower than this [m] is no dart that anybody would sew.
 _NARROW = 3e-3
 

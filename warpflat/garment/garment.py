@@ -1,4 +1,4 @@
-"""A garment: the pieces of a form on a mannequin, each flattened, and the seams between them."""
+"""A garment: flat pieces, the seams between them, and the form on a mannequin that they come from, if there is one."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import expect, expect_callback, expect_each
 from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.cutting.separate_pieces import separate
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
@@ -23,20 +24,19 @@ from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.finishing import Finishing
-from warpflat.garment.fullness import FullEdge, give_fullness
+from warpflat.garment.fullness import give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
 from warpflat.garment.hems import straight_hems
 from warpflat.garment.openings import Opening, opened_rings
 from warpflat.garment.pockets import Pocket
 from warpflat.garment.rings import GarmentRing, measure_rings
-from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import sew
-from warpflat.garment.sewn import SeamPair, Sewn
+from warpflat.garment.sewn import SeamLengths, SeamPair, Sewn
 from warpflat.garment.wearer import WearerFit, assess_wearer
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.pieces import FormPiece
 from warpflat.solver.options import RelaxOptions
+from warpflat.surface.border_seams import NamedSeam
 
 __all__ = ["Garment", "flatten_form"]
 
@@ -46,15 +46,16 @@ _SAME_PIECE = 5e-4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Garment:
-    """A form's pieces, flattened.
+    """Pieces, flattened, and sewn to each other or to themselves; a single piece without a seam is a garment, too.
 
     Attributes:
         name: the garment's.
-        mannequin: whose form it is.
-        form: the pieces in space, with their edges and seams.
-        pieces: the flat pieces by name, in the form's order.
+        pieces: the flat pieces by name, in order; each whole, even where cuts have parted it.
+        seam_pairs: what is sewn to each other.
         sewn: outcome of relaxing them together under their seams and constraints; None if they were not sewn.
-        wished: the ease of its seams; None if it was not sewn.
+        named_seams: seams of a mesh that were named by lines along its border.
+        mannequin, form: the body and the form on it, of a garment that comes from one: pieces in space with their edges and seams.
+        wished: the ease of a form's seams; None if it was not sewn.
         openings: along its seams.
         finishing: of its free edges, in the pattern.
         pockets: in the pattern.
@@ -63,10 +64,12 @@ class Garment:
     """
 
     name: str
-    mannequin: Mannequin
-    form: FormResult
     pieces: Mapping[str, Flattening]
+    seam_pairs: Sequence[SeamPair] = ()
     sewn: Sewn | None = None
+    named_seams: Sequence[NamedSeam] = ()
+    mannequin: Mannequin | None = None
+    form: FormResult | None = None
     wished: SeamRatios | None = None
     openings: Sequence[Opening] = ()
     finishing: Sequence[Finishing] = ()
@@ -76,14 +79,54 @@ class Garment:
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
-        return f"<Garment {self.name!r}: {', '.join(self.pieces)}; {len(self.form.seams)} seams, strain energy {energy:.4g} J>"
+        return (
+            f"<Garment {self.name!r}: {', '.join(self.pieces)}; {len(self.seams)} seams, strain energy {energy:.4g} J>"
+        )
+
+    @property
+    def positions(self) -> dict[str, FloatArray]:
+        """The layouts by piece, each #P by 2 [m]."""
+        return {name: piece.positions for name, piece in self.pieces.items()}
+
+    @cached_property
+    def parts(self) -> dict[str, Flattening]:
+        """What is cut from cloth, by name: the pieces, and the parts of those that cuts have parted."""
+        return {part.surface.name: part for piece in self.pieces.values() for part in separate(piece)}
+
+    def advised(self, advise: Callable[[Flattening], Flattening]) -> Garment:
+        """Return the garment with what `advise` adds to each of its parts."""
+        parts = {name: advise(part) for name, part in self.parts.items()}
+        made = replace(self, pieces={name: parts.get(name, piece) for name, piece in self.pieces.items()})
+        made.__dict__["parts"] = parts
+        return made
 
     @property
     def seams(self) -> tuple[SeamLengths, ...]:
         """Every seam with the lengths of its two sides."""
-        results = () if self.sewn is None else self.sewn.results
-        costs = {result.name: result.cost for result in results if result.kind == "seam"}
-        return tuple(self._measured(number, costs.get(seam.name)) for number, seam in enumerate(self.form.seams))
+        costs = {} if self.sewn is None else {made.name: made.cost for made in self.sewn.results if made.kind == "seam"}
+        runs: dict[str, list[SeamPair]] = {}
+        for pair in self.seam_pairs:
+            if pair.sides is not None:
+                runs.setdefault(pair.name, []).append(pair)
+        found = []
+        for name, pairs in runs.items():
+            first, second = (self.pieces[piece] for piece in pairs[0].pieces)
+            edges = [np.diff(arc_lengths(first.positions[pair.vertices[0]])) for pair in pairs]
+            length = float(sum(edge.sum() for edge in edges))
+            wished = sum(float((edge / pair.ratio).sum()) for edge, pair in zip(edges, pairs, strict=True))
+            even = all(np.array_equal(pair.ratio, 1.0) for pair in pairs)
+            assert pairs[0].sides is not None
+            found.append(
+                SeamLengths(
+                    name=name,
+                    sides=pairs[0].sides,
+                    length_3d=sum(polyline_length(first.network.surface.vertices[pair.vertices[0]]) for pair in pairs),
+                    lengths=(length, sum(polyline_length(second.positions[pair.vertices[1]]) for pair in pairs)),
+                    ease=0.0 if even else wished / length - 1.0,
+                    cost=costs.get(name),
+                )
+            )
+        return tuple(found)
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -104,22 +147,43 @@ class Garment:
         return tuple(found)
 
     def mirror_vertices(self, first: str, second: str) -> IntArray | None:
-        """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if no pair."""
-        return _mirror_vertices(self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror)
+        """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if they are no pair.
+
+        Matched face by face: along a line at which a piece is cut open, a vertex of the mannequin is two of the piece.
+        """
+        if self.form is None or self.mannequin is None:
+            return None
+        one, two, image = self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror
+        if len(one.grid_vertices) != len(two.grid_vertices) or len(one.face_brick) != len(two.face_brick):
+            return None
+        rows = two.grid_vertices[two.surface.faces].tolist()
+        faces = {
+            frozenset(row): dict(zip(row, face, strict=True))
+            for row, face in zip(rows, two.surface.faces.tolist(), strict=True)
+        }
+        partners = np.full(len(one.grid_vertices), -1, dtype=np.int32)
+        for row, face in zip(image[one.grid_vertices[one.surface.faces]].tolist(), one.surface.faces, strict=True):
+            other = faces.get(frozenset(row))
+            if other is None:
+                return None
+            partners[face] = [other[vertex] for vertex in row]
+        return partners
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on completions, repairs and choices, one sentence each."""
-        of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
-        return (*self.mannequin.notes, *of_pieces, *self.remarks)
+        alone = self.form is None and len(self.pieces) == 1
+        of_pieces = (
+            note if alone else f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages
+        )
+        return (*(() if self.mannequin is None else self.mannequin.notes), *self.remarks, *of_pieces)
 
     @property
     def rings(self) -> list[GarmentRing]:
-        """Every closed way around the garment, and what must pass through it."""
-        first, positions = (
-            next(iter(self.pieces.values())),
-            {name: flat.positions for name, flat in self.pieces.items()},
-        )
+        """Every closed way around a garment on its mannequin, and what must pass through it."""
+        if self.form is None or self.mannequin is None:
+            return []
+        first, positions = next(iter(self.pieces.values())), self.positions
         return measure_rings(
             self.mannequin, self.form, positions, strain_limit=first.fabric.strain_limit,
             girths=pattern_girths(self.mannequin, self.form, positions),
@@ -128,78 +192,56 @@ class Garment:
 
     @cached_property
     def wearer(self) -> WearerFit | None:
-        """How the garment fits the body itself; None if its pieces go around nothing."""
+        """How the garment fits its mannequin itself; None if it has none, or its pieces go around nothing."""
+        if self.form is None or self.mannequin is None:
+            return None
         first = next(iter(self.pieces.values()))
-        positions = {name: piece.positions for name, piece in self.pieces.items()}
-        return assess_wearer(self.mannequin, self.form, positions, first.fabric, grain_angle=first.grain_angle)
+        return assess_wearer(self.mannequin, self.form, self.positions, first.fabric, grain_angle=first.grain_angle)
 
-    def _measured(self, number: int, cost: float | None) -> SeamLengths:
-        seam = self.form.seams[number]
-        first, second = (self.pieces[piece] for piece in seam.pieces)
-        ratio = 1.0 if self.wished is None else self.wished.ratios[number]
-        if self.wished is not None and number in self.wished.edge_ratios:
-            edges = [np.diff(arc_lengths(first.positions[run.vertices[0]])) for run in seam.runs]
-            wished = [own / each for own, each in zip(edges, self.wished.edge_ratios[number], strict=True)]
-            ratio = float(np.concatenate(edges).sum() / np.concatenate(wished).sum())
-        return SeamLengths(
-            name=seam.name,
-            sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
-            length_3d=sum(polyline_length(first.surface.vertices[run.vertices[0]]) for run in seam.runs),
-            lengths=(
-                sum(polyline_length(first.positions[run.vertices[0]]) for run in seam.runs),
-                sum(polyline_length(second.positions[run.vertices[1]]) for run in seam.runs),
-            ),
-            ease=1.0 / ratio - 1.0,
-            cost=cost,
-        )
-
-    def _measure(self, name: str) -> dict[str, Any]:
-        """Build the piece's entry in `metrics.json`, with its strain energy brick by brick."""
+    def _measure(self, name: str, piece: Flattening) -> dict[str, Any]:
+        """Build the entry of a part in `metrics.json`; of a form's piece with its strain energy brick by brick, and its darts."""
+        if self.form is None:
+            return piece.measures
         brick = np.array(self.form.pieces[name].face_brick)
-        measured = self.pieces[name].measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
-        darts = measure_darts(self.form, name, self.pieces[name].positions)
+        measured = piece.measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
+        darts = measure_darts(self.form, name, piece.positions)
         return {**measured, **({"darts": darts} if darts else {})}
 
     def metrics(self) -> dict[str, Any]:
         """Return the content of `metrics.json`."""
-        first = next(iter(self.pieces.values()))
-        pieces = {name: self._measure(name) for name in self.pieces}
-        positions = {name: piece.positions for name, piece in self.pieces.items()}
-        girths = pattern_girths(self.mannequin, self.form, positions)
-        wearer = {} if self.wearer is None else {"against": "form", "wearer": self.wearer.as_dict()}
-        more = {
-            "wear": {**garment_wear(pieces), **wearer},
-            "mannequin": self.mannequin.metrics(),
-            "seams": [seam.as_dict() for seam in self.seams],
-            "pairs": [list(pair) for pair in self.pairs],
-            "girths": girths,
-            "rings": [ring.as_dict() for ring in self.rings],
-            **({} if self.sewn is None else self._sewing()),
-            **({} if self.curves is None else {"curves": self.curves.as_dict()}),
-        }
-        return run_metrics(pieces, first.network.device, more)
+        pieces, more = {name: self._measure(name, piece) for name, piece in self.parts.items()}, dict[str, Any]()
+        if self.form is not None and self.mannequin is not None:
+            wearer = {} if self.wearer is None else {"against": "form", "wearer": self.wearer.as_dict()}
+            more = {
+                "wear": {**garment_wear(pieces), **wearer},
+                "mannequin": self.mannequin.metrics(),
+                "pairs": [list(pair) for pair in self.pairs],
+                "girths": pattern_girths(self.mannequin, self.form, self.positions),
+                "rings": [ring.as_dict() for ring in self.rings],
+                **({} if self.curves is None else {"curves": self.curves.as_dict()}),
+            }
+        device = next(iter(self.pieces.values())).network.device
+        return run_metrics(pieces, device, {**more, **self.sewing_metrics()})
 
     def summary(self) -> dict[str, Any]:
         """Return the entry of another size in `metrics.json`: convergence, flips, stages and seams."""
-        return {
-            "pieces": {
-                name: {
-                    "converged": piece.converged,
-                    "flipped_faces": piece.flipped_faces,
-                    "stages": [stage.as_dict() for stage in piece.stages],
-                }
-                for name, piece in self.pieces.items()
-            },
-            "seams": [seam.as_dict() for seam in self.seams],
-            **({} if self.sewn is None else self._sewing()),
+        pieces = {
+            name: {
+                "converged": piece.converged,
+                "flipped_faces": piece.flipped_faces,
+                "stages": [stage.as_dict() for stage in piece.stages],
+            }
+            for name, piece in self.pieces.items()
         }
+        return {"pieces": pieces, **self.sewing_metrics()}
 
-    def _sewing(self) -> dict[str, Any]:
-        assert self.sewn is not None
-        return {
-            "constraints": [result.as_dict() for result in self.sewn.constraints],
-            "sewing": self.sewn.as_dict(),
-        }
+    def sewing_metrics(self) -> dict[str, Any]:
+        """Return the entries of `metrics.json` about seams and constraints; none of a mesh that has none."""
+        found: dict[str, Any] = {}
+        if self.sewn is not None:
+            held = [result.as_dict() for result in self.sewn.constraints]
+            found = {"constraints": held, "sewing": self.sewn.as_dict()}
+        return {"seams": [seam.as_dict() for seam in self.seams], **found} if found or self.form is not None else {}
 
     def save(self, folder: str | Path, *, picture: bool = True) -> list[str]:
         """Write `metrics.json`, an OBJ per piece and `picture.png`, all of them or none, and return their names.
@@ -210,7 +252,9 @@ class Garment:
         from warpflat.core.output import output_folder, require_own_metrics, write_report
 
         others = [*(["picture.png"] if picture else []), "metrics.json"]
-        with output_folder(folder, others, sources=self.mannequin.sources, guard=True) as to:
+        sources = [source for piece in self.pieces.values() for source in piece.surface.sources]
+        sources += [] if self.mannequin is None else self.mannequin.sources
+        with output_folder(folder, others, sources=sources, guard=True) as to:
             require_own_metrics(to)
             files = self.write_files(to, picture=picture)
             write_report(to / "metrics.json", self.metrics(), name=self.name, files=files)
@@ -224,8 +268,10 @@ class Garment:
         """
         from warpflat.export.picture_garment import Body
 
-        body = Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
-        return write_files(list(self.pieces.values()), folder, picture=picture, frames=False, body=body)
+        body = None
+        if self.mannequin is not None:
+            body = Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
+        return write_files(list(self.parts.values()), folder, picture=picture, frames=False, body=body)
 
 
 def flatten_form(
@@ -275,37 +321,45 @@ def flatten_form(
     wished = seam_ratios(form, wishes)
     pieces = {name: flat for name, flat in (known or {}).items() if flat.surface is form.pieces[name].surface}
     names = [name for name in form.pieces if name not in pieces]
-    by_name = None if callback is None else _callback_by_name(names, callback)
     flat = flatten_all(
         [form.pieces[name].surface for name in names],
         fabric=fabric,
         datum=[form.pieces[name].datum or None for name in names],
         grain_angle=grain_angle,
         relax=relax,
-        callback=by_name,
+        callback=None if callback is None else lambda number, progress: callback(names[number], progress),
         device=device,
         **options,
     )
     pieces |= dict(zip(names, flat, strict=True))
-    pieces = {name: pieces[name] for name in form.pieces}
-    if not sewn:
-        return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
-    for name, edges in wished.full.items():
-        pieces[name] = give_fullness(pieces[name], edges, _plain_edges(form, name, edges), options=relax)
     pairs = [
         SeamPair(
             name=seam.name, pieces=seam.pieces, vertices=run.vertices,
             ratio=wished.edge_ratios[number][i] if number in wished.edge_ratios else wished.ratios[number],
+            sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
         )
         for number, seam in enumerate(form.seams)
         for i, run in enumerate(seam.runs)
     ]  # fmt: skip
-    pairs += dart_pairs(form)
+    garment = Garment(
+        name=form.name,
+        mannequin=mannequin,
+        form=form,
+        pieces={name: pieces[name] for name in form.pieces},
+        seam_pairs=[*pairs, *dart_pairs(form)],
+    )
+    if not sewn:
+        return garment
+    full = dict(garment.pieces)
+    for name, edges in wished.full.items():
+        sides = [row for pair in pairs for piece, row in zip(pair.pieces, pair.vertices, strict=True) if piece == name]
+        plain = [row for row in sides if not any(row is edge.vertices for edge in edges)]
+        full[name] = give_fullness(full[name], edges, plain, options=relax)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
     held = (*constraints, *straight_hems(form, constraints), *dart_constraints(form))
-    result = sew(pieces, pairs, constraints=held, folds=folds, options=relax)
-    garment = Garment(name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, wished=wished)
-    again = _SewAgain(pairs=pairs, held=held, folds=folds, options=relax)
+    result = sew(full, garment.seam_pairs, constraints=held, folds=folds, options=relax)
+    garment = replace(garment, pieces=result.pieces, sewn=result, wished=wished)
+    again = _SewAgain(mannequin=mannequin, form=form, held=held, folds=folds, options=relax)
 
     def drawn(own: Garment, under: _SewAgain) -> Garment:
         return under.with_curves(own, 1e-3 * curves_mm) if curves_mm else own
@@ -327,10 +381,12 @@ class _SewAgain:
     """What holds a sewn garment, to relax it again under more.
 
     Attributes:
-        pairs, held, folds, options: as :func:`warpflat.garment.sewing.sew` takes them.
+        mannequin, form: those of the garment.
+        held, folds, options: as :func:`warpflat.garment.sewing.sew` takes them.
     """
 
-    pairs: Sequence[SeamPair]
+    mannequin: Mannequin
+    form: FormResult
     held: Sequence[Constraint]
     folds: Mapping[str, IntArray]
     options: RelaxOptions | None
@@ -339,7 +395,7 @@ class _SewAgain:
         """Return the garment under more constraints, and the outcome of that; as it was, where they cannot be kept."""
         assert garment.sewn is not None
         outcome = sew(
-            garment.pieces, self.pairs, constraints=[*self.held, *more], folds=self.folds, options=self.options,
+            garment.pieces, garment.seam_pairs, constraints=[*self.held, *more], folds=self.folds, options=self.options,
             offsets=garment.sewn.offsets,
         )  # fmt: skip
         if not outcome.converged:
@@ -348,7 +404,7 @@ class _SewAgain:
 
     def with_girths(self, garment: Garment) -> tuple[Garment, _SewAgain]:
         """Return the garment with the girths that its form asks for, and what holds it then."""
-        girths = girth_constraints(garment.mannequin, garment.form, _positions(garment))
+        girths = girth_constraints(self.mannequin, self.form, garment.positions)
         if not girths:
             return garment, self
         kept, outcome = self(garment, girths)
@@ -380,7 +436,7 @@ class _SewAgain:
     def _drawn(self, garment: Garment, bounds: Mapping[str, float]) -> Garment:
         """Return the garment with the borders of each piece drawn within its bound [m]."""
         assert garment.sewn is not None
-        plans = plan_curves(garment.mannequin.layout, garment.form, _positions(garment), bounds, self.held)
+        plans = plan_curves(self.mannequin.layout, self.form, garment.positions, bounds, self.held)
         if not plans or not garment.sewn.converged:
             return garment
         drawn, outcome = self(garment, [plan.line for plan in plans])
@@ -388,7 +444,7 @@ class _SewAgain:
             words = "the borders stay as the cloth rests: drawn by hand, seams or constraints could not be kept"
             return replace(garment, remarks=(*garment.remarks, words))
         lines = measure_curves(
-            garment.form, plans, _positions(drawn), [each for each in outcome.results if each.kind == "curve"]
+            self.form, plans, drawn.positions, [each for each in outcome.results if each.kind == "curve"]
         )
         assert drawn.sewn is not None
         bound = max(bounds.values())
@@ -398,52 +454,3 @@ class _SewAgain:
 def _strained(before: Garment, after: Garment) -> list[str]:
     """Return the pieces that fit before and do not after."""
     return [name for name, piece in after.pieces.items() if not piece.fit.fits and before.pieces[name].fit.fits]
-
-
-def _positions(garment: Garment) -> dict[str, FloatArray]:
-    return {name: piece.positions for name, piece in garment.pieces.items()}
-
-
-def _callback_by_name(
-    names: Sequence[str], callback: Callable[[str, Progress], bool | None]
-) -> Callable[[int, Progress], bool | None]:
-    """Return a callback that takes a piece's number, and passes its name on."""
-
-    def call(number: int, progress: Progress) -> bool | None:
-        return callback(names[number], progress)
-
-    return call
-
-
-def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[IntArray]:
-    """Return the vertices along each side of a seam of the piece that has no fullness."""
-    sides = [
-        ids
-        for seam in form.seams
-        for run in seam.runs
-        for name, ids in zip(seam.pieces, run.vertices, strict=True)
-        if name == piece
-    ]
-    return [ids for ids in sides if not any(ids is edge.vertices for edge in full)]
-
-
-def _mirror_vertices(first: FormPiece, second: FormPiece, image: IntArray) -> IntArray | None:
-    """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if they are no pair.
-
-    Matched face by face: along a line at which a piece is cut open, a vertex of the mannequin is two of the piece.
-    """
-    if len(first.grid_vertices) != len(second.grid_vertices) or len(first.face_brick) != len(second.face_brick):
-        return None
-    faces = {
-        frozenset(row): dict(zip(row, face, strict=True))
-        for row, face in zip(
-            second.grid_vertices[second.surface.faces].tolist(), second.surface.faces.tolist(), strict=True
-        )
-    }
-    partners = np.full(len(first.grid_vertices), -1, dtype=np.int32)
-    for row, face in zip(image[first.grid_vertices[first.surface.faces]].tolist(), first.surface.faces, strict=True):
-        other = faces.get(frozenset(row))
-        if other is None:
-            return None
-        partners[face] = [other[vertex] for vertex in row]
-    return partners

@@ -30,10 +30,12 @@ __all__ = [
     "check_names",
     "export_patterns",
     "garment_files",
+    "pattern_names",
     "surface_files",
 ]
 
 FORMATS = ("dxf", "svg", "pdf", "json")
+_MARKER = (".marker.svg", ".marker.json")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +98,7 @@ def garment_files(
     options: PatternOptions | None = None,
     sample_size: str | None = None,
 ) -> WrittenPattern:
-    """Write the pattern of a garment in one or more sizes; several lie upon each other as a nest.
+    """Write the pattern of a garment; on a form in one or more sizes, of which several lie upon each other as a nest.
 
     A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other
     files are good.
@@ -113,8 +115,9 @@ def garment_files(
     """
     from warpflat.garment.to_pattern import pattern_of_garment
 
-    options = options or PatternOptions()
-    check_names(options.names, next(iter(garments.values())).pieces)
+    options, first = options or PatternOptions(), next(iter(garments.values()))
+    if first.form is not None:
+        check_names(options.names, first.parts)
     return _write_pattern(
         lambda: pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size),
         folder, name, options,
@@ -143,7 +146,7 @@ def surface_files(
     Raises:
         InputError: the folder cannot be written.
     """
-    from warpflat.garment.surface_to_pattern import pattern_of_surface
+    from warpflat.garment.to_pattern import pattern_of_surface
 
     options = options or PatternOptions()
     return _write_pattern(
@@ -247,6 +250,12 @@ def _write_pattern(
             notes = (*notes, *remarks)
             metrics["marker"] = plan
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics, walked=walked)
+
+
+def pattern_names(name: str, formats: Iterable[str], *, marker: bool = False) -> list[str]:
+    """Return the names of the files of a pattern, as far as they are known: without rules of sizes, or markers of further cloths."""
+    files = [f"{name if kind in ('dxf', 'svg') else 'pattern'}.{kind}" for kind in FORMATS if kind in formats]
+    return [*files, *(f"{name}{ending}" for ending in _MARKER if marker)]
 
 
 def check_names(names: Mapping[str, str], pieces: Iterable[str]) -> None:
@@ -363,7 +372,7 @@ def _marker(
             continue
         # The shell's marker has no more than the garment's name.
         stem = name if number == 0 else f"{name}.{plain_letters(fabric).replace(' ', '_')}"
-        files = [file_in(folder, stem, ending) for ending in (".marker.svg", ".marker.json")]
+        files = [file_in(folder, stem, ending) for ending in _MARKER]
         write_marker_svg(marker, files[0])
         placements: list[dict[str, Any]] = [
             {

@@ -1,27 +1,33 @@
-"""Pieces of one garment whose borders meet in space are sewn to each other."""
+"""Pieces of meshes are sewn, each to itself and to the others: at cuts, at seams that are named, where borders meet in space."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import find_unused_name
 from warpflat.flattening.result import Flattening
-from warpflat.garment.seam_length import SeamLengths
+from warpflat.garment.closed_cuts import seams_of_cuts
+from warpflat.garment.constraints import Constraint
+from warpflat.garment.fullness import FullEdge, give_fullness
+from warpflat.garment.garment import Garment
 from warpflat.garment.sewing import sew
-from warpflat.garment.sewn import SeamPair, Sewn
+from warpflat.garment.sewn import SeamPair
 from warpflat.solver.options import RelaxOptions
-from warpflat.surface.border_seams import SAME_PLACE
+from warpflat.surface.border_seams import SAME_PLACE, NamedSeam, SurfaceSeam, surface_seams
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, lies_within
 
-__all__ = ["SewnPieces", "meeting_borders", "name_seams", "sew_pieces", "unsewn_borders"]
+__all__ = ["meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
 
 #: Borders that run along each other within this distance [m] are meant to be sewn, or told.
 BESIDE = 1e-3
@@ -33,52 +39,71 @@ _SAMPLES, _MOST_SAMPLES = 5e-4, 200_000
 _LINING = 5e-3
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SewnPieces:
-    """Pieces relaxed together under the seams between them.
+def sew_pieces(
+    pieces: Sequence[Flattening],
+    constraints: Sequence[Constraint] = (),
+    *,
+    seams: Sequence[NamedSeam] = (),
+    options: RelaxOptions | None = None,
+    name: str | None = None,
+) -> Garment:
+    """Relax pieces of meshes again, all together, so that seams and darts match and constraints hold.
 
-    Attributes:
-        pieces: in their order.
-        sewn: outcome of the relaxation.
-        seams: measured.
-    """
-
-    pieces: tuple[Flattening, ...]
-    sewn: Sewn
-    seams: tuple[SeamLengths, ...]
-
-    def metrics(self) -> dict[str, Any]:
-        """Return the entries of `metrics.json` besides the pieces."""
-        return {"seams": [seam.as_dict() for seam in self.seams], "constraints": [], "sewing": self.sewn.as_dict()}
-
-
-def sew_pieces(pieces: Sequence[Flattening], *, options: RelaxOptions | None = None) -> SewnPieces | None:
-    """Relax pieces again so that both sides of seams and darts are equally long; None where no borders meet.
+    Sewn are the two sides of every cut, the seams that are named, and borders that meet in space, of two pieces or of one that was
+    cut open in its file.
 
     Args:
-        pieces: flattened one by one, of one fabric and of different names.
+        pieces: flattened one by one, of one fabric and of different names, perhaps cut.
+        constraints: on lines of pieces.
+        seams: between lines along the border of the first piece.
         options: of the relaxation.
+        name: of the garment; that of the first piece if not given.
+
+    Returns:
+        The garment; its `sewn` is None where there is nothing to be sewn or held.
+
+    Raises:
+        InputError: a constraint or a seam names a line that its piece does not have, or asks what the line cannot be.
     """
-    pairs = meeting_borders({piece.surface.name: piece.surface for piece in pieces})
-    if not pairs:
-        return None
-    sewn = sew({piece.surface.name: piece for piece in pieces}, pairs, options=options)
-    after = {name: sewn.pieces[name] for name in (piece.surface.name for piece in pieces)}
-    measured = []
-    for pair, result in zip(pairs, sewn.results, strict=False):
-        first, second = (
-            polyline_length(after[name].positions[row]) for name, row in zip(pair.pieces, pair.vertices, strict=True)
+    flat = {piece.surface.name: piece for piece in pieces}
+    first = next(iter(flat))
+    found = surface_seams(flat[first].network.surface, seams)
+    flat[first] = _with_fullness(flat[first], found, options)
+    pairs = [
+        SeamPair(
+            name=title, pieces=(own, own), vertices=(seam.left, seam.right),
+            sides=(f"{own}.{title}.left", f"{own}.{title}.right"),
         )
-        measured.append(
-            SeamLengths(
-                name=pair.name,
-                sides=pair.pieces,
-                length_3d=polyline_length(after[pair.pieces[0]].surface.vertices[pair.vertices[0]]),
-                lengths=(first, second),
-                cost=result.cost,
-            )
+        for own, piece in flat.items()
+        for title, _, seam in seams_of_cuts(piece)
+    ]  # fmt: skip
+    pairs += [
+        SeamPair(
+            name=seam.named.name, pieces=(first, first), vertices=seam.vertices, ratio=1.0 / (1.0 + seam.named.ease),
+            joints=seam.joints, sides=(f"{first}.{seam.named.sides[0]}", f"{first}.{seam.named.sides[1]}"),
         )
-    return SewnPieces(pieces=tuple(after.values()), sewn=sewn, seams=tuple(measured))
+        for seam in found
+    ]  # fmt: skip
+    sewn_edges = {
+        (own, min(edge), max(edge))
+        for pair in pairs
+        for own, row in zip(pair.pieces, pair.vertices, strict=True)
+        for edge in pairwise(row.tolist())
+    }
+    for pair in meeting_borders({own: piece.network.surface for own, piece in flat.items()}, without=sewn_edges):
+        if len(flat) > 1:
+            pairs.append(replace(pair, sides=pair.pieces))
+            continue
+        # What was cut open before, here or in the file, is sewn like any cut.
+        opening = _opening(flat[first].network.surface, pair)
+        title = find_unused_name(opening or pair.name, {other.name for other in pairs})
+        line = f"{first}.{opening or title}"
+        pairs.append(replace(pair, name=title, sides=(f"{line}.left", f"{line}.right")))
+    garment = Garment(name=name or first, pieces=flat, seam_pairs=pairs, named_seams=seams)
+    if not pairs and not constraints:
+        return garment
+    sewn = sew(flat, pairs, constraints=constraints, options=options)
+    return replace(garment, pieces={own: sewn.pieces[own] for own in flat}, sewn=sewn)
 
 
 def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:
@@ -94,14 +119,16 @@ def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:
     return [replace(surface, lines=named[surface.name]) for surface in surfaces]
 
 
-def meeting_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple[int, int]] = ()) -> list[SeamPair]:
+def meeting_borders(
+    surfaces: Mapping[str, Surface], *, without: Collection[tuple[str, int, int]] = ()
+) -> list[SeamPair]:
     """Return the stretches of border that lie at one place in space, edge by edge: seams between pieces, and darts.
 
     Three borders that meet along one edge are no seam there.
 
     Args:
         surfaces: by name.
-        without: edges that are left out, by their vertices, the lower first.
+        without: edges that are left out, by piece and vertices, the lower first.
     """
     edges = _BorderEdges(surfaces, without)
     pairs: list[SeamPair] = []
@@ -119,12 +146,29 @@ def meeting_borders(surfaces: Mapping[str, Surface], *, without: Collection[tupl
     return pairs
 
 
-def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple[int, int]] = ()) -> list[str]:
+def unsewn_notes(garment: Garment) -> list[str]:
+    """Return notes on borders of meshes that run along each other and are not sewn; at most three, and how many more there are."""
+    if garment.form is not None:
+        return []
+    sewn = {
+        (name, min(edge), max(edge))
+        for pair in garment.seam_pairs
+        for name, row in zip(pair.pieces, pair.vertices, strict=True)
+        for edge in pairwise(row.tolist())
+    }
+    found = unsewn_borders({name: piece.network.surface for name, piece in garment.pieces.items()}, without=sewn)
+    more = [f"{len(found) - 3} more stretches of border run along others and are not sewn"] if len(found) > 3 else []
+    alone = len(garment.pieces) > 1 and garment.sewn is None
+    none = ["no borders meet in space, vertex by vertex: the pieces are not sewn to each other"] if alone else []
+    return [*found[:3], *more, *none]
+
+
+def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple[str, int, int]] = ()) -> list[str]:
     """Describe the stretches of border that run along another one and are not sewn to it, the longest first.
 
     Args:
         surfaces: by name.
-        without: edges that are sewn in another way, by their vertices, the lower first.
+        without: edges that are sewn in another way, by piece and vertices, the lower first.
     """
     from scipy.spatial import cKDTree
 
@@ -181,7 +225,7 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
 class _BorderEdges:
     """The border edges of several surfaces, along their loops, each with the one that lies at its place."""
 
-    def __init__(self, surfaces: Mapping[str, Surface], without: Collection[tuple[int, int]]) -> None:
+    def __init__(self, surfaces: Mapping[str, Surface], without: Collection[tuple[str, int, int]]) -> None:
         from scipy.spatial import cKDTree
 
         self.names, self.tail, self.head = list[str](), list[int](), list[int]()
@@ -212,7 +256,7 @@ class _BorderEdges:
         here: dict[tuple[int, ...], list[int]] = {}
         for edge, ends in enumerate(self._ends):
             own = sorted((self.tail[edge], self.head[edge]))
-            if ends[0] != ends[1] and (own[0], own[1]) not in without:
+            if ends[0] != ends[1] and (self.names[edge], own[0], own[1]) not in without:
                 here.setdefault(tuple(sorted(ends)), []).append(edge)
         self._partner = {a: b for both in here.values() if len(both) == 2 for a, b in (both, both[::-1])}
         self._without = without
@@ -237,8 +281,8 @@ class _BorderEdges:
         """Return #E, which edges are sewn to none."""
         return np.array(
             [
-                edge not in self._partner and (min(ends), max(ends)) not in self._without
-                for edge, ends in enumerate(zip(self.tail, self.head, strict=True))
+                edge not in self._partner and (name, min(ends), max(ends)) not in self._without
+                for edge, (name, *ends) in enumerate(zip(self.names, self.tail, self.head, strict=True))
             ]
         )
 
@@ -268,3 +312,36 @@ class _BorderEdges:
         if self.next[edges[0]] == edges[1]:
             return np.array([*(self.tail[edge] for edge in edges), self.head[edges[-1]]], dtype=np.int32)
         return np.array([*(self.head[edge] for edge in edges), self.tail[edges[-1]]], dtype=np.int32)
+
+
+def _opening(surface: Surface, pair: SeamPair) -> str | None:
+    """Return the name of the line along which a stretch of border was cut open."""
+    first = {frozenset(side[:2].tolist()) for side in pair.vertices}
+    for name, line in surface.lines.items():
+        side = re.fullmatch(r"(.+)\.(left|right)(\.\d+)?'*", name)
+        if side is not None and not first.isdisjoint(map(frozenset, pairwise(line.tolist()))):
+            return side[1]
+    return None
+
+
+def _with_fullness(result: Flattening, seams: Sequence[SurfaceSeam], options: RelaxOptions | None) -> Flattening:
+    """Return the piece with more cloth along the sides that are meant to be longer."""
+    full = [
+        FullEdge(vertices=seam.vertices[seam.named.longer], factor=seam.named.factor, gathered=seam.named.gathered)
+        for seam in seams
+        if seam.named.factor > 1.0
+    ]
+    if not full:
+        return result
+    if result.cuts:
+        name = next(seam.named.name for seam in seams if seam.named.factor > 1.0)
+        raise InputError(
+            f"seam {name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
+        )
+    plain = [
+        ids
+        for seam in seams
+        for side, ids in enumerate(seam.vertices)
+        if seam.named.factor == 1.0 or side != seam.named.longer
+    ]
+    return give_fullness(result, full, plain, options=options)

@@ -1,60 +1,65 @@
-"""From a flattened garment to a pattern: the edges of its pieces with their kinds, its seams, its labels.
+"""From a flattened garment to its pattern: the edges of its pieces with their kinds, its darts and seams, its labels.
 
-Which edge is a seam, a hem or the fold follows from the form alone (:func:`plan_form`), so that a wrong name in a scene
-is found before anything is relaxed. The flat layouts give the shapes (:func:`pattern_of_garment`).
+Of a form the edges follow from the form alone (:func:`plan_form`), so that a wrong name in a scene is found before anything is
+relaxed; the flat layouts give the shapes. Of a mesh the border is split at its corners in the plane, and named by the lines along it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.text import find_unused_name
-from warpflat.garment.darts import CLOSED, pleat_depths
+from warpflat.core.text import find_unused_name, quote_value
+from warpflat.flattening.applied_cut import seam_kind
+from warpflat.garment.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
+from warpflat.garment.darts import pleat_depths
 from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges
-from warpflat.garment.form_plan import (
-    EdgePlan,
-    FormPlan,
-    check_fold_grain,
-    find_fold_lines,
-    plan_form,
-)
+from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.mark_openings import mark_openings
-from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
-from warpflat.garment.openings import Opening, one_sided, place_opening
+from warpflat.garment.mirror_pieces import find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.openings import one_sided, place_opening
 from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
-from warpflat.pattern.from_mesh import inner_stretches
+from warpflat.pattern.from_mesh import MeshFeatures, inner_stretches, line_labels, piece_from_mesh
 from warpflat.pattern.label import default_grain
-from warpflat.pattern.piece_parts import FOLD_STRAIGHT, Dart, Edge, Hole
+from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart, Edge, Hole
 from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
-from warpflat.surface.cut.dart_legs import are_curved, open_length
+from warpflat.surface.border_seams import SAME_PLACE
+from warpflat.surface.connectivity import border_loops, join_labels
+from warpflat.surface.cut.dart import fish_eye_measure
+from warpflat.surface.cut.dart_legs import are_curved, open_length, pull_back, pull_back_eye
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
     from warpflat.garment.garment import Garment as FlatGarment
     from warpflat.mannequin.pieces import FormPiece
+    from warpflat.surface.border_seams import NamedSeam
+    from warpflat.surface.cut.cut_mesh import Seam as Cut
+    from warpflat.surface.mesh import Surface
 
-__all__ = ["grain_of", "pattern_of_garment"]
+__all__ = ["check_edge_names", "grain_of", "pattern_of_garment", "pattern_of_surface"]
 
 
 #: A datum that strays from the grain by no more than this [m] carries the grain line.
 ON_DATUM = 1e-3
+#: Least distance [m] of the grain line from darts and holes, and the steps [m] in which it is moved aside.
+GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 
 
 def pattern_of_garment(
     garments: Mapping[str, FlatGarment], *, name: str, rules: EdgeRules | None = None, sample_size: str | None = None
 ) -> tuple[Garment, tuple[str, ...]]:
-    """Make the pattern of a garment in one or more sizes.
+    """Make the pattern of a garment; of one on a form in one or more sizes. For a mesh see :func:`pattern_of_surface`.
 
     Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece
     whose centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a seam in the
@@ -73,28 +78,77 @@ def pattern_of_garment(
         InputError: the rules name an edge that does not exist, the grain is oblique to a fold, a piece's outline
             crosses itself, or the sizes differ in their edges.
     """
-    rules = rules or EdgeRules()
-    sample = next(iter(garments.values()))
+    rules, sample = rules or EdgeRules(), next(iter(garments.values()))
+    if sample.form is None:
+        return pattern_of_surface(list(sample.parts.values()), name=name, rules=rules, seams=sample.named_seams)
+    forms = {size: garment.form for size, garment in garments.items() if garment.form is not None}
+    form = sample.form
     if sample.wished is not None:
-        positions = {piece: each.positions for piece, each in sample.pieces.items()}
-        ease, eased = measure_ease(sample.form, sample.wished, positions)
+        ease, eased = measure_ease(form, sample.wished, sample.positions)
         rules = replace(rules, ease={**ease, **rules.ease, **{seam: ease[seam] for seam in eased}}, eased=eased)
-    garments = _laid_upon_each_other(garments)
-    plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
-    form, plan = next(iter(garments.values())).form, next(iter(plans.values()))
-    bent = _bent_folds(garments)
+    plans = {size: plan_form(each, rules) for size, each in forms.items()}
+    plan = next(iter(plans.values()))
+    # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
+    laid = {}
+    for size, garment in garments.items():
+        moved = {}
+        for piece, flat in garment.pieces.items():
+            there = sample.pieces[piece]
+            offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
+            moved[piece] = replace(flat, positions=flat.positions + offset) if offset.any() else flat
+        laid[size] = replace(garment, pieces=moved)
+    garments, sample = laid, next(iter(laid.values()))
+    # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
+    bent: dict[str, float] = {}
+    for size, garment in garments.items():
+        for piece, flat in garment.pieces.items():
+            edge = forms[size].pieces[piece].fold
+            if edge is None:
+                continue
+            points = flat.positions[forms[size].pieces[piece].edges[edge]]
+            span, away = points[-1] - points[0], points - points[0]
+            length = max(float(np.linalg.norm(span)), 1e-12)
+            stray = float(np.abs(away[:, 0] * span[1] - away[:, 1] * span[0]).max()) / length
+            if stray > max(FOLD_STRAIGHT, bent.get(piece, 0.0)):
+                bent[piece] = stray
     folds = {piece: edge for piece, edge in find_fold_lines(form, plan).items() if piece not in bent}
-    opened = {name: piece.fold for name, piece in form.pieces.items() if piece.fold and name not in folds}
+    opened = {piece: each.fold for piece, each in form.pieces.items() if each.fold and piece not in folds}
     for flat in (garment.pieces[piece] for garment in garments.values() for piece in folds):
         check_fold_grain(folds, flat.grain_angle)
-    pieces = {
-        size: _pieces(garment, plans[size], rules, size=size, opened=set(opened), quantities=plan.quantities)
-        for size, garment in garments.items()
-    }
-    seams = _with_opened_folds(plan.seams, opened)
+    pieces: dict[str, tuple[Piece, ...]] = {}
+    for size, garment in garments.items():
+        pleats = pleat_depths(forms[size])
+        pieces[size] = tuple(
+            _form_piece(
+                flat,
+                forms[size].pieces[piece],
+                plans[size].edges[piece],
+                rules=rules,
+                size=size,
+                quantity=2 if piece in opened else plan.quantities[piece],
+                open_fold=piece in opened,
+                pleats={dart: depth for (own, dart), depth in pleats.items() if own == piece},
+            )
+            for piece, flat in garment.pieces.items()
+        )
+    # A piece that is cut twice instead of on the fold has a seam in its centre.
+    seams = plan.seams
+    for title, (piece, edge) in zip(
+        name_seams(list(opened.values()), [(piece, piece) for piece in opened]), opened.items(), strict=True
+    ):
+        side = (SeamSide(piece=piece, edge=edge),)
+        seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
     # One pattern cannot serve for both sides where just one of them has an opening.
     pairs = () if one_sided(sample.openings) else find_mirror_pairs(garments, pieces, seams)
-    drawn = {size: _without_mirror_images(row, pairs) for size, row in pieces.items()}
+    twice, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
+    drawn = {
+        size: tuple(
+            replace(piece, quantity=2 * piece.quantity) if piece.name in twice else piece
+            for piece in row
+            if piece.name not in left_out
+        )
+        for size, row in pieces.items()
+    }
     notes = tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
@@ -102,189 +156,29 @@ def pattern_of_garment(
     )
     pattern = Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
     placed = {
-        size: [
-            place_opening(garment.form, opening, {piece: flat.positions for piece, flat in garment.pieces.items()})
-            for opening in garment.openings
-        ]
+        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
         for size, garment in garments.items()
     }
     pattern = mark_openings(pattern, sample.openings, placed)
     zips = [
         row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top
     ]
-    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=_stands(pattern, sample.openings))
-    return add_pockets(pattern, sample.pockets), notes
-
-
-def _stands(pattern: Garment, openings: Sequence[Opening]) -> list[Stand]:
-    """Return the outer edges of the button stands of a pattern, with their facings."""
-    return [
+    stands = [
         Stand(
             piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
             grown_on=opening.buttons.facing == "grown-on",
         )
-        for opening in openings
+        for opening in sample.openings
         if opening.buttons is not None
         for piece in pattern.pieces[pattern.sample]
         for edge in piece.edges
         if edge.name == f"{opening.line} {STAND}"
     ]  # fmt: skip
+    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands)
+    return add_pockets(pattern, sample.pockets), notes
 
 
-def _laid_upon_each_other(garments: Mapping[str, FlatGarment]) -> dict[str, FlatGarment]:
-    """Move the pieces of every size to where the lower end of their datum lies in the first size.
-
-    Relaxation keeps a piece upright, but not in its place.
-    """
-    first = next(iter(garments.values()))
-    moved = {}
-    for size, garment in garments.items():
-        pieces = {}
-        for name, flat in garment.pieces.items():
-            there = first.pieces[name]
-            offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
-            pieces[name] = replace(flat, positions=flat.positions + offset) if offset.any() else flat
-        moved[size] = replace(garment, pieces=pieces)
-    return moved
-
-
-def _with_opened_folds(seams: tuple[Seam, ...], opened: Mapping[str, str]) -> tuple[Seam, ...]:
-    """Add a seam in the centre of each piece that is cut twice instead of on the fold."""
-    names = name_seams(list(opened.values()), [(piece, piece) for piece in opened])
-    for name, (piece, edge) in zip(names, opened.items(), strict=True):
-        side = (SeamSide(piece=piece, edge=edge),)
-        seams = (*seams, Seam(name=find_unused_name(name, {seam.name for seam in seams}), sides=(side, side)))
-    return seams
-
-
-def _pieces(
-    garment: FlatGarment,
-    plan: FormPlan,
-    rules: EdgeRules,
-    *,
-    size: str,
-    opened: set[str],
-    quantities: Mapping[str, int],
-) -> tuple[Piece, ...]:
-    """Return all pieces of one size; those in `opened` are halves that cannot lie on the fold and are cut twice."""
-    pleats = pleat_depths(garment.form)
-    return tuple(
-        _piece(
-            flat,
-            garment.form.pieces[name],
-            plan.edges[name],
-            rules=rules,
-            size=size,
-            quantity=2 if name in opened else quantities[name],
-            open_fold=name in opened,
-            pleats={dart: depth for (piece, dart), depth in pleats.items() if piece == name},
-        )
-        for name, flat in garment.pieces.items()
-    )
-
-
-def _without_mirror_images(pieces: Sequence[Piece], pairs: Sequence[MirrorPair]) -> tuple[Piece, ...]:
-    """Leave out the pieces that are cut by another one's pattern, which is cut twice as often."""
-    drawn, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
-    return tuple(
-        replace(piece, quantity=2 * piece.quantity) if piece.name in drawn else piece
-        for piece in pieces
-        if piece.name not in left_out
-    )
-
-
-def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = None) -> FloatArray:
-    """Return the grain line along the warp (2 by 2 [m]), on the datum where that is straight.
-
-    Elsewhere it runs through the widest place.
-
-    Args:
-        outline: #P by 2 [m].
-        flat: the piece.
-        datum: #P by 2 [m]; None if it does not lie inside the piece.
-    """
-    from warpflat.fabric.fabric import grain_axes
-
-    x, y = grain_axes(flat.grain_angle)[0]
-    turn = np.array([[y, -x], [x, y]])
-    if datum is not None:
-        along = datum @ turn.T
-        if np.ptp(along[:, 0]) <= ON_DATUM:
-            low, high = float(along[:, 1].min()), float(along[:, 1].max())
-            ends = np.array([low + (high - low) / 6, high - (high - low) / 6])
-            return np.column_stack([np.full(2, along[:, 0].mean()), ends]) @ turn
-    return default_grain(outline @ turn.T) @ turn
-
-
-def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: FloatArray) -> dict[str, FloatArray]:
-    """Return the stretches of feature lines inside a piece, #P by 2 [m]; a second stretch of a line is "NAME 2".
-
-    Args:
-        lines: vertex indices by name.
-        border: vertex indices along every edge, both ends included.
-        flat: #V by 2 [m].
-    """
-    edges = {(min(a, b), max(a, b)) for ids in border for a, b in pairwise(np.asarray(ids).tolist())}
-    found: dict[str, FloatArray] = {}
-    for name, line in lines.items():
-        for stretch in inner_stretches(np.asarray(line), edges):
-            found[find_unused_name(name, found)] = flat[stretch]
-    return found
-
-
-def _bent_folds(garments: Mapping[str, FlatGarment]) -> dict[str, float]:
-    """Return half pieces whose fold strays from straight in some size, and by how much [m] at most."""
-    bent: dict[str, float] = {}
-    for garment in garments.values():
-        for name, flat in garment.pieces.items():
-            piece = garment.form.pieces[name]
-            if piece.fold is None:
-                continue
-            points = flat.positions[piece.edges[piece.fold]]
-            span, away = points[-1] - points[0], points - points[0]
-            length = max(float(np.linalg.norm(span)), 1e-12)
-            stray = float(np.abs(away[:, 0] * span[1] - away[:, 1] * span[0]).max()) / length
-            if stray > max(FOLD_STRAIGHT, bent.get(name, 0.0)):
-                bent[name] = stray
-    return bent
-
-
-def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], piece: str) -> list[Edge]:
-    """Move the tip of a dart whose legs overlap by less than `CLOSED` short of it back to where they meet.
-
-    Raises:
-        InputError: the legs of a dart overlap from the border on, or by more.
-    """
-    by_name = {edge.name: edge for edge in edges}
-    for dart, names in darts.items():
-        left, right = (by_name[name] for name in names)
-        count, overlap = open_length(left.points, right.points[::-1])
-        if count == 0:
-            raise InputError(
-                f"piece {piece!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
-                "it a width, mouth_mm = 10"
-            )
-        if overlap > CLOSED:
-            raise InputError(
-                f"piece {piece!r}: the legs of dart {dart!r} overlap by {1e3 * overlap:.2g} mm: let it open wider, mouth_mm = 15, "
-                "or make it shorter"
-            )
-        if count == len(left.points):
-            continue
-        kept = slice(0, count)
-        tip = 0.5 * (left.points[count] + right.points[::-1][count])
-        for leg, turn in ((left, 1), (right, -1)):
-            points = np.vstack([leg.points[::turn][kept], tip])[::turn]
-            ids = (
-                None
-                if leg.vertices is None
-                else np.append(leg.vertices[::turn][kept], leg.vertices[::turn][-1])[::turn]
-            )
-            by_name[leg.name] = replace(leg, points=points, vertices=ids)
-    return list(by_name.values())
-
-
-def _piece(
+def _form_piece(
     flat: Flattening,
     piece: FormPiece,
     plan: Sequence[EdgePlan],
@@ -339,3 +233,312 @@ def _piece(
             max(along.values(), key=len, default=None),
         ),
     )
+
+
+def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], piece: str) -> list[Edge]:
+    """Move the tip of a dart whose legs overlap by less than `CLOSED` short of it back to where they meet.
+
+    Raises:
+        InputError: the legs of a dart overlap from the border on, or by more.
+    """
+    by_name = {edge.name: edge for edge in edges}
+    for dart, names in darts.items():
+        left, right = (by_name[name] for name in names)
+        count, overlap = open_length(left.points, right.points[::-1])
+        if count == 0:
+            raise InputError(
+                f"piece {piece!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
+                "it a width, mouth_mm = 10"
+            )
+        if overlap > CLOSED:
+            raise InputError(
+                f"piece {piece!r}: the legs of dart {dart!r} overlap by {1e3 * overlap:.2g} mm: let it open wider, mouth_mm = 15, "
+                "or make it shorter"
+            )
+        if count == len(left.points):
+            continue
+        kept = slice(0, count)
+        tip = 0.5 * (left.points[count] + right.points[::-1][count])
+        for leg, turn in ((left, 1), (right, -1)):
+            points = np.vstack([leg.points[::turn][kept], tip])[::turn]
+            ids = (
+                None
+                if leg.vertices is None
+                else np.append(leg.vertices[::turn][kept], leg.vertices[::turn][-1])[::turn]
+            )
+            by_name[leg.name] = replace(leg, points=points, vertices=ids)
+    return list(by_name.values())
+
+
+def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: FloatArray) -> dict[str, FloatArray]:
+    """Return the stretches of feature lines inside a piece, #P by 2 [m]; a second stretch of a line is "NAME 2".
+
+    Args:
+        lines: vertex indices by name.
+        border: vertex indices along every edge, both ends included.
+        flat: #V by 2 [m].
+    """
+    edges = {(min(a, b), max(a, b)) for ids in border for a, b in pairwise(np.asarray(ids).tolist())}
+    found: dict[str, FloatArray] = {}
+    for name, line in lines.items():
+        for stretch in inner_stretches(np.asarray(line), edges):
+            found[find_unused_name(name, found)] = flat[stretch]
+    return found
+
+
+def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = None) -> FloatArray:
+    """Return the grain line along the warp (2 by 2 [m]), on the datum where that is straight.
+
+    Elsewhere it runs through the widest place.
+
+    Args:
+        outline: #P by 2 [m].
+        flat: the piece.
+        datum: #P by 2 [m]; None if it does not lie inside the piece.
+    """
+    from warpflat.fabric.fabric import grain_axes
+
+    x, y = grain_axes(flat.grain_angle)[0]
+    turn = np.array([[y, -x], [x, y]])
+    if datum is not None:
+        along = datum @ turn.T
+        if np.ptp(along[:, 0]) <= ON_DATUM:
+            low, high = float(along[:, 1].min()), float(along[:, 1].max())
+            ends = np.array([low + (high - low) / 6, high - (high - low) / 6])
+            return np.column_stack([np.full(2, along[:, 0].mean()), ends]) @ turn
+    return default_grain(outline @ turn.T) @ turn
+
+
+def pattern_of_surface(
+    results: Sequence[Flattening],
+    *,
+    name: str,
+    rules: EdgeRules | None = None,
+    size: str = "",
+    seams: Sequence[NamedSeam] = (),
+) -> tuple[Garment, tuple[str, ...]]:
+    """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
+
+    A cut with one tip inside becomes a dart of its name, one with two tips a fish-eye dart; their tips are moved back
+    as the cut asks for. A cut that parts the surface is a seam between the two pieces.
+
+    Args:
+        results: pieces of different names.
+        name: of the pattern.
+        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are
+            called "edge_1" and so on, counter-clockwise.
+        size: for the label.
+        seams: of the border, by the lines that are sewn to each other.
+
+    Returns:
+        The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
+
+    Raises:
+        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip is moved back too
+            far, or a named seam's side is no edge.
+    """
+    rules = rules or EdgeRules()
+    pieces = [_mesh_piece(result, size) for result in results]
+    named = []
+    for seam in seams:
+        first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+        back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
+        named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
+    names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
+    rules, notes = rules.known(names)
+    notes += tuple(
+        f"cut {quote_value(title)} opens by less than {1e3 * CLOSED:g} mm: the pattern is whole there, with a line"
+        for result in results
+        for title in _closed_cuts(result)
+    )
+    rules.check(names)
+    ruled = []
+    for piece in pieces:
+        edges, holes = [], []
+        for edge in piece.edges:
+            # The allowance of a dart's leg is for one that is cut away, not folded.
+            kind = "seam" if edge.kind == "dart" else rules.kind(piece.name, edge.name, edge.kind)
+            width = rules.allowance(piece.name, edge.name, kind)
+            edges.append(replace(edge, kind="dart" if edge.kind == "dart" else kind, allowance=width))
+        for hole in piece.holes:
+            if hole.kind != "dart":
+                kind = rules.kind(piece.name, hole.name, "seam")
+                if kind not in ("seam", "hem", "cut"):
+                    raise InputError(
+                        f"kinds.{hole.name}: a hole cannot be of kind {kind!r}; give it 'seam', 'hem' or 'cut'"
+                    )
+                width = rules.allowance(piece.name, hole.name, kind)
+                hole = replace(hole, allowance=DEFAULT_ALLOWANCE[kind] if width is None else width)
+            holes.append(hole)
+        ruled.append(replace(piece, edges=edges, holes=holes))
+    return Garment(name=name, pieces={size: ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
+
+
+def _mesh_piece(result: Flattening, size: str) -> Piece:
+    """Return one piece with its cuts as darts, and its grain."""
+    darts: dict[str, tuple[int, int, int]] = {}
+    fisheyes: dict[str, Cut] = {}
+    tip_back = {title: cut.tip_back for title, cut, _ in seams_of_cuts(result)}
+    closed = _closed_cuts(result)
+    faces, lines = result.faces, dict(result.network.surface.lines)
+    if closed:
+        faces, lines = close_cuts(faces, lines, closed, count=len(result.positions))
+    loops = border_loops(faces)
+    for title, _, seam in seams_of_cuts(result):
+        kind = seam_kind(seam)
+        if title in closed:
+            continue
+        if kind == "fish-eye":
+            fisheyes[title] = seam
+        elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
+            darts[title] = places
+    piece = piece_from_mesh(
+        faces,
+        result.positions,
+        name=result.surface.name,
+        features=MeshFeatures(
+            lines=lines,
+            darts=darts,
+            fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in fisheyes.items()},
+        ),
+        size=size,
+        fabric=result.fabric.name,
+    )
+    # The tip of a dart lies short of the end of its cut, both tips of a fish-eye dart short of both ends.
+    for title in [title for title in (*darts, *fisheyes) if tip_back[title] > 0]:
+        try:
+            if title in darts:
+                left, right = piece.edge(f"{title}.left"), piece.edge(f"{title}.right")
+                legs = pull_back(left.points, right.points[::-1], tip_back[title])
+                moved = {left.name: legs[0], right.name: legs[1][::-1]}
+                edges = [replace(edge, points=moved.get(edge.name, edge.points)) for edge in piece.edges]
+                piece = replace(piece, edges=edges)
+            else:
+                at, sides = result.positions, (fisheyes[title].left, fisheyes[title].right)
+                station = fish_eye_measure(at, *sides).station
+                one, other = pull_back_eye(at[sides[0]], at[sides[1]], station, tip_back[title])
+                ring = np.concatenate([other[:-1], one[:0:-1]])
+                holes = [replace(hole, points=ring) if hole.name == title else hole for hole in piece.holes]
+                piece = replace(piece, holes=holes)
+        except InputError as reason:
+            raise InputError(f"piece {piece.name!r}: dart {title!r}: {reason}") from None
+    drawn = [
+        replace(dart, cut=are_curved(piece.edge(dart.left).points, piece.edge(dart.right).points))
+        for dart in piece.darts
+    ]
+    on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
+    datum = None if on_border else result.positions[result.datum]
+    grain = _clear_of_holes(grain_of(piece.outline, result, datum), piece)
+    return replace(piece, darts=drawn, grain=grain)
+
+
+def _closed_cuts(result: Flattening) -> dict[str, Cut]:
+    return {title: seam for title, _, seam in seams_of_cuts(result) if are_closed(result.positions, seam)}
+
+
+def _dart_places(loops: Sequence[IntArray], cut: Cut) -> tuple[int, int, int] | None:
+    """Return left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
+    at_end = cut.left[-1] == cut.right[-1]
+    tip = int(cut.left[-1] if at_end else cut.left[0])
+    mouths = [int(side[0] if at_end else side[-1]) for side in (cut.left, cut.right)]
+    for loop in loops:
+        where = {vertex: place for place, vertex in enumerate(loop.tolist())}
+        if all(vertex in where for vertex in (tip, *mouths)):
+            first, second = sorted(mouths, key=lambda v: (where[tip] - where[v]) % len(loop))
+            return first, tip, second
+    return None
+
+
+def _clear_of_holes(grain: FloatArray, piece: Piece) -> FloatArray:
+    """Move the grain line aside as far as it takes to keep off holes and fish-eye darts."""
+    import shapely
+
+    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+    across = np.array([along[1], -along[0]])
+    free = shapely.Polygon(piece.outline, [hole.points for hole in piece.holes]).buffer(-GRAIN_CLEAR)
+    for step in range(31):
+        for side in (1, -1):
+            moved = grain + side * step * GRAIN_STEP * across
+            if free.contains(shapely.LineString(moved)):
+                return moved
+    return grain
+
+
+def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piece]) -> tuple[SeamSide, ...]:
+    """Return the edges along a line, in order, as the border runs."""
+    for result, piece in zip(results, pieces, strict=True):
+        ids = result.network.surface.lines.get(line)
+        if ids is None:
+            continue
+        own = [e for e in piece.edges if e.vertices is not None and e.kind != "dart" and np.isin(e.vertices, ids).all()]
+        if sum(len(edge.points) - 1 for edge in own) != len(ids) - 1:
+            continue
+        ends = {int(edge.vertices[-1]) for edge in own if edge.vertices is not None}
+        start = next((k for k, e in enumerate(own) if e.vertices is not None and int(e.vertices[0]) not in ends), 0)
+        return tuple(SeamSide(piece=piece.name, edge=edge.name) for edge in own[start:] + own[:start])
+    raise InputError(f"line {line!r} is no whole stretch of a piece's border; a cut or another line parts it")
+
+
+def _mesh_seams(
+    results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
+) -> tuple[Seam, ...]:
+    """Return the seams: those that are named, and pairs of edges that are one curve in space."""
+    from scipy.spatial import cKDTree
+
+    seams: list[Seam] = [*named]
+    done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
+    edges = [
+        (SeamSide(piece=piece.name, edge=edge.name), result.network.surface.vertices[edge.vertices])
+        for result, piece in zip(results, pieces, strict=True)
+        for edge in piece.edges
+        if edge.kind in ("seam", "cut") and edge.vertices is not None and (piece.name, edge.name) not in done
+    ]
+    if not edges:
+        return tuple(seams)
+    # Only edges whose ends lie at the same two places can be one curve.
+    ends = np.array([curve[[0, -1]] for _, curve in edges]).reshape(-1, 3)
+    place = join_labels(len(ends), *cKDTree(ends).query_pairs(SAME_PLACE, output_type="ndarray").T)
+    groups: dict[tuple[int, ...], list[tuple[SeamSide, FloatArray]]] = {}
+    for edge, here in zip(edges, np.sort(place.reshape(-1, 2), axis=1).tolist(), strict=True):
+        groups.setdefault(tuple(here), []).append(edge)
+
+    def are_one(curve: FloatArray, other: FloatArray) -> bool:
+        return len(curve) == len(other) and bool(np.linalg.norm(curve - other, axis=1).max() < SAME_PLACE)
+
+    for group in groups.values():
+        for (first, curve), (second, other) in combinations(group, 2):
+            against = not are_one(curve, other)
+            if are_one(curve, other[::-1] if against else other):
+                name = first.edge.removesuffix(".left").removesuffix(".right")
+                name = find_unused_name(name, {seam.name for seam in seams})
+                sides = ((first,), (replace(second, reversed=against),))
+                seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
+    return tuple(seams)
+
+
+def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:
+    """Check that every name in the rules can be an edge's, before anything is flattened.
+
+    Lines along the border name the edges, holes are numbered. Where corners split them shows only in the plane.
+    Therefore "bottom_2" passes if there is a bottom, and "edge_7" if there is a stretch of border without a line.
+
+    Args:
+        surfaces: with their lines, cut as they are going to be.
+        rules: as of :func:`pattern_of_surface`.
+        cuts: names of the cuts, for the legs of their darts.
+
+    Raises:
+        InputError: a name that no piece can have (gives the nearest).
+    """
+    legs = "|".join(map(re.escape, ["dart", *cuts]))
+    edges: dict[str, list[str]] = {}
+    for surface in surfaces:
+        loops = border_loops(surface.faces)
+        lines = {label for loop in loops for label in line_labels(loop, surface.lines)}
+        names = {line or "edge" for line in lines}
+        later = re.compile(rf"({'|'.join(map(re.escape, sorted(names)))})_\d+|({legs})(_\d+)?\.(left|right)")
+        asked = {name.removeprefix(f"{surface.name}.") for name in (*rules.kinds, *rules.allowances)}
+        known = {line or "edge_1" for line in lines} | {name for name in asked if later.fullmatch(name)}
+        known |= {f"hole_{number}" for number in range(1, len(loops))}
+        edges.setdefault(surface.name, []).extend(sorted(known))
+    rules.check(edges)

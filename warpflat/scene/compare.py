@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.cutting.remedies import advise
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.result import Flattening
+from warpflat.garment.garment import Garment
 from warpflat.scene.comparison import Comparison
-from warpflat.scene.cuts import CutSequence
 from warpflat.scene.drape import drape_scene
+from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import Scene, scene_fabric
-from warpflat.scene.run import flatten_scene, scene_cuts
-
-if TYPE_CHECKING:
-    from warpflat.draping.result import Drape
-    from warpflat.garment.garment import Garment
+from warpflat.scene.plan import MeshPlan, plan_scene
 
 __all__ = ["compare_fabrics", "compared_files", "comparison_table", "laid_upon", "save_comparison"]
 
@@ -46,61 +43,40 @@ def compare_fabrics(
     Raises:
         InputError: fewer than two fabrics, one given twice or unknown, or the scene is wrong.
     """
-    from warpflat.scene.form_shaping import settle_shape
-
     if len(fabrics) < 2:
         raise InputError(
             f"{len(fabrics)} fabric given to compare; name two or more, such as --fabric denim --fabric jersey"
         )
-    dressed = {}
     # In the scene's own fabric, so that all patterns have the same darts.
     scene, _ = settle_shape(scene, device=device)
+    dressed = {}
     for name in fabrics:
         one = replace(scene, settings=scene.settings.model_copy(update={"fabric": name}))
         fabric = scene_fabric(one)
         if fabric.name in dressed:
             raise InputError(f"fabric {name!r} is given twice ({fabric.name}); compare different ones")
         dressed[fabric.name] = one
-    # Cuts are found once, and all of them are made, so that all patterns have the same points.
-    sequence = None
-    if scene.settings.mannequin is None:
-        sequence = replace(scene_cuts(scene, device=device), auto=None)
-    results: dict[str, Mapping[str, Flattening]] = {}
-    sewing: dict[str, Mapping[str, Any]] = {}
-    drapes: dict[str, Drape] = {}
+    plan = plan_scene(scene, device=device)
+    if isinstance(plan, MeshPlan):
+        # Cuts are found once, and all of them are made, so that all patterns have the same points.
+        plan = replace(plan, sequences=[replace(sequence, auto=None) for sequence in plan.sequences])
+    garments: dict[str, Garment] = {}
     for name, one in dressed.items():
 
-        def report(progress: Progress, name: str = name) -> None:
-            if on_progress is not None:
-                on_progress(name, progress)
+        def report(_: str, progress: Progress, fabric: str = name) -> bool | None:
+            return None if on_progress is None else on_progress(fabric, progress)
 
-        results[name], sewing[name], worn = _run(one, sequence, report, device)
-        if drape:
-            drapes[name] = drape_scene(one, worn, device=device)
+        cloth = replace(plan, scene=one) if isinstance(plan, MeshPlan) else plan_scene(one, device=device)
+        garments[name] = cloth.flatten(callback=report)
+    results = {name: {part: advise(flat) for part, flat in garment.parts.items()} for name, garment in garments.items()}
     first = next(iter(results.values()))
     layouts = {
         name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
         for name, pieces in results.items()
     }
+    sewing = {name: garment.sewing_metrics() for name, garment in garments.items()}
+    drapes = {name: drape_scene(dressed[name], garments[name], device=device) for name in garments if drape}
     return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing, drapes=drapes)
-
-
-def _run(
-    scene: Scene, sequence: CutSequence | None, report: Callable[[Progress], bool | None], device: str | None
-) -> tuple[Mapping[str, Flattening], Mapping[str, Any], Garment | Flattening]:
-    """Run the scene without writing files; return its pieces, the entries of `metrics.json` on their sewing, and what is worn."""
-    from warpflat.cutting.remedies import advise
-    from warpflat.cutting.separate_pieces import separate
-    from warpflat.scene.run_garment import plan_garment
-
-    if sequence is None:
-        garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: report(progress))
-        how = garment.summary()
-        garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
-        return garment.pieces, {key: how[key] for key in how if key != "pieces"}, garment
-    result, sewn = flatten_scene(scene, sequence, callback=report, device=device)
-    pieces = {piece.surface.name: advise(piece) for piece in separate(result)}
-    return pieces, {} if sewn is None else sewn.metrics(), result
 
 
 def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpflat.core.activity import report_activity
+from warpflat.garment.garment import Garment
+from warpflat.garment.pattern_files import garment_files, pattern_names
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named
 from warpflat.scene.schema import DrapeTable
@@ -14,30 +16,46 @@ from warpflat.scene.schema import DrapeTable
 if TYPE_CHECKING:
     from warpflat.draping.result import Drape
     from warpflat.flattening.result import Flattening
-    from warpflat.garment.garment import Garment
 
-__all__ = ["drape_scene", "write_drape"]
+__all__ = ["drape_names", "drape_scene", "write_drape"]
+
+
+def drape_names(scene: Scene) -> list[str]:
+    """Return the files that a scene's drape will write, as far as they are known: without those of a form's pieces."""
+    settings, output, table = scene.settings, scene.settings.output, scene.settings.drape
+    if table is None:
+        return []
+    names = [f"{scene.name}.draped.obj"] if settings.mannequin is None else []
+    names += ["drape.png"] if output.picture else []
+    names += ["drape.webp"] if output.picture and FrameSchedule(output).wanted else []
+    if table.correct or table.correct_fabric is not None:
+        names += ["corrected.png"] if output.picture else []
+        names += pattern_names(f"{scene.name}.corrected", _corrected_formats(scene))
+    return names
+
+
+def _corrected_formats(scene: Scene) -> list[str]:
+    """Return the formats of the corrected pattern: the PDF and the JSON have one name in a folder, which is the first pattern's."""
+    return [each for each in scene.settings.pattern.formats if each in ("dxf", "svg")]
 
 
 def write_drape(
-    scene: Scene, garment: Garment | Flattening, folder: Path, *, device: str | None = None
+    scene: Scene, garment: Garment, folder: Path, *, device: str | None = None
 ) -> tuple[dict[str, Any], list[str]]:
-    """Drape a scene's garment or piece, and write its files.
+    """Drape a scene's garment, and write its files.
 
     Args:
-        scene: the scene.
+        scene: with a `[drape]` table.
         garment: flattened.
         folder: an existing one.
         device: Warp device.
 
     Returns:
-        The entries of `metrics.json`, and the names of the files; none of both without a `[drape]` table.
+        The entries of `metrics.json`, and the names of the files.
 
     Raises:
         InputError: an unknown line, or the folder cannot be written.
     """
-    if scene.settings.drape is None:
-        return {}, []
     from warpflat.draping.write import write_drape_files
 
     draped = drape_scene(scene, garment, device=device)
@@ -45,6 +63,7 @@ def write_drape(
     files = write_drape_files(draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted)
     metrics = {"drape": draped.measures()}
     table = scene.settings.drape
+    assert table is not None
     if table.correct or table.correct_fabric is not None:
         entry, more = _write_correction(scene, garment, draped, folder)
         metrics["drape"]["correction"] = entry
@@ -52,15 +71,11 @@ def write_drape(
     return metrics, files
 
 
-def _write_correction(
-    scene: Scene, garment: Garment | Flattening, draped: Drape, folder: Path
-) -> tuple[dict[str, Any], list[str]]:
+def _write_correction(scene: Scene, garment: Garment, draped: Drape, folder: Path) -> tuple[dict[str, Any], list[str]]:
     """Correct the pattern, and write it beside the first."""
     from warpflat.core.output import optional_file
     from warpflat.draping.correct_pattern import correct_pattern
     from warpflat.fabric.library import find_fabric
-    from warpflat.garment.garment import Garment
-    from warpflat.garment.pattern_files import garment_files, surface_files
     from warpflat.scene.pattern_options import pattern_options
 
     settings = scene.settings
@@ -77,13 +92,10 @@ def _write_correction(
             from warpflat.draping.correction_picture import write_correction_picture
 
             write_correction_picture(path, found)
-    corrected, name = found.apply(garment), f"{scene.name}.corrected"
-    # The PDF and the JSON have one name in a folder, which is the first pattern's.
-    drawing = replace(drawing, formats=[each for each in drawing.formats if each in ("dxf", "svg")], cloth=None)
-    if isinstance(corrected, Garment):
-        written = garment_files({"": corrected}, folder, name=name, options=drawing)
-    else:
-        written = surface_files([corrected], folder, name=name, options=drawing)
+    corrected = found.apply(garment)
+    assert isinstance(corrected, Garment)
+    drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
+    written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
     return found.measures(garment), [*files, *written.files]
 
 

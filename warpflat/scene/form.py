@@ -10,7 +10,7 @@ from warpflat.mannequin.forms import Form, FormResult, form_from_mapping, shippe
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
-from warpflat.scene.form_cuts import cut_form
+from warpflat.scene.cuts import cut_form
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.scene.openings import scene_openings
 

@@ -14,12 +14,12 @@ from warpflat.core.polyline import polyline_length
 from warpflat.core.toml_file import tables_as_toml
 from warpflat.garment.form_plan import plan_form
 from warpflat.garment.garment import Garment
-from warpflat.mannequin.darts import FormDart, PlacedDart
+from warpflat.mannequin.darts import FormDart
+from warpflat.scene.cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.form import scene_form, scene_recipe
-from warpflat.scene.form_cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import Scene
-from warpflat.scene.run_garment import plan_garment
+from warpflat.scene.plan import plan_garment
 
 __all__ = ["KINDS", "DartEdit", "edit_dart", "rotate_dart", "split_dart", "turn_dart"]
 
@@ -157,7 +157,9 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
         kept = [cut for cut in cuts if not (cut.get("omit") and place_of(cut) == old.place)]
         seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0]}
         return scene_with(scene, cuts=[*cuts_beside(*scene_recipe(scene), kept, seam), seam])
-    fisheyes = {f"{name}.{own}" for name, piece in garment.form.pieces.items() for own in piece.fisheyes}
+    form = garment.form
+    assert form is not None
+    fisheyes = {f"{name}.{own}" for name, piece in form.pieces.items() for own in piece.fisheyes}
     if any(f"{old.piece}.{old.name}{side}" in fisheyes for side in ("", " left", " right")):
         raise InputError(
             f"dart {dart!r} has no mouth on the border, so it cannot become {into}; turn it into seam or nothing"
@@ -207,11 +209,17 @@ def _bounds(scene: Scene, piece: str, line: str) -> bool:
 
 def _shares(dart: FormDart, garment: Garment) -> Mapping[str, tuple[str, float]]:
     """Return by seam at the mouths of a dart and its mirror image the edge, and the share of it that they take in."""
-    form, seams = garment.form, plan_form(garment.form).seams
+    form = garment.form
+    assert form is not None
+    seams = plan_form(form).seams
     taken: dict[tuple[str, str], float] = {}
     for placed in form.darts:
         if placed.asked.place == dart.place and placed.piece in form.pieces:
-            edge, width = _mouth(placed, garment)
+            # The edge on which its mouth lies, and how wide that is.
+            piece, positions = form.pieces[placed.piece], garment.pieces[placed.piece].positions
+            left, right = (piece.edges[leg] for leg in piece.darts[placed.name])
+            edge = next(name for name, ids in piece.edges.items() if ids[-1] == left[0])
+            edge, width = piece.parts.get(edge, edge), polyline_length(positions[[left[0], right[-1]]])
             taken[placed.piece, edge] = taken.get((placed.piece, edge), 0.0) + width
     found = {}
     for (name, edge), width in taken.items():
@@ -230,11 +238,3 @@ def _shares(dart: FormDart, garment: Garment) -> Mapping[str, tuple[str, float]]
             raise InputError(f"dart {name}.{dart.name}: its mouth lies on {edge!r}, which is sewn to nothing")
         found[seam] = (name, width / length)
     return found
-
-
-def _mouth(dart: PlacedDart, garment: Garment) -> tuple[str, float]:
-    """Return the edge on which the mouth of a dart lies, and its width [m]."""
-    piece, positions = garment.form.pieces[dart.piece], garment.pieces[dart.piece].positions
-    left, right = (piece.edges[leg] for leg in piece.darts[dart.name])
-    edge = next(name for name, ids in piece.edges.items() if ids[-1] == left[0])
-    return piece.parts.get(edge, edge), polyline_length(positions[[left[0], right[-1]]])

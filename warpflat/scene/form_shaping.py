@@ -1,17 +1,20 @@
-"""A form shaped by itself: the best cut of all candidates is made, again and again, until it is enough."""
+"""Which darts and seams the shape of a form gets: a book's or the best of all candidates, without darts that the body does not want."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
-from warpflat.cutting.ledger import AutoCut, RankedBy
+from warpflat.cutting.ledger import AutoCut, LedgerEntry, RankedBy
 from warpflat.flattening.result import Flattening
+from warpflat.garment.darts import closed_darts
+from warpflat.garment.garment import Garment
+from warpflat.mannequin.elbow_darts import ELBOW
+from warpflat.scene.cuts import place_of, scene_with
 from warpflat.scene.form import scene_recipe
-from warpflat.scene.form_cuts import place_of, scene_with
-from warpflat.scene.form_ledger import FormEntry, candidate_cuts, trial_of_scene, try_cuts, with_cut
+from warpflat.scene.ledger import candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.scene.load import Scene
 
-__all__ = ["settle_shape"]
+__all__ = ["ClosedDarts", "require_open_darts", "settle_shape", "without_closed_darts"]
 
 
 def settle_shape(scene: Scene, *, device: str | None = None) -> tuple[Scene, tuple[str, ...]]:
@@ -41,15 +44,9 @@ def settle_shape(scene: Scene, *, device: str | None = None) -> tuple[Scene, tup
         for dart in scene_recipe(scene_with(bare, cuts=[]))[1].darts
         if dart.place not in places
     ]
-    cut, made = _cut(
-        scene_with(bare, cuts=[*own, *omitted]), _is_unstrained, by="released", usual_only=True, device=device
-    )
+    bare = scene_with(bare, cuts=[*own, *omitted])
+    cut, made = _cut(bare, lambda piece: piece.fit.outside == 0.0, by="released", usual_only=True, device=device)
     return cut, (_note(made),)
-
-
-def _is_unstrained(piece: Flattening) -> bool:
-    """Return whether no cloth of a piece is strained beyond its limit."""
-    return piece.fit.outside == 0.0
 
 
 def _cut(
@@ -60,7 +57,7 @@ def _cut(
     most: int | None = None,
     usual_only: bool = False,
     device: str | None = None,
-) -> tuple[Scene, list[FormEntry]]:
+) -> tuple[Scene, list[LedgerEntry]]:
     """Cut greedily; return the scene with its cuts, and the entry of each.
 
     Args:
@@ -71,15 +68,15 @@ def _cut(
         usual_only: a book's darts only, of which those are made that leave less cloth strained beyond its limit.
         device: Warp device.
     """
-    made: list[FormEntry] = []
-    known: dict[str, tuple[FormEntry, ...]] = {}
+    made: list[LedgerEntry] = []
+    known: dict[str, tuple[LedgerEntry, ...]] = {}
     while most is None or len(made) < most:
         base = trial_of_scene(scene, device=device)
         wanting = [name for name, piece in base.garment.pieces.items() if not is_enough(piece)]
         for name in wanting:
             if name not in known:
                 cuts = [cut for cut in candidate_cuts(base, usual_only=usual_only) if cut["piece"] == name]
-                known[name] = try_cuts(base, cuts, by=by).entries
+                known[name] = try_cuts(base, cuts, by=by)[0]
         helpful = [
             entry
             for name in wanting
@@ -98,10 +95,64 @@ def _cut(
     return scene, made
 
 
-def _note(made: list[FormEntry]) -> str:
+def _note(made: list[LedgerEntry]) -> str:
     """Return a sentence about the cuts that were made."""
     words = [
         f"{entry.cut['piece']}.{entry.cut['name']} along {entry.cut['line']} releases {1e3 * entry.released:.3g} mJ"
         for entry in made
     ]
     return f"cuts found: {'; '.join(words)}" if made else "no cut was found that would help"
+
+
+class ClosedDarts(Exception):
+    """Darts of a scene's shape do not open.
+
+    Attributes:
+        without: the scene without them.
+        notes: one sentence for each.
+    """
+
+    def __init__(self, without: Scene, notes: tuple[str, ...]) -> None:
+        super().__init__(*notes)
+        self.without, self.notes = without, notes
+
+
+def without_closed_darts(scene: Scene, garments: Iterable[Garment]) -> tuple[Scene, tuple[str, ...]]:
+    """Return a scene without the darts of its shape that do not open in some size, and one sentence for each that is left out.
+
+    A body may want no dart where a pattern book has one, such as in the skirt of one whose belly stands out.
+
+    Args:
+        scene: the one that has been flattened.
+        garments: its garment, in every size.
+    """
+    own = {place_of(table.model_dump()) for table in scene.settings.cuts}
+    closed = []
+    for garment in garments:
+        found = [] if garment.form is None else closed_darts(garment.form, garment.positions)
+        closed += [d for d in found if d.place not in own and d not in closed]
+    if scene.settings.shape != "darts":
+        # A woven sleeve around a bent elbow has its dart in every shape.
+        closed = [dart for dart in closed if ELBOW in dart.place]
+    if not closed:
+        return scene, ()
+    cuts = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
+    for dart in closed:
+        place = zip(("piece", "line", "towards", "at"), dart.place, strict=True)
+        cuts.append({key: value for key, value in place if value} | {"omit": True})
+    notes = tuple(
+        f"{dart.piece}: the {dart.name} is left out, since the cloth would not open it; [[cuts]] with mouth_mm keeps it"
+        for dart in closed
+    )
+    return scene_with(scene, cuts=cuts), notes
+
+
+def require_open_darts(scene: Scene, garments: Iterable[Garment]) -> None:
+    """Check that the darts of a scene's shape open in the garment of every size.
+
+    Raises:
+        ClosedDarts: some darts of the scene's shape do not open.
+    """
+    without, notes = without_closed_darts(scene, garments)
+    if notes:
+        raise ClosedDarts(without, notes)

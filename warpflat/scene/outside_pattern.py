@@ -15,8 +15,8 @@ from warpflat.core.input_files import read_json
 from warpflat.core.toml_file import Table, check_table, read_toml
 from warpflat.mannequin.table import MannequinTable, mannequin_from_table
 from warpflat.scene.load import errors_named, expand_variables
+from warpflat.scene.run import SceneResult
 from warpflat.scene.schema import DrapeTable
-from warpflat.scene.write import SceneResult
 
 if TYPE_CHECKING:
     from warpflat.draping.lift import Lift

@@ -15,8 +15,8 @@ from warpflat.flattening.result import Flattening
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import FormDart, dart_along, usual_darts
 from warpflat.mannequin.pieces import is_part_of
+from warpflat.scene.cuts import cut_of_dart
 from warpflat.scene.form import scene_recipe
-from warpflat.scene.form_cuts import cut_of_dart
 from warpflat.scene.load import Scene
 from warpflat.studio.pick import Hit
 from warpflat.studio.solve import Solution

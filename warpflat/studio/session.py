@@ -17,8 +17,8 @@ from warpflat.draping.drape_garment import drape
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.result import Drape
 from warpflat.flattening.step_by_step import relaxation
-from warpflat.scene.form_cuts import scene_with
-from warpflat.scene.form_ledger import with_cut
+from warpflat.scene.cuts import scene_with
+from warpflat.scene.ledger import with_cut
 from warpflat.scene.load import Scene, scene_fabric
 from warpflat.studio.frame import PieceFrame, Watch
 from warpflat.studio.save import Saved, run_saved, scene_file, write_scene

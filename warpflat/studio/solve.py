@@ -17,13 +17,11 @@ from warpflat.garment.darts import measure_darts
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
-from warpflat.scene.closed_darts import without_closed_darts
 from warpflat.scene.cuts import CutSequence
 from warpflat.scene.form import scene_form
-from warpflat.scene.form_shaping import settle_shape
+from warpflat.scene.form_shaping import settle_shape, without_closed_darts
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_relax_options
-from warpflat.scene.run import flatten_scene, scene_cuts
-from warpflat.scene.run_garment import GarmentPlan, plan_garment
+from warpflat.scene.plan import GarmentPlan, plan_garment, plan_mesh, scene_cuts
 from warpflat.scene.surface import scene_surface
 from warpflat.surface.mesh import Surface
 
@@ -69,8 +67,8 @@ class Solution:
     @property
     def openings(self) -> dict[str, float]:
         """How wide each cut or dart opens, by "piece.name" [m]."""
-        if self.garment is not None:
-            form = self.garment.form
+        form = None if self.garment is None else self.garment.form
+        if form is not None:
             return {
                 f"{name}.{dart['name']}": float(dart["intake_m"])
                 for name, piece in self.pieces.items()
@@ -108,13 +106,13 @@ def _solve_surface(
     known = before is not None and before.bare is not None and _alike(scene, before.scene, _OF_SURFACE)
     bare = before.bare if known and before is not None and before.bare is not None else scene_surface(scene)
     sequence = scene_cuts(scene, surface=bare)
-    each_step = None if callback is None else partial(callback, scene.name)
     plan = None if before is None else _one_more_cut(scene, before, sequence)
     if before is not None and plan is not None:
         with errors_named(scene.where):
-            result = cut(before.pieces[scene.name], plan, relax=scene_relax_options(scene), callback=each_step)
+            step = None if callback is None else partial(callback, scene.name)
+            result = cut(before.pieces[scene.name], plan, relax=scene_relax_options(scene), callback=step)
     else:
-        result, _ = flatten_scene(scene, sequence, callback=each_step)
+        result = plan_mesh(scene, cuts=sequence).flatten(callback=callback).pieces[scene.name]
     return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*sequence.notes, *result.messages))
 
 
