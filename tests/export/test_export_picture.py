@@ -25,8 +25,7 @@ from warpflat.export.labels import (
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_garment import Body, crop_body
-from warpflat.export.picture_packing import pack_boxes, pack_rows
-from warpflat.export.picture_page import BETWEEN, place_views
+from warpflat.export.picture_page import BETWEEN, pack_boxes, pack_rows, place_views
 from warpflat.export.picture_views import Silhouette, make_facets, pattern_view
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.half_edges import border_edges

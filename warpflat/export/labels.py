@@ -384,16 +384,13 @@ class _Names:
         """Place names off the cloth beside their lines, level, as near as there is room."""
         for name in self._unplaced(names):
             width, height = self._size(name)
-            spots = spots_beside(self._points_clear_of_others(name), width, (1.0, -1.0))
+            # A leader begins at a point of the line that is not near to other lines, if there is one.
+            points = resample(self._lines[name], _SHARES)
+            others = np.concatenate([np.empty((0, 2)), *(line for other, line in self._lines.items() if other != name)])
+            away = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1, initial=np.inf)
+            clear = away > _LEAST_DISTANCE if (away > _LEAST_DISTANCE).any() else np.ones(len(points), dtype=bool)
+            spots = spots_beside([(x, y) for x, y in points[clear].tolist()], width, (1.0, -1.0))
             self._place(name, self._spots_on_cloth(spots, width, height, covered=False), may_cross=False)
-
-    def _points_clear_of_others(self, name: str) -> list[tuple[float, float]]:
-        """Return points of a line that are not near to others, if there are such."""
-        points = resample(self._lines[name], _SHARES)
-        others = np.concatenate([np.empty((0, 2)), *(line for other, line in self._lines.items() if other != name)])
-        away = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1, initial=np.inf)
-        clear = away > _LEAST_DISTANCE if (away > _LEAST_DISTANCE).any() else np.ones(len(points), dtype=bool)
-        return [(x, y) for x, y in points[clear].tolist()]
 
     def place_anywhere(self) -> None:
         """Place names wherever there is room."""

@@ -27,8 +27,8 @@ from warpflat.pattern.draft import nest_label, relabelled
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drawing import OnPaper, Stroke, draw_nest
 from warpflat.pattern.half_pieces import halved
+from warpflat.pattern.label import BOLD, CAPITALS, FONT, Words, embedded_font
 from warpflat.pattern.layout import Placed, Sheet, lay_out, nests, occupied_points
-from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, embedded_font
 from warpflat.pattern.sewing_order import seam_letters
 from warpflat.pattern.tile_nesting import nest_on_tiles
 from warpflat.pattern.words import printed_in, translate
@@ -95,7 +95,15 @@ def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, si
     printed = halved(whole)
     kind = PAPERS[paper]
     sheet, tiling = _arranged(nests(printed), kind)
-    kind, sheet = tiling.paper, _with_labels_off_joints(sheet, garment.name, tiling)
+    # Labels move to where no joint of two sheets crosses them, where there is room for that.
+    placed = []
+    for place in sheet.placed:
+        joints = [place.on_piece(joint) for joint in tiling.joints]
+        pieces = tuple(relabelled(piece, garment.name, joints) for piece in place.pieces) if joints else place.pieces
+        if any(piece.label.leader is not None for piece in pieces):
+            pieces = place.pieces
+        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
+    kind, sheet = tiling.paper, replace(sheet, placed=tuple(placed))
     tiling = replace(tiling, sheet=sheet)
     content, guided = b"", list[str]()
     if kind.tiled:
@@ -119,11 +127,13 @@ def _pages(
         chosen: sizes.
         guide: whether the legend and the guide come first.
     """
+    from reportlab.pdfbase import pdfmetrics
     from reportlab.pdfgen.canvas import Canvas
 
     kind, stream = tiling.paper, BytesIO()
     canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
-    _register_fonts()
+    for name in (FONT, BOLD):
+        pdfmetrics.registerFont(embedded_font(name))
     canvas.setTitle(f"{whole.name}, {' / '.join(chosen)}")
     canvas.setCreator("warpflat")
     canvas.setViewerPreference("PrintScaling", "None")
@@ -181,32 +191,12 @@ def _nested(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet:
     return Sheet(placed=tuple(placed), size=size)
 
 
-def _with_labels_off_joints(sheet: Sheet, garment: str, tiling: Tiling) -> Sheet:
-    """Move the labels of pieces to where no joint of two sheets crosses them, where there is room for that."""
-    placed = []
-    for place in sheet.placed:
-        joints = [place.on_piece(joint) for joint in tiling.joints]
-        pieces = tuple(relabelled(piece, garment, joints) for piece in place.pieces) if joints else place.pieces
-        if any(piece.label.leader is not None for piece in pieces):
-            pieces = place.pieces
-        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
-    return replace(sheet, placed=tuple(placed))
-
-
 def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
     """Return a piece whose label is turned round where it would stand on its head on the sheet."""
     turn = float(np.degrees(piece.label.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
     if -89.5 < (turn + 180.0) % 360.0 - 180.0 < 90.5:
         return piece
     return replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
-
-
-def _register_fonts() -> None:
-    """Register the fonts, which are embedded."""
-    from reportlab.pdfbase import pdfmetrics
-
-    for name in (FONT, BOLD):
-        pdfmetrics.registerFont(embedded_font(name))
 
 
 def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: Sequence[str]) -> None:
@@ -360,7 +350,21 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
         canvas.line(*(np.array(start) * POINT), *(np.array(end) * POINT))
         r, c = neighbours[side]
         if 0 <= r < tiling.rows and 0 <= c < tiling.columns and (r, c) in tiling.tiles:
-            _diamond(canvas, np.array(middle), tiling, (row, column), (r, c))
+            # The diamond in which two sheets meet, with their names.
+            at = np.array(middle)
+            first, second = sorted([(row, column), (r, c)])
+            size = 0.004
+            path = canvas.beginPath()
+            path.moveTo(*((at + np.array([size, 0])) * POINT))
+            for dx, dy in ((0, size), (-size, 0), (0, -size)):
+                path.lineTo(*((at + np.array([dx, dy])) * POINT))
+            path.close()
+            canvas.drawPath(path)
+            canvas.setFillColor("#888888")
+            canvas.setFont(FONT, 6)
+            text = f"{tiling.name(*first)} | {tiling.name(*second)}"
+            shift = np.array([0.006, 0.001]) if first[0] != second[0] else np.array([-0.004, 0.006])
+            canvas.drawString(*((at + shift) * POINT), text)
     for x in (low[0], high[0]):
         for y in (bottom, top):
             for dx, dy in ((0.004, 0.0), (0.0, 0.004)):
@@ -368,20 +372,3 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
     canvas.setFillColor("#bbbbbb")
     canvas.setFont(BOLD, 26)
     canvas.drawString((low[0] + 0.006) * POINT, (top - 0.014) * POINT, tiling.name(row, column))
-
-
-def _diamond(canvas: Any, at: FloatArray, tiling: Tiling, here: tuple[int, int], there: tuple[int, int]) -> None:
-    """Draw the diamond in which two sheets meet, with their names."""
-    first, second = sorted((here, there))
-    size = 0.004
-    path = canvas.beginPath()
-    path.moveTo(*((at + np.array([size, 0])) * POINT))
-    for dx, dy in ((0, size), (-size, 0), (0, -size)):
-        path.lineTo(*((at + np.array([dx, dy])) * POINT))
-    path.close()
-    canvas.drawPath(path)
-    canvas.setFillColor("#888888")
-    canvas.setFont(FONT, 6)
-    text = f"{tiling.name(*first)} | {tiling.name(*second)}"
-    shift = np.array([0.006, 0.001]) if first[0] != second[0] else np.array([-0.004, 0.006])
-    canvas.drawString(*((at + shift) * POINT), text)

@@ -110,26 +110,6 @@ def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntA
     A surface that faces all directions (a skirt) is seen from +Z, one that lies flat on the ground from above.
     """
     vectors = area_vectors(surface.vertices, facets.triangles)
-    directions = _view_directions(vectors)
-    centred = surface.vertices - surface.vertices.mean(axis=0)
-    return View(points=centred @ directions.T, facets=facets, lines=lines, vectors=vectors @ directions.T)
-
-
-def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
-    """Return the view of a pattern (#P by 2) in its plane."""
-    points = np.column_stack([positions, np.zeros(len(positions))])
-    return View(points=points, facets=facets, lines=lines, vectors=None)
-
-
-def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
-    """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    seen = points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]).T
-    return View(points=seen, facets=facets, lines={}, vectors=area_vectors(seen, facets.triangles))
-
-
-def _view_directions(vectors: FloatArray) -> FloatArray:
-    """Return the directions right, up and towards the viewer (3 by 3, in rows), by the area vectors (#T by 3)."""
     total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
     length = float(np.linalg.norm(mean))
     front = mean / length if length > 0.12 * total and length > 0.0 else np.array([0.0, 0.0, 1.0])
@@ -146,7 +126,22 @@ def _view_directions(vectors: FloatArray) -> FloatArray:
     towards = towards / np.linalg.norm(towards)
     right = np.cross(upwards, towards)
     right /= np.linalg.norm(right)
-    return np.array([right, np.cross(towards, right), towards])
+    directions = np.array([right, np.cross(towards, right), towards])
+    centred = surface.vertices - surface.vertices.mean(axis=0)
+    return View(points=centred @ directions.T, facets=facets, lines=lines, vectors=vectors @ directions.T)
+
+
+def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
+    """Return the view of a pattern (#P by 2) in its plane."""
+    points = np.column_stack([positions, np.zeros(len(positions))])
+    return View(points=points, facets=facets, lines=lines, vectors=None)
+
+
+def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
+    """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    seen = points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]).T
+    return View(points=seen, facets=facets, lines={}, vectors=area_vectors(seen, facets.triangles))
 
 
 class DrawnView:
@@ -191,7 +186,25 @@ class DrawnView:
     def draw(self, axes: Any, face_colours: FloatArray) -> None:
         """Draw the coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
         left, bottom = (round(place * DPI) - _MARGIN for place in (self.left, self.bottom))
-        axes.add_artist(Pixels(self._image(face_colours), left=left, bottom=bottom, zorder=1))
+        facets = self.view.facets
+        axes.add_artist(
+            Pixels(
+                shade(
+                    self._samples,
+                    self._per_pixel,
+                    self._grid,
+                    facets.triangles,
+                    face_colours,
+                    face=facets.face_of_triangle,
+                    lighting=Lighting(
+                        normals=self._normals(), at_vertices=not self._fine, direction=_LIGHT, back=_BACK
+                    ),
+                ),
+                left=left,
+                bottom=bottom,
+                zorder=1,
+            )
+        )
         self._draw_mesh(axes)
         self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
 
@@ -233,19 +246,6 @@ class DrawnView:
         result[:, 1] = (self._rows - ((points[:, 1] - self._low[1]) * per_metre + _MARGIN)) * self._per_pixel
         result[:, 2] = points[:, 2]
         return result
-
-    def _image(self, face_colours: FloatArray) -> NDArray[np.uint8]:
-        """Return the pixels, #R by #C by 4, RGBA."""
-        facets = self.view.facets
-        return shade(
-            self._samples,
-            self._per_pixel,
-            self._grid,
-            facets.triangles,
-            face_colours,
-            face=facets.face_of_triangle,
-            lighting=Lighting(normals=self._normals(), at_vertices=not self._fine, direction=_LIGHT, back=_BACK),
-        )
 
     def _normals(self) -> FloatArray | None:
         """Return normals of any length at the vertices; of a fine mesh each triangle's own."""

@@ -15,9 +15,8 @@ from warpflat.core.text import control_in, format_count, size_words
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.drawing import Drawing, Stroke, draw_nest, grain_strokes
-from warpflat.pattern.label import LEADING
+from warpflat.pattern.label import CAPITALS, LEADING, Words, text_width
 from warpflat.pattern.layout import lay_out, nests
-from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
 from warpflat.pattern.seam_words import seam_words
 from warpflat.pattern.words import printed_in

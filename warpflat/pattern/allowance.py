@@ -76,7 +76,15 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     whole = close_slits(union([*parts, *strips]))
     for side in sides:
         if isinstance(side, Side) and side.kind == "fold":
-            whole = _on_fold(whole, side, body)
+            # Keep what lies on the piece's side of its fold.
+            half = half_plane(side.points[0], side.points[-1], body)
+            over = float(shapely.distance(half, shapely.points(shapely.get_coordinates(body))).max())
+            if over > FOLD_STRAIGHT:
+                raise InputError(
+                    f"edge {side.name!r} lies on the fold, but the piece reaches {over * 1e3:.1f} mm beyond it; "
+                    "a half piece lies on one side of its fold"
+                )
+            whole = intersection(whole, half)
     polygon = max(shapely.get_parts(whole), key=lambda part: part.area)
     pockets = [shapely.Polygon(ring) for ring in polygon.interiors]
     if any(pocket.area > 1e-6 for pocket in pockets):
@@ -84,24 +92,6 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     ring = shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6)
     points = np.asarray(shapely.orient_polygons(ring).exterior.coords)[:-1]
     return CutOutline(points=points, notes=tuple(notes), prolonged=prolonged)
-
-
-def _on_fold(whole: Geometry, side: Side, body: Polygon) -> Geometry:
-    """Keep what lies on the piece's side of its fold.
-
-    Raises:
-        InputError: the piece reaches farther across the fold's line than a fold may bend.
-    """
-    import shapely
-
-    half = half_plane(side.points[0], side.points[-1], body)
-    over = float(shapely.distance(half, shapely.points(shapely.get_coordinates(body))).max())
-    if over > FOLD_STRAIGHT:
-        raise InputError(
-            f"edge {side.name!r} lies on the fold, but the piece reaches {over * 1e3:.1f} mm beyond it; "
-            "a half piece lies on one side of its fold"
-        )
-    return intersection(whole, half)
 
 
 def _corner_allowance(

@@ -113,20 +113,16 @@ def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:
     far = ends[np.argmax(np.linalg.norm(ends - wedge.tip, axis=1))]
     fold = np.stack([wedge.tip, far])
     if are_curved(left, right):
-        fold = np.concatenate([_middle_line(left[::-1], right), fold[1:]])
+        # The middle line of two lines with one start, by shares of their lengths.
+        shares = np.linspace(0.0, 1.0, FOLD_POINTS)
+        sides = [
+            np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
+            for line, arc in ((line, arc_lengths(line)) for line in (left[::-1], right))
+        ]
+        fold = np.concatenate([np.asarray((sides[0] + sides[1]) / 2), fold[1:]])
     if legs.dart.pleat is not None:
         fold = drawn_leg(fold[::-1], legs.dart.pleat)[::-1]
     return DraftedDart(dart=legs.dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=legs.mouth)
-
-
-def _middle_line(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the middle line of two lines with one start, by shares of their lengths."""
-    shares = np.linspace(0.0, 1.0, FOLD_POINTS)
-    sides = [
-        np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
-        for line, arc in ((line, arc_lengths(line)) for line in (first, second))
-    ]
-    return np.asarray((sides[0] + sides[1]) / 2)
 
 
 def dart_notes(legs: DartLegs) -> list[str]:

@@ -16,8 +16,7 @@ from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
 from warpflat.pattern.drafted_darts import fisheye_legs
-from warpflat.pattern.label import Label
-from warpflat.pattern.lettering import Words, text_width
+from warpflat.pattern.label import Label, Words, text_width
 from warpflat.pattern.words import translate, translate_name
 
 if TYPE_CHECKING:
@@ -116,7 +115,18 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
     joints = () if paper is None else paper.joints
     drawings = []
     middle = len(pieces) // 2
-    edge = _most_graded_edge(pieces)
+
+    def shift_across(name: str) -> float:
+        middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
+        start, end = pieces[0].edge(name).line[[0, -1]]
+        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
+        shift = middles[1] - middles[0]
+        return abs(float(shift[0] * along[1] - shift[1] * along[0]))
+
+    # Where the sizes lie farthest apart a size is easiest to read off its line.
+    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
+    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
+    edge = max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
     for index, piece in enumerate(pieces):
         strokes = [
             *_cut_strokes(piece, open_folds=paper is not None),
@@ -277,7 +287,15 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True, joints: Sequence[F
 
     lines = _named_lines(piece, borders=borders)
     drawn = [shapely.LineString(line) for _, line, _ in lines]
-    obstacles = [*_name_obstacles(piece), *(shapely.LineString(joint) for joint in joints)]
+    obstacles = [
+        *[
+            *([shapely.Polygon(piece.label.box)] if piece.label.leader is None else []),
+            *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
+            *(shapely.LinearRing(cutout.sew_line) for cutout in piece.cutouts.values()),
+            *(shapely.LineString(stroke.points) for stroke in grain_strokes(piece.grain)),
+        ],
+        *(shapely.LineString(joint) for joint in joints),
+    ]
     words = []
     for index, (name, line, inwards) in enumerate(lines):
         others = shapely.union_all([*obstacles, *(other for key, other in enumerate(drawn) if key != index)])
@@ -301,18 +319,6 @@ def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, Float
     lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
     called = {name for name, _, _ in lines}
     return [(translate_name(name_without_number(name, called)), line, inwards) for name, line, inwards in lines]
-
-
-def _name_obstacles(piece: DraftedPiece) -> list[Geometry]:
-    """Return what names keep clear of besides other lines: the label, drill holes, cutouts and the grain."""
-    import shapely
-
-    return [
-        *([shapely.Polygon(piece.label.box)] if piece.label.leader is None else []),
-        *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
-        *(shapely.LinearRing(cutout.sew_line) for cutout in piece.cutouts.values()),
-        *(shapely.LineString(stroke.points) for stroke in grain_strokes(piece.grain)),
-    ]
 
 
 def _place_name(name: str, line: FloatArray, obstacles: Geometry, *, inwards: bool) -> Words | None:
@@ -413,21 +419,6 @@ def _list_sizes(label: Label, size: str, sizes: str) -> list[Words]:
             height = row.height * min(1.0, label.width / text_width(text, row.height))
             words[index] = replace(row, text=text, height=height)
     return words
-
-
-def _most_graded_edge(pieces: tuple[DraftedPiece, ...]) -> str:
-    """Return the edge on which the sizes lie farthest apart: there a size is easiest to read off its own line."""
-
-    def shift_across(name: str) -> float:
-        middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
-        start, end = pieces[0].edge(name).line[[0, -1]]
-        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
-        shift = middles[1] - middles[0]
-        return abs(float(shift[0] * along[1] - shift[1] * along[0]))
-
-    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
-    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
-    return max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
 
 
 def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[Words]:

@@ -56,6 +56,8 @@ def fit_edges(
         seams: between them; the legs of the pieces' darts count as seams too.
         tolerance: [m] for all edges; None takes the least of `TOLERANCES` that makes a clean curve of each.
     """
+    import shapely
+
     fitted = {}
     for piece in pieces:
         for edge in piece.edges:
@@ -68,7 +70,14 @@ def fit_edges(
                 fitted[first], fitted[second] = _fit_ragged_seam(lines[first], lines[second], against, ease)
     _keep_near(pieces, lines, seams, fitted, tolerance)
     for piece in pieces:
-        _replace_crossing_curves(piece, lines, fitted)
+        # Curves that cross themselves or each other are replaced by their chords.
+        keys = [(piece.name, edge.name) for edge in piece.edges]
+        drawn = {key: shapely.LineString(fitted[key][0].sample()) for key in keys}
+        if shapely.Polygon(np.concatenate([line.coords[:-1] for line in drawn.values()])).is_valid:
+            continue
+        for key in keys:
+            if not drawn[key].is_simple or any(drawn[key].crosses(drawn[other]) for other in keys if other != key):
+                fitted[key] = chords(lines[key]), fitted[key][1]
     return fitted
 
 
@@ -249,18 +258,3 @@ def _lengths_along(curve: Curve, points: FloatArray) -> FloatArray:
     places = np.maximum.accumulate(shapely.line_locate_point(line, shapely.points(points)))
     places[[0, -1]] = 0.0, line.length
     return np.asarray(places)
-
-
-def _replace_crossing_curves(
-    piece: Piece, lines: Mapping[EdgeKey, FloatArray], fitted: dict[EdgeKey, tuple[Curve, float]]
-) -> None:
-    """Replace curves of a piece that cross themselves or each other by their chords."""
-    import shapely
-
-    keys = [(piece.name, edge.name) for edge in piece.edges]
-    drawn = {key: shapely.LineString(fitted[key][0].sample()) for key in keys}
-    if shapely.Polygon(np.concatenate([line.coords[:-1] for line in drawn.values()])).is_valid:
-        return
-    for key in keys:
-        if not drawn[key].is_simple or any(drawn[key].crosses(drawn[other]) for other in keys if other != key):
-            fitted[key] = chords(lines[key]), fitted[key][1]

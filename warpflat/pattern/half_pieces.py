@@ -29,17 +29,17 @@ ON_AXIS = 1e-6
 def halved(garment: DraftedGarment) -> DraftedGarment:
     """Return the garment with every wide piece that is its own mirror image, in all sizes, as a half on the fold."""
     names = [piece.name for piece in next(iter(garment.pieces.values()))]
-    on_fold = {name for name in names if all(_is_wide(p) and is_symmetric(p) for p in garment.all_sizes(name))}
+    on_fold = {
+        name
+        for name in names
+        if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in garment.all_sizes(name))
+    }
     sides = {name: _kept_side(garment.all_sizes(name)[0], garment.garment.seams) for name in on_fold}
     pieces = {
         size: tuple(_half(piece, garment, sides[piece.name]) if piece.name in on_fold else piece for piece in row)
         for size, row in garment.pieces.items()
     }
     return replace(garment, pieces=pieces)
-
-
-def _is_wide(piece: DraftedPiece) -> bool:
-    return float(np.ptp(piece.cut_line[:, 0])) >= NARROW
 
 
 def is_symmetric(piece: DraftedPiece) -> bool:
@@ -104,14 +104,21 @@ def _side_of(line: FloatArray, axis: float) -> float:
 
 def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedPiece:
     """Return the half of a symmetric piece on one side, with the fold along x = 0 and its lower end in the origin."""
+    import shapely
+
     axis = _axis(piece)
     edges = [part for edge in piece.edges if (part := _kept_part(edge, axis, side)) is not None]
-    first = next(k for k in range(len(edges)) if _gap(edges[k - 1], edges[k]) > 10 * ON_AXIS)
+    # The first edge after the gap where the other half was.
+    first = next(
+        k
+        for k in range(len(edges))
+        if float(np.linalg.norm(edges[k - 1].curve.bezier[-1, 3] - edges[k].curve.bezier[0, 0])) > 10 * ON_AXIS
+    )
     edges = [*edges[first:], *edges[:first]]
     start, end = edges[-1].curve.bezier[-1, 3], edges[0].curve.bezier[0, 0]
     low = start if start[1] < end[1] else end
     shift = -low
-    edges = [_moved_edge(edge, shift) for edge in edges]
+    edges = [_with_curve(edge, Curve(bezier=edge.curve.bezier + shift, straight=edge.curve.straight)) for edge in edges]
     names = {edge.name: without_side(edge.name) for edge in edges}
     if len(set(names.values())) < len(names):
         names = {name: name for name in names}
@@ -127,6 +134,17 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         for name, line in piece.fisheyes.items()
         if side * (line[0, 0] - axis) > 0.0
     ]
+    # The parts of lines on one side of the axis, without those that lie on it.
+    far = 10.0
+    box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
+    kept: dict[str, FloatArray] = {}
+    for name, line in piece.internal_lines.items():
+        inside = shapely.intersection(shapely.LineString(line), box)
+        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "LineString"]
+        for part in parts:
+            points = np.asarray(part.coords)
+            if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER and without_side(name) not in kept:
+                kept[without_side(name)] = points + shift
     half = Piece(
         name=piece.name,
         size=piece.size,
@@ -135,7 +153,7 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         edges=[edge.edge for edge in edges],
         darts=darts,
         holes=holes,
-        internal_lines=_kept_lines(piece.internal_lines, axis, side, shift),
+        internal_lines=kept,
         marks={
             hole.name: hole.at + shift
             for hole in piece.drill_holes
@@ -201,11 +219,6 @@ def _kept_notches(
     return tuple(replace(notch, edge=edge) for notch, edge in zip(kept, nearest, strict=True))
 
 
-def _gap(before: DraftedEdge, after: DraftedEdge) -> float:
-    """Return the distance [m] from the end of an edge to the start of the next."""
-    return float(np.linalg.norm(before.curve.bezier[-1, 3] - after.curve.bezier[0, 0]))
-
-
 def _kept_part(edge: DraftedEdge, axis: float, side: float) -> DraftedEdge | None:
     """Return the part of an edge on one side of the axis; None if there is none."""
     kept, straight = [], []
@@ -244,10 +257,6 @@ def _with_curve(edge: DraftedEdge, curve: Curve) -> DraftedEdge:
     return replace(edge, edge=own, curve=curve, line=line, places=places)
 
 
-def _moved_edge(edge: DraftedEdge, shift: FloatArray) -> DraftedEdge:
-    return _with_curve(edge, Curve(bezier=edge.curve.bezier + shift, straight=edge.curve.straight))
-
-
 def _fold_edge(piece: DraftedPiece, start: FloatArray, end: FloatArray, taken: set[str]) -> DraftedEdge:
     """Return the edge along the axis, named as the line of the piece that lies there."""
     names = [name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - _axis(piece)).max() < INNER]
@@ -264,20 +273,3 @@ def _fold_edge(piece: DraftedPiece, start: FloatArray, end: FloatArray, taken: s
         fit_error=0.0,
         tolerance=0.0,
     )
-
-
-def _kept_lines(lines: Mapping[str, FloatArray], axis: float, side: float, shift: FloatArray) -> dict[str, FloatArray]:
-    """Return the parts of lines on one side of the axis, without those that lie on it."""
-    import shapely
-
-    far = 10.0
-    box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
-    kept: dict[str, FloatArray] = {}
-    for name, line in lines.items():
-        inside = shapely.intersection(shapely.LineString(line), box)
-        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "LineString"]
-        for part in parts:
-            points = np.asarray(part.coords)
-            if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER and without_side(name) not in kept:
-                kept[without_side(name)] = points + shift
-    return kept

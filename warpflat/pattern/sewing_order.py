@@ -57,17 +57,13 @@ def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
     """Return what each piece is called: one that is cut in pairs has no side."""
     titles = {
         piece.name: translate_name(without_side(piece.name))
-        if _in_pairs(piece) and not piece.title
+        if piece.paired and piece.quantity % 2 == 0 and not piece.on_fold and not piece.title
         else piece.printed_name
         for piece in pieces
     }
     plain = list(titles.values())
     names = {piece.name: piece.printed_name for piece in pieces}
     return {name: title if plain.count(title) == 1 else names[name] for name, title in titles.items()}
-
-
-def _in_pairs(piece: Piece) -> bool:
-    return piece.paired and piece.quantity % 2 == 0 and not piece.on_fold
 
 
 def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
@@ -122,7 +118,11 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
                 pleats="; ".join(pleats),
             )
         )
-    patches = [titles[piece.name] for piece in pieces if piece.piece.role == "pocket" and _is_patch(piece)]
+    patches = [
+        titles[piece.name]
+        for piece in pieces
+        if piece.piece.role == "pocket" and any(edge.kind == "hem" for edge in piece.edges)
+    ]
     if patches:
         steps.append(
             translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=", ".join(patches))
@@ -139,7 +139,19 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     hems = _free_edges(pieces, garment.garment.seams, titles, ("hem",))
     if hems:
         steps.append(translate("Turn up and sew the hems: {edges}.", edges=hems))
-    return (*steps, *_button_steps(pieces, titles))
+    buttons = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
+    return (
+        *steps,
+        *[
+            translate(
+                "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
+                count=count,
+                title=title,
+            )
+            for title, count in buttons.items()
+            if count > 1
+        ],
+    )
 
 
 def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
@@ -160,24 +172,6 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
         if any(key in words for key in keys) and not (number == 3 and "shoulder" in words):
             return number
     return 0
-
-
-def _is_patch(piece: DraftedPiece) -> bool:
-    return any(edge.kind == "hem" for edge in piece.edges)
-
-
-def _button_steps(pieces: Sequence[DraftedPiece], titles: Mapping[str, str]) -> list[str]:
-    """Return the steps for buttons."""
-    own = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
-    return [
-        translate(
-            "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
-            count=count,
-            title=title,
-        )
-        for title, count in own.items()
-        if count > 1
-    ]
 
 
 def _letter(number: int) -> str:

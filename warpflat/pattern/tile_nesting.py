@@ -101,7 +101,11 @@ def nest_on_tiles(
     masks = [_masks(shape, cell, gap, (0, 1, 2, 3)) for shape in shapes]
     total = sum(float(shape.area) for shape in shapes)
     needed = int(np.ceil(total / float(np.prod(step))))
-    counts = _column_counts(masks, per_tile, shared, needed)
+    # The numbers of columns that are tried: around a square sheet, and wide enough for every shape.
+    narrowest = max(min(mask.cells.shape[1] for mask in row) for row in masks)
+    least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
+    square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
+    counts = list(range(least, max(least, square) + 3))
     heights = [_heights(masks, count, per_tile, shared) for count in counts]
     sizes = [(max(height) + needed // count + 2, count) for count, height in zip(counts, heights, strict=True)]
     # Where shapes do not fit together there is room at last for all above each other.
@@ -116,7 +120,18 @@ def nest_on_tiles(
                 if laid is not None and (best is None or laid[0] < best[0]):
                     best = laid
     assert best is not None
-    return _places(best[1], cell, step, overlap, gap)
+    # Places on the sheet [m], y upwards, and its size, without unused rows and columns at its end.
+    shapes_laid = best[1]
+    margin = gap / 2 + CELL / 20
+    right = max(column * cell[0] + mask.extent[0] for mask, _, column in shapes_laid) + 2 * margin
+    lower = max(row * cell[1] + mask.extent[1] for mask, row, _ in shapes_laid) + 2 * margin
+    size = np.maximum(1, np.ceil((np.array([right, lower]) - overlap) / step - 1e-9)) * step + overlap
+    places = []
+    for mask, row, column in shapes_laid:
+        top = size[1] - row * cell[1] - margin
+        corner = np.array([column * cell[0] + margin, top - mask.extent[1]])
+        places.append(TurnedShape(quarters=mask.quarters, corner=corner))
+    return places, size
 
 
 def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> float | None:
@@ -187,16 +202,6 @@ def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: t
     row, column = np.nonzero(unknown)
     cells[row, column] = shapely.intersects(area, boxes(row, column, 1))
     return np.ascontiguousarray(cells)
-
-
-def _column_counts(
-    masks: Sequence[Sequence[Mask]], per_tile: tuple[int, ...], shared: tuple[int, int], needed: int
-) -> list[int]:
-    """Return the numbers of columns that are tried: around a square sheet, and wide enough for every shape."""
-    narrowest = max(min(mask.cells.shape[1] for mask in row) for row in masks)
-    least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
-    square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
-    return list(range(least, max(least, square) + 3))
 
 
 def _heights(
@@ -339,20 +344,3 @@ class Places:
         """Take everything away."""
         self.occupied[:] = False
         self._here = None
-
-
-def _places(
-    laid: Sequence[tuple[Mask, int, int]], cell: FloatArray, step: FloatArray, overlap: float, gap: float
-) -> tuple[list[TurnedShape], FloatArray]:
-    """Return places on the sheet [m], y upwards, and its size, without unused rows and columns at its end."""
-    margin = gap / 2 + CELL / 20
-    right = max(column * cell[0] + mask.extent[0] for mask, _, column in laid) + 2 * margin
-    lower = max(row * cell[1] + mask.extent[1] for mask, row, _ in laid) + 2 * margin
-    tiles = np.maximum(1, np.ceil((np.array([right, lower]) - overlap) / step - 1e-9))
-    size = tiles * step + overlap
-    places = []
-    for mask, row, column in laid:
-        top = size[1] - row * cell[1] - margin
-        corner = np.array([column * cell[0] + margin, top - mask.extent[1]])
-        places.append(TurnedShape(quarters=mask.quarters, corner=corner))
-    return places, size

@@ -21,9 +21,8 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
 from warpflat.core.usd_process import UNREADABLE, read_apart
-from warpflat.export.colours import energy_colours
+from warpflat.export.colours import VertexColours, energy_colours
 from warpflat.export.geometry import face_areas, outline_edges
-from warpflat.export.usd_colours import VertexColours
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
@@ -246,7 +245,9 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
     ]
     box = _Box(np.concatenate([positions for _, _, positions, _ in layouts]))
     before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
-    painted = [VertexColours(shape.faces, _areas(shape), len(shape.surface)) for shape in shapes]
+    painted = [
+        VertexColours(shape.faces, face_areas(shape.surface, shape.faces), len(shape.surface)) for shape in shapes
+    ]
     for number, _, positions, time in layouts:
         steps, colours = box.steps(positions), piece.rows(time, painted[number])
         same = before is not None and before[0] == number
@@ -262,11 +263,6 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
         "frames": list(stored),
     }
     return entry, blocks
-
-
-def _areas(shape: Shape) -> FloatArray:
-    """Return the areas of the faces on the surface, #F [m2]."""
-    return face_areas(shape.surface, shape.faces)
 
 
 def _at(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> Iterator[tuple[int, Shape, int]]:

@@ -155,7 +155,10 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
             )
         seams.extend(_seams(chain, left_ends, right_ends))
 
-    cut_mesh = _mesh_of(new_faces)
+    nowhere = np.empty((0, 3))
+    cut_mesh = Surface(
+        vertices=nowhere, faces=new_faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
+    )
     labels = components_of(cut_mesh)
     after = int(labels.max(initial=-1)) + 1
     # Joined again across the cut, its components are those before it.
@@ -182,14 +185,6 @@ def faces_at(faces: IntArray, vertices: IntArray) -> NDArray[np.int64]:
     # Column by column: along four values NumPy's `any` takes several times as long.
     first, second, third, fourth = there[faces].T
     return np.flatnonzero(first | second | third | fourth)
-
-
-def _mesh_of(faces: IntArray) -> Surface:
-    """Return a surface of which nothing but the faces is known."""
-    nowhere = np.empty((0, 3))
-    return Surface(
-        vertices=nowhere, faces=faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
-    )
 
 
 def _edge(chain: IntArray, index: int) -> str:

@@ -1,6 +1,6 @@
 """A mesh of a USD stage, in metres and Y up, with the curves that are drawn beside it.
 
-The process that reads a file loads this module only: see :mod:`warpflat.surface.io.read_usd`.
+The process that reads a file loads this module only: see :mod:`warpflat.surface.io.read`.
 """
 
 from __future__ import annotations

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -145,27 +143,17 @@ def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int,
     ends = [edge for edge, found in triangles_at.items() if len(found) == 1]
     for seed in [*ends, *triangles_at]:
         if seed in left:
-            chains.append((_chain_from(seed, edges_of, triangles_at, left), len(triangles_at[seed]) > 1))
+            chain, here, came = [seed], seed, -1
+            left.discard(seed)
+            while onward := [t for t in triangles_at[here] if t != came]:
+                came = onward[0]
+                here = next(edge for edge in edges_of[came] if edge != here)
+                if here not in left:
+                    break
+                left.discard(here)
+                chain.append(here)
+            chains.append((chain, len(triangles_at[seed]) > 1))
     return chains
-
-
-def _chain_from(
-    seed: tuple[int, int],
-    edges_of: list[list[tuple[int, int]]],
-    triangles_at: Mapping[tuple[int, int], list[int]],
-    left: set[tuple[int, int]],
-) -> list[tuple[int, int]]:
-    """Follow the crossed edges from one of them, triangle by triangle, and remove them from those `left`."""
-    chain, here, came = [seed], seed, -1
-    left.discard(seed)
-    while onward := [t for t in triangles_at[here] if t != came]:
-        came = onward[0]
-        here = next(edge for edge in edges_of[came] if edge != here)
-        if here not in left:
-            break
-        left.discard(here)
-        chain.append(here)
-    return chain
 
 
 def _distances(surface: Surface, places: list[Place], closed: bool, origin: FloatArray) -> FloatArray:
