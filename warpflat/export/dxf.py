@@ -333,8 +333,8 @@ def grade_rules(garment: DraftedGarment, sizes: Sequence[str]) -> GradeRules:
     for piece in garment.pieces[sample]:
         all_sizes = {each.size: each for each in garment.all_sizes(piece.name)}
         rows = [_places(all_sizes[size]) for size in sizes]
-        own = rows[list(sizes).index(sample)]
-        for key, at in own.items():
+        graded = rows[list(sizes).index(sample)]
+        for key, at in graded.items():
             if all(key in row for row in rows):
                 moves = np.array([row[key] - at for row in rows])
                 number = rules.rule(moves)

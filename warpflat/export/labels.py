@@ -243,7 +243,7 @@ _AROUND = sorted(
         for step in range(24)
         for rise in (0.0, 0.07, -0.07, 0.15, -0.15, 0.25, -0.25, 0.36, -0.36)
     ),
-    key=lambda way: math.hypot(*way) + 0.5 * abs(way[1]),
+    key=lambda offset: math.hypot(*offset) + 0.5 * abs(offset[1]),
 )
 
 
@@ -335,8 +335,8 @@ class _Names:
         """Return the names that are not placed yet and whose lines run across."""
         found = []
         for name in self._unplaced(names):
-            way = np.subtract(*reversed(self._ends(name)))
-            if abs(way[1]) <= _STEEP * way[0]:
+            along = np.subtract(*reversed(self._ends(name)))
+            if abs(along[1]) <= _STEEP * along[0]:
                 found.append(name)
         return found
 

@@ -210,17 +210,17 @@ def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: 
         nested = len(placed.pieces) > 1
         on_paper = OnPaper(joints=[placed.on_piece(joint) for joint in tiling.joints], letters=letters)
         for index, drawing in enumerate(draw_nest(placed.pieces, on_paper)):
-            own: list[Stroke] = []
+            of_size: list[Stroke] = []
             shared: list[Stroke] = []
             for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
-                (own if nested and stroke.role in OF_LAYER else shared).append(stroke)
+                (of_size if nested and stroke.role in OF_LAYER else shared).append(stroke)
             for stroke in shared:
                 _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
             for words in (words for words in drawing.words if not words.tag):
                 _words(canvas, words, placed.matrix, "#000000")
             if nested:
                 canvas._code.append(f"/OC /size{sizes.index(drawing.piece.size)} BDC")
-            for stroke in own:
+            for stroke in of_size:
                 _stroke(canvas, stroke, placed.matrix, index, widen)
             for words in (words for words in drawing.words if words.tag):
                 _words(canvas, words, placed.matrix, SIZE_COLOURS[index % len(SIZE_COLOURS)])

@@ -124,8 +124,8 @@ def crop_body(body: Body, worn: FloatArray) -> tuple[IntArray, FloatArray]:
         if len(edges):
             # With vertices of its own: light does not bend around its edge.
             rim = vertices[edges.ravel()]
-            own = len(vertices) + np.arange(len(rim)).reshape(-1, 2)
-            cap = np.column_stack([own, np.full(len(own), len(vertices) + len(rim))])
+            copies = len(vertices) + np.arange(len(rim)).reshape(-1, 2)
+            cap = np.column_stack([copies, np.full(len(copies), len(vertices) + len(rim))])
             vertices = np.concatenate([vertices, rim, rim.mean(axis=0)[None]])
             triangles = np.concatenate([triangles, cap])
     return triangles.astype(np.int32), vertices

@@ -171,7 +171,7 @@ def check_closed(lines: Sequence[FloatArray], loops: Iterable[FloatArray], metre
         round_something = len(points) > 2 and area > max(least, _LEAST_SHARE * (0.25 * chain.length) ** 2)
         if not round_something or gap >= _NEARLY_CLOSED * chain.length:
             continue
-        # An outline may cross itself: of a point alone it is told whether it lies within.
+        # An outline may cross itself, so one point decides whether it lies within another.
         if not shapely.intersects(closed[pieces.query(chain.centroid)], chain.centroid).any():
             at = ", ".join(f"{1e3 * metres * x:.0f}" for x in points[0])
             raise InputError(

@@ -156,10 +156,10 @@ def _walk(element: ET.Element, matrix: FloatArray) -> Iterator[tuple[ET.Element,
     """Yield an element and all below it with their matrices to the page; what is only defined is left out."""
     if element.tag.rpartition("}")[2] in ("defs", "symbol", "clipPath", "marker", "pattern"):
         return
-    own = _times(matrix, _transform(element.get("transform", "")))
-    yield element, own
+    placed = _times(matrix, _transform(element.get("transform", "")))
+    yield element, placed
     for child in element:
-        yield from _walk(child, own)
+        yield from _walk(child, placed)
 
 
 def _transform(text: str) -> FloatArray:

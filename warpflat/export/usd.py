@@ -25,17 +25,21 @@ from warpflat.core.output import atomic_path, hidden_file, require_writable
 from warpflat.export.colours import VertexColours, energy_scale
 from warpflat.export.geometry import Polylines, area_vectors, face_areas, polylines_of, vertex_normals
 from warpflat.export.usd_prims import (
+    FIRST_FRAME,
     MeshSamples,
     SampledLines,
     add_cameras,
     add_light,
     add_material,
     add_texture_coordinates,
+    begin_stage,
     bounding_box,
+    define_energy_mesh,
     define_group,
-    define_mesh,
+    last_values_as_defaults,
     require_usd,
     rows_on_table,
+    set_points,
     usd_errors,
     valid_name,
 )
@@ -43,9 +47,6 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["FrameWriter", "film_scale"]
-
-
-FIRST_FRAME = 1
 
 
 @dataclass(kw_only=True)
@@ -79,18 +80,18 @@ class FramePiece:
         """
         if faces is None:
             return False
-        new, own = np.ascontiguousarray(faces, dtype=np.int32), self.surface.faces
+        new, original = np.ascontiguousarray(faces, dtype=np.int32), self.surface.faces
         if new is self.faces or np.array_equal(new, self.faces):
             return False
-        used = own >= 0
-        if new.shape != own.shape or not np.array_equal(new >= 0, used) or new.max() >= count:
+        used = original >= 0
+        if new.shape != original.shape or not np.array_equal(new >= 0, used) or new.max() >= count:
             raise ValueError(f"{what}: the faces are not those of the surface in the pattern's numbering")
         to_surface = np.zeros(count, dtype=np.int32)
-        to_surface[new[used]] = own[used]
-        if not np.array_equal(to_surface[new[used]], own[used]):
+        to_surface[new[used]] = original[used]
+        if not np.array_equal(to_surface[new[used]], original[used]):
             raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
         self.faces, self.to_surface = new, to_surface
-        areas = face_areas(self.surface.vertices, own)
+        areas = face_areas(self.surface.vertices, original)
         self.colours = self.colours[0], VertexColours(new, areas, count)
         return True
 
@@ -193,7 +194,7 @@ class FrameWriter:
         Raises:
             InputError: the place cannot be written.
         """
-        from pxr import Kind, Usd, UsdGeom
+        from pxr import Usd
 
         require_writable(self._final)
         if self._final.suffix != ".usdc":  # the only format that can be saved bit by bit
@@ -202,14 +203,8 @@ class FrameWriter:
             self._working = self._hidden.enter_context(hidden_file(self._final))
             with usd_errors(self._final):
                 self._stage = Usd.Stage.CreateNew(str(self._working))
-            UsdGeom.SetStageMetersPerUnit(self._stage, 1.0)
-            UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.y)
-            self._stage.SetTimeCodesPerSecond(self._rate)
-            self._stage.SetFramesPerSecond(self._rate)
-            self._stage.SetStartTimeCode(FIRST_FRAME)
-            self._stage.SetEndTimeCode(FIRST_FRAME)
+            begin_stage(self._stage, rate=self._rate)
             self._stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
-            self._stage.SetDefaultPrim(define_group(self._stage, "/World", kind=Kind.Tokens.assembly))
         except BaseException:
             self._hidden.close()
             raise
@@ -232,11 +227,7 @@ class FrameWriter:
                     for piece in shown:
                         for samples in (piece.on_surface, piece.on_pattern):
                             add_texture_coordinates(samples.mesh, piece.surface, piece.faces, piece.last_positions)
-                    # Every sampled attribute has its last value as its default.
-                    for prim in self._stage.Traverse():
-                        for attribute in prim.GetAuthoredAttributes():
-                            if attribute.GetNumTimeSamples():
-                                attribute.Set(attribute.Get(self._stage.GetEndTimeCode()))
+                    last_values_as_defaults(self._stage, self._stage.Traverse())
                     self._save()
             # Nothing may hold the file open when it is moved.
             self._stage = None
@@ -272,11 +263,15 @@ class FrameWriter:
         default = Usd.TimeCode.Default()
         triangles, _ = triangulate(surface.faces)
         normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
-        on_surface = MeshSamples(define_mesh(self._stage, f"{path}/surface", normals, per_face=False), self._scale)
+        on_surface = MeshSamples(
+            define_energy_mesh(self._stage, f"{path}/surface", normals, per_face=False), self._scale
+        )
         on_surface.write(default, points, surface.faces)
         # Cuts change the number of vertices and never that of faces: one normal per face serves all frames.
         upright = np.tile([0.0, 0.0, 1.0], (len(surface.faces), 1))
-        on_pattern = MeshSamples(define_mesh(self._stage, f"{path}/pattern", upright, per_face=True), self._scale)
+        on_pattern = MeshSamples(
+            define_energy_mesh(self._stage, f"{path}/pattern", upright, per_face=True), self._scale
+        )
         lines = polylines_of(surface.lines)
         group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
         colours = VertexColours(surface.faces, face_areas(surface.vertices, surface.faces), len(points))
@@ -302,15 +297,13 @@ class FrameWriter:
             file: name of a file of :func:`warpflat.mannequin.usd.write_mannequin_usd`.
             points: #V by 3, of its body as it is shown [m]: a little smaller, so that cloth that lies on it is seen.
         """
-        from pxr import UsdGeom, Vt
+        from pxr import UsdGeom
 
         path = "/World/mannequin"
         self._used_names.add("mannequin")
         self._stage.DefinePrim(path).GetReferences().AddReference(f"./{file}", path)
         shown = UsdGeom.Mesh(self._stage.OverridePrim(f"{path}/body"))
-        stored = np.asarray(points, dtype=np.float32)
-        shown.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored))
-        shown.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)))
+        set_points(shown, points)
         UsdGeom.Imageable(self._stage.OverridePrim(f"{path}/lines")).CreatePurposeAttr(UsdGeom.Tokens.guide)
 
     def write(

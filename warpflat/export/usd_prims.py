@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import CannotWriteError
@@ -25,23 +25,30 @@ from warpflat.export.geometry import Polylines
 from warpflat.surface.mesh import Surface
 
 __all__ = [
+    "FIRST_FRAME",
     "MeshSamples",
     "SampledLines",
     "add_cameras",
     "add_light",
     "add_material",
     "add_texture_coordinates",
+    "begin_stage",
     "bounding_box",
+    "define_energy_mesh",
     "define_group",
     "define_mesh",
     "export_stage",
+    "last_values_as_defaults",
     "require_usd",
     "rows_on_table",
+    "set_points",
     "usd_errors",
     "valid_name",
 ]
 
 
+#: Number of a film's first frame.
+FIRST_FRAME = 1
 _CONSTANT = "constant"
 
 
@@ -111,8 +118,55 @@ def define_group(stage: Any, path: str, *, label: str | None = None, kind: str |
     return prim
 
 
-def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -> Any:
-    """Define a polygon mesh (no subdivision), seen from both sides, with energy density per face and colour per vertex.
+def begin_stage(stage: Any, *, rate: float | None = None) -> None:
+    """Set a stage to metres and Y up, and define `/World`, its default prim; `rate` [1/s] begins a film at frame 1."""
+    from pxr import Kind, UsdGeom
+
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    if rate is not None:
+        stage.SetTimeCodesPerSecond(rate)
+        stage.SetFramesPerSecond(rate)
+        stage.SetStartTimeCode(FIRST_FRAME)
+        stage.SetEndTimeCode(FIRST_FRAME)
+    stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
+
+
+def define_mesh(stage: Any, path: str, faces: IntArray | None = None) -> Any:
+    """Define a polygon mesh (no subdivision), seen from both sides; `faces` (#F by 4, -1 as the fourth of a triangle) hold for all time."""
+    from pxr import UsdGeom, Vt
+
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
+    mesh.CreateDoubleSidedAttr(True)
+    if faces is not None:
+        used = faces >= 0
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)))
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces[used], dtype=np.int32)))
+    return mesh
+
+
+def set_points(mesh: Any, points: ArrayLike, time: Any = None) -> None:
+    """Author the points of a mesh (#P by 3 [m]) and the box around them, at a time or for all of it."""
+    from pxr import Usd, Vt
+
+    stored = np.ascontiguousarray(points, dtype=np.float32)
+    time = Usd.TimeCode.Default() if time is None else time
+    mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
+    mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
+
+
+def last_values_as_defaults(stage: Any, prims: Iterable[Any]) -> None:
+    """Author the last value of every sampled attribute as its default, for readers that do not ask for a time."""
+    for prim in prims:
+        for attribute in prim.GetAuthoredAttributes():
+            if attribute.GetNumTimeSamples():
+                attribute.Set(attribute.Get(stage.GetEndTimeCode()))
+
+
+def define_energy_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -> Any:
+    """Define a mesh with energy density per face and colour per vertex.
 
     Args:
         stage, path: where.
@@ -121,10 +175,7 @@ def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -
     """
     from pxr import Sdf, UsdGeom, Vt
 
-    mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
-    mesh.CreateDoubleSidedAttr(True)
+    mesh = define_mesh(stage, path)
     mesh.CreateNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(normals.astype(np.float32)))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform if per_face else UsdGeom.Tokens.vertex)
     density = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
@@ -148,7 +199,7 @@ class MeshSamples:
     def __init__(self, mesh: Any, scale: float) -> None:
         """
         Args:
-            mesh: of :func:`define_mesh`.
+            mesh: of :func:`define_energy_mesh`.
             scale: energy of the last colour [J/m2].
         """
         from pxr import UsdGeom

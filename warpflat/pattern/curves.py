@@ -180,7 +180,7 @@ class _FitGoal:
     tolerance: float
     room: float
     bend: float
-    slack: float
+    leeway: float
     strict: bool
 
     def score(self, curve: Curve, length_error: float) -> float:
@@ -191,7 +191,7 @@ class _FitGoal:
             return np.inf
         length_error = max(length_error, abs(float(arc_lengths(samples)[-1] - self.arc[-1])))
         allowed = self.room if self.strict else self.room + self.bend / 24
-        return max(stray / allowed, length_error / (LENGTH * self.slack))
+        return max(stray / allowed, length_error / (LENGTH * self.leeway))
 
 
 def _fit_run(
@@ -214,22 +214,22 @@ def _fit_run(
     # What a curve along the points is measured by.
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     bend = float((np.abs(turning_angles(points)) * np.maximum(step[:-1], step[1:])).max())
-    slack = 1.0
+    leeway = 1.0
     strict = room is not None
     if room is not None:
-        slack = NEAR
+        leeway = NEAR
     elif lengths is None:
         # A zigzag smoothed away is longer than the curve by the square of its width.
-        room, slack = tolerance, max(1.0, (tolerance / TOLERANCE) ** 2)
+        room, leeway = tolerance, max(1.0, (tolerance / TOLERANCE) ** 2)
     else:
         room = OTHER_LENGTHS * tolerance
         # What bends along a zigzag is to be smoothed away.
         bend = 0.0 if tolerance > TOLERANCE else bend
     arc = arc_lengths(points) if lengths is None else lengths
-    goal = _FitGoal(points=points, arc=arc, tolerance=tolerance, room=room, bend=bend, slack=slack, strict=strict)
+    goal = _FitGoal(points=points, arc=arc, tolerance=tolerance, room=room, bend=bend, leeway=leeway, strict=strict)
     best, least = chords(points), np.inf
     for smoothing in tolerance**2 * len(points) * np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001, 0.0]):
-        fit = _length_keeping_spline(points, goal.arc, float(smoothing), tolerance, LENGTH_WEIGHT * goal.slack)
+        fit = _length_keeping_spline(points, goal.arc, float(smoothing), tolerance, LENGTH_WEIGHT * goal.leeway)
         if fit is None:
             continue
         bezier, length_error = fit

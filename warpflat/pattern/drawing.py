@@ -413,8 +413,8 @@ def _list_sizes(label: Label, size: str, sizes: str) -> list[Words]:
     """Return the label's words with all sizes in place of its own, no wider than the label is."""
     words = label.words()
     for index, row in enumerate(words):
-        own, all_sizes = translate("size {size}", size=size), translate("sizes {sizes}", sizes=sizes)
-        if row.text == own[0].upper() + own[1:]:
+        one_size, all_sizes = translate("size {size}", size=size), translate("sizes {sizes}", sizes=sizes)
+        if row.text == one_size[0].upper() + one_size[1:]:
             text = all_sizes[0].upper() + all_sizes[1:]
             height = row.height * min(1.0, label.width / text_width(text, row.height))
             words[index] = replace(row, text=text, height=height)

@@ -87,8 +87,8 @@ def _kept_side(piece: DraftedPiece, seams: Sequence[Seam]) -> float:
     """Return the side that is drawn, -1 or 1 along x: whose seams meet the drawn copies, else the left one's."""
     axis, votes = _axis(piece), 0.0
     for seam in seams:
-        for own, others in (seam.sides, seam.sides[::-1]):
-            for side in own:
+        for chain, others in (seam.sides, seam.sides[::-1]):
+            for side in chain:
                 if side.piece == piece.name and any(other.mirrored for other in others):
                     votes -= 2 * _side_of(piece.edge(side.edge).line, axis)
     for edge in piece.edges:
@@ -203,8 +203,10 @@ def _kept_notches(
     """
     import shapely
 
-    axis, own = _axis(piece), {dart.dart.name for dart in piece.darts}
-    kept = [n for n in piece.notches if n.seam not in own and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS]
+    axis, dart_names = _axis(piece), {dart.dart.name for dart in piece.darts}
+    kept = [
+        n for n in piece.notches if n.seam not in dart_names and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS
+    ]
     across = {
         seam.name for seam in seams for row in seam.sides for s in row if s.piece == piece.name and s.edge in names
     }
@@ -252,9 +254,9 @@ def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None
 def _with_curve(edge: DraftedEdge, curve: Curve) -> DraftedEdge:
     """Return an edge along another curve, of the same name, kind and width."""
     line = curve.sample()
-    own = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
+    shortened = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
     places = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    return replace(edge, edge=own, curve=curve, line=line, places=places)
+    return replace(edge, edge=shortened, curve=curve, line=line, places=places)
 
 
 def _fold_edge(piece: DraftedPiece, start: FloatArray, end: FloatArray, taken: set[str]) -> DraftedEdge:

@@ -129,9 +129,9 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         )
     seams = sewn_seams(garment, size)
     for stage in sorted({seam.stage for seam in seams}):
-        own = [seam for seam in seams if seam.stage == stage]
+        joined = [seam for seam in seams if seam.stage == stage]
         what = translate(_STAGES[stage][0] if stage < len(_STAGES) else "Sew")
-        parts = [f"{seam.letter} ({_join(seam)}{_eased(seam)})" for seam in own]
+        parts = [f"{seam.letter} ({_join(seam)}{_eased(seam)})" for seam in joined]
         steps.append(translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(parts)))
     free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
     if free:
@@ -220,9 +220,9 @@ def _free_edges(
     for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
         for edge in piece.piece.edges:
             if edge.kind in kinds and (piece.name, edge.name) not in sewn:
-                own = found.setdefault(translate_name(without_side(edge.name)), [])
-                own += [] if titles[piece.name] in own else [titles[piece.name]]
-    return "; ".join(f"{name} ({', '.join(own)})" for name, own in found.items())
+                of_edge = found.setdefault(translate_name(without_side(edge.name)), [])
+                of_edge += [] if titles[piece.name] in of_edge else [titles[piece.name]]
+    return "; ".join(f"{name} ({', '.join(of_edge)})" for name, of_edge in found.items())
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -78,12 +78,12 @@ class FilmPiece:
         """Return the topology at a frame."""
         counts = np.asarray(self._pattern.GetFaceVertexCountsAttr().Get(time))
         corners = np.array(self._pattern.GetFaceVertexIndicesAttr().Get(time), dtype=np.int32)
-        own = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
+        on_surface = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
         space = np.array(self._surface.GetPointsAttr().Get(), dtype=np.float64)
         faces = np.full((len(counts), 4), -1, dtype=np.int32)
         faces[np.arange(4) < counts[:, None]] = corners
         origin = np.zeros(int(corners.max()) + 1, dtype=np.int32)
-        origin[corners] = own
+        origin[corners] = on_surface
         return Shape(faces=faces, surface=space[origin])
 
     def positions(self, time: int, count: int) -> FloatArray:
@@ -273,7 +273,7 @@ def _at(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> Ite
 
 
 class _Box:
-    """A box around points, in which places are told in 65,535 steps along its longest side."""
+    """A box around points, with 65,535 steps along its longest side."""
 
     def __init__(self, points: FloatArray) -> None:
         self._low = points.min(axis=0)

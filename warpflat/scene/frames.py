@@ -182,10 +182,10 @@ class KeyFile:
             at_least: frames.
             most_keys: at least 2.
         """
-        way = self.displacement(stage, stage.keys)
-        if way <= _STILL:
+        reach = self.displacement(stage, stage.keys)
+        if reach <= _STILL:
             return [stage.keys[0], stage.keys[-1]], at_least
-        spacing = 2.0 * way / steps
+        spacing = 2.0 * reach / steps
         while True:
             keys, distances = self.thin(stage, spacing)
             shown = max(self.displacement(stage, keys), _STILL)  # the layout farthest out may be left out
@@ -529,8 +529,8 @@ class FrameRecorder:
         """Return whether the layout lies far enough from the one kept last, by the way of the stage until now."""
         if self._schedule.is_even:
             return True
-        moved, way = (np.abs(positions - before).max() for before in (self._last, self._first))
-        return bool(moved > _KEPT * way)
+        moved, travelled = (np.abs(positions - before).max() for before in (self._last, self._first))
+        return bool(moved > _KEPT * travelled)
 
     def _keep(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> None:
         assert self._keys is not None

@@ -128,9 +128,9 @@ def _side(surface: Surface, along: set[tuple[int, int]], line: str) -> IntArray:
     ids = np.asarray(surface.lines[line], dtype=np.int32)
     if ids[0] == ids[-1]:
         raise InputError(f"line {line!r} is closed; a side runs from one place of the border to another")
-    for way in (ids, ids[::-1]):
-        if all(edge in along for edge in pairwise(way.tolist())):
-            return np.ascontiguousarray(way)
+    for run in (ids, ids[::-1]):
+        if all(edge in along for edge in pairwise(run.tolist())):
+            return np.ascontiguousarray(run)
     a, b = next(edge for edge in pairwise(ids.tolist()) if edge not in along)
     raise InputError(
         f"line {line!r} leaves the border between vertices {a} and {b}; a side is one stretch of border that no cut parts"

@@ -463,8 +463,8 @@ def multilevel_preconditioner(matrix: csr_array, places: FloatArray, edge_length
 
     def apply(residual: FloatArray) -> FloatArray:
         residuals: list[FloatArray] = [residual]
-        for label, own in zip(into, inverse[1:], strict=True):
-            residuals.append(np.bincount(label, residuals[-1], minlength=len(own)).astype(np.float64, copy=False))
+        for label, known in zip(into, inverse[1:], strict=True):
+            residuals.append(np.bincount(label, residuals[-1], minlength=len(known)).astype(np.float64, copy=False))
         result: FloatArray = solve(residuals[-1])
         for level in range(len(into) - 1, -1, -1):
             result = result[into[level]]

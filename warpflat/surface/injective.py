@@ -228,10 +228,10 @@ def overlap_area(surface: Surface, positions: FloatArray, cut_sides: IntArray) -
             cells = cells[shapely.is_valid(cells)]
             overlap += float(shapely.area(cells).sum()) - float(shapely.union_all(cells).area)
         else:
-            own = edges.component == number
+            here = edges.component == number
             # The area around which the border winds more than once, as often as it does so again [m2].
-            tail = positions[edges.tail[own]]
-            head = positions[edges.head[own]]
+            tail = positions[edges.tail[here]]
+            head = positions[edges.head[here]]
             parts = shapely.get_parts(
                 shapely.polygonize([shapely.union_all(shapely.linestrings(np.stack([tail, head], axis=1)))])
             )

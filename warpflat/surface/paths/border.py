@@ -97,8 +97,8 @@ def line_on_border(
             raise InputError(f"unknown side {side!r} of the border; {nearest(str(side), SIDES)}")
         at = _corners(surface, loop, side)
         # Seen from outside the border runs counter-clockwise.
-        ways = {"left": ("tl", "bl"), "bottom": ("bl", "br"), "right": ("br", "tr"), "top": ("tr", "tl")}
-        line = _between(loop, at[ways[side][0]], at[ways[side][1]])
+        sides = {"left": ("tl", "bl"), "bottom": ("bl", "br"), "right": ("br", "tr"), "top": ("tr", "tl")}
+        line = _between(loop, at[sides[side][0]], at[sides[side][1]])
         return line[::-1].copy() if side in ("left", "top") else line
     if start is None or end is None:
         raise InputError(f"a stretch of the border needs a side ({', '.join(SIDES)}), or both start and end")
@@ -115,7 +115,7 @@ def line_on_border(
     i, j = int(np.flatnonzero(loop == a)[0]), int(np.flatnonzero(loop == b)[0])
     along, back = _between(loop, i, j), _between(loop, j, i)[::-1].copy()
     if direction == "shortest":
-        length = [polyline_length(surface.vertices[way]) for way in (along, back)]
+        length = [polyline_length(surface.vertices[path]) for path in (along, back)]
         direction = "with" if length[0] <= length[1] else "against"
     return along if direction == "with" else back
 
@@ -196,8 +196,8 @@ def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int)
     Where a side curls a little out of sight, the outermost point that is seen lies beside the corner.
     """
     station = arc_lengths(surface.vertices[loop], closed=True)
-    way = np.abs(station[:-1] - station[place])
-    near = np.minimum(way, station[-1] - way) < _NEAR * station[-1]
+    distance = np.abs(station[:-1] - station[place])
+    near = np.minimum(distance, station[-1] - distance) < _NEAR * station[-1]
     return int(np.argmax(np.where(near, turn, -np.inf)))
 
 
