@@ -113,7 +113,14 @@ def write_dxf(
             _line(block, piece.grain, scale, "7")
             for line in piece.internal_lines.values():
                 _polyline(block, line, scale, "8")
-            _write_darts(block, piece, scale)
+            for dart in piece.darts:
+                if dart.fold is not None:
+                    _polyline(block, dart.fold, scale, "8")
+                word = "DART" if dart.dart.pleat is None else "PLEAT"
+                _text(block, f"{word}: {dart.dart.name}", dart.tip, scale, "15", 0.003)
+            for dart_name, line in piece.fisheyes.items():
+                _polyline(block, line, scale, "8", closed=True)
+                _text(block, f"DART: {dart_name}", line.mean(axis=0), scale, "15", 0.003)
             for cutout in piece.cutouts.values():
                 _polyline(block, cutout.cut_line, scale, "11", closed=True)
                 if cutout.width > 0:
@@ -199,18 +206,6 @@ def _ascii(text: str) -> str:
 def _is_written(name: str) -> bool:
     """Return whether 7 bits leave anything of a name."""
     return any(letter.isalnum() for letter in _ascii(name))
-
-
-def _write_darts(block: list[str], piece: DraftedPiece, scale: float) -> None:
-    """Write the folds of darts, fish-eye darts and their names."""
-    for dart in piece.darts:
-        if dart.fold is not None:
-            _polyline(block, dart.fold, scale, "8")
-        word = "DART" if dart.dart.pleat is None else "PLEAT"
-        _text(block, f"{word}: {dart.dart.name}", dart.tip, scale, "15", 0.003)
-    for name, line in piece.fisheyes.items():
-        _polyline(block, line, scale, "8", closed=True)
-        _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)
 
 
 def _write_style(

@@ -137,7 +137,17 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
             ),
         )
     )
-    _cut_list(page, pieces)
+    cloths = cut_list(pieces)
+    if len(cloths) > 1:
+        page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
+        for cloth, entries in cloths.items():
+            cut = [
+                translate(
+                    f"{{title}} {{count}}{' on fold' if entry.on_fold else ''}", title=entry.title, count=entry.quantity
+                )
+                for entry in entries
+            ]
+            page.paragraph(", ".join(cut), indent=0.030, lead=cloth)
     _cloth(page, whole, units)
     steps = sewing_steps(whole, size)
     page.heading(translate("Sewing order"), 3 * LINE)
@@ -146,29 +156,28 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     )
     for number, words in enumerate(steps, 1):
         page.paragraph(words, indent=0.006, lead=str(number))
-    _seams(page, whole, size, units)
+    seams = sewn_seams(whole, size)
+    if seams:
+        page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
+        rows = [
+            [
+                seam.letter,
+                seam.name + (f" ({seam.count} x)" if seam.count > 1 else ""),
+                seam.sides[0],
+                length_words(seam.length_mm[0] / 1000, units),
+                seam.sides[1],
+                length_words(seam.length_mm[1] / 1000, units),
+            ]
+            for seam in seams
+        ]
+        head = ["", *(translate(word) for word in ("seam", "piece", "length", "sewn to", "length"))]
+        page.table(head, rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
     notes = dict.fromkeys(f"{piece.piece.printed_name}: {note}." for piece in pieces for note in piece.notes)
     if notes:
         page.heading(translate("Notes"), 3 * LINE)
     for note in notes:
         page.paragraph(note)
     page.end()
-
-
-def _cut_list(page: _Page, pieces: Sequence[DraftedPiece]) -> None:
-    """Write what is cut from each cloth, where there are several."""
-    cloths = cut_list(pieces)
-    if len(cloths) < 2:
-        return
-    page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
-    for cloth, entries in cloths.items():
-        words = [
-            translate(
-                f"{{title}} {{count}}{' on fold' if entry.on_fold else ''}", title=entry.title, count=entry.quantity
-            )
-            for entry in entries
-        ]
-        page.paragraph(", ".join(words), indent=0.030, lead=cloth)
 
 
 def _thumbnail(canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: float) -> None:
@@ -213,24 +222,3 @@ def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     page.paragraph(
         translate("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")
     )
-
-
-def _seams(page: _Page, whole: DraftedGarment, size: str, units: str) -> None:
-    """Write the table of seams: letter, sides, lengths."""
-    seams = sewn_seams(whole, size)
-    if not seams:
-        return
-    page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
-    rows = [
-        [
-            seam.letter,
-            seam.name + (f" ({seam.count} x)" if seam.count > 1 else ""),
-            seam.sides[0],
-            length_words(seam.length_mm[0] / 1000, units),
-            seam.sides[1],
-            length_words(seam.length_mm[1] / 1000, units),
-        ]
-        for seam in seams
-    ]
-    head = ["", *(translate(word) for word in ("seam", "piece", "length", "sewn to", "length"))]
-    page.table(head, rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))

@@ -215,26 +215,23 @@ def place_views(
     for shape, (wide, _) in zip(silhouettes, sizes, strict=True):
         x = 0.5 * (width - wide) if stacked else left + 0.5 * spare
         left += wide + spare
-        low = top
+        heading_left, heading_right = x + 0.5 * wide - _HALF_HEADING, x + 0.5 * wide + _HALF_HEADING
+        heading = _HEADING - _heading_room(shape, scale)
+        # The view's upper edge is no higher than any of these.
+        limits = [top]
         for box in words:
-            low = max(
-                low, box.bottom + _ABOVE - scale * shape.room_above((box.left - x) / scale, (box.right - x) / scale)
-            )
-            if (
-                has_headings
-                and box.left < x + 0.5 * wide + _HALF_HEADING
-                and box.right > x + 0.5 * wide - _HALF_HEADING
-            ):
-                low = max(low, box.bottom + _HEADING - _heading_room(shape, scale))
+            room = shape.room_above((box.left - x) / scale, (box.right - x) / scale)
+            limits.append(box.bottom + _ABOVE - scale * room)
+            if has_headings and box.left < heading_right and box.right > heading_left:
+                limits.append(box.bottom + heading)
         if stacked and places:
-            before, (x_before, low_before) = silhouettes[len(places) - 1], places[-1]
-            bottom = low_before + scale * before.height
-            low = max(low, bottom + BETWEEN - scale * before.overlap_below(shape, (x - x_before) / scale))
+            above, (x_above, low_above) = silhouettes[len(places) - 1], places[-1]
+            bottom = low_above + scale * above.height + BETWEEN
+            limits.append(bottom - scale * above.overlap_below(shape, (x - x_above) / scale))
             if has_headings:
-                middle = (x + 0.5 * wide - x_before) / scale
-                above = before.room_below(middle - _HALF_HEADING / scale, middle + _HALF_HEADING / scale)
-                low = max(low, bottom + BETWEEN + _HEADING - _heading_room(shape, scale) - scale * above)
-        places.append((x, low))
+                room = above.room_below((heading_left - x_above) / scale, (heading_right - x_above) / scale)
+                limits.append(bottom + heading - scale * room)
+        places.append((x, max(limits)))
     if not stacked:
         # The lower ones are as low as they must be; others stand in the middle of their room.
         floor = max(low + high for (_, low), (_, high) in zip(places, sizes, strict=True))

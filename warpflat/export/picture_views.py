@@ -205,7 +205,14 @@ class DrawnView:
                 zorder=1,
             )
         )
-        self._draw_mesh(axes)
+        faces = self.view.facets.faces
+        is_quad = faces[:, 3] >= 0
+        covered = float((self._samples.triangle >= 0).sum()) / self._per_pixel**2
+        if covered >= 50.0 * max(len(faces), 1):
+            closed = np.where(is_quad[:, None], faces, faces[:, [0, 1, 2, 0]])
+            sides = np.stack([closed, np.roll(closed, -1, axis=1)], axis=-1).reshape(-1, 2)
+            edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
+            self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
         self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
 
     def draw_segments(
@@ -213,7 +220,21 @@ class DrawnView:
     ) -> None:
         """Draw the visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
         if len(edges):
-            segments = self._visible_parts(edges)
+            # Segments are the visible parts of edges (#S by 2 by 2 [in]).
+            a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
+            if self.view.vectors is None:
+                segments = np.stack([self.to_page(a), self.to_page(b)], axis=1)
+            else:
+                pixels = np.linalg.norm((b - a)[:, :2], axis=1) * self._scale * DPI
+                count = np.clip(np.ceil(pixels / 3.0), 1, 400).astype(int)
+                edge = np.repeat(np.arange(len(edges)), count)
+                step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+                begin, end = ((step + shift) / count[edge] for shift in (0.0, 1.0))
+                start, stop = (a[edge] + (b - a)[edge] * share[:, None] for share in (begin, end))
+                seen = self._is_visible(self._to_samples(0.5 * (start + stop)))
+                goes_on = (edge[1:] == edge[:-1]) & seen[1:] & seen[:-1]
+                first, last = seen & ~np.insert(goes_on, 0, False), seen & ~np.append(goes_on, False)
+                segments = np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
             # Many to a path: a path each takes longer to set up than all of them to draw.
             parts = [segments[i : i + _SEGMENTS_TO_A_PATH] for i in range(0, len(segments), _SEGMENTS_TO_A_PATH)]
             paths = [Path(part.reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(part))) for part in parts]
@@ -253,37 +274,6 @@ class DrawnView:
         if vectors is None or self._fine:
             return vectors
         return vertex_normals(vectors, facets.triangles, len(self.view.points))
-
-    def _draw_mesh(self, axes: Any) -> None:
-        faces = self.view.facets.faces
-        is_quad = faces[:, 3] >= 0
-        covered = float((self._samples.triangle >= 0).sum()) / self._per_pixel**2
-        # Thin lines at less than every seventh pixel would only darken the colours.
-        if covered / max(len(faces), 1) < 50.0:
-            return
-        closed = np.where(is_quad[:, None], faces, faces[:, [0, 1, 2, 0]])
-        sides = np.stack([closed, np.roll(closed, -1, axis=1)], axis=-1).reshape(-1, 2)
-        edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
-        self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
-
-    def _visible_parts(self, edges: IntArray) -> FloatArray:
-        """Return the visible parts of edges (#S by 2 by 2 [in]).
-
-        Hidden parts of a surface's edges are found in short pieces.
-        """
-        a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
-        if self.view.vectors is None:
-            return np.stack([self.to_page(a), self.to_page(b)], axis=1)
-        pixels = np.linalg.norm((b - a)[:, :2], axis=1) * self._scale * DPI
-        count = np.clip(np.ceil(pixels / 3.0), 1, 400).astype(int)
-        edge = np.repeat(np.arange(len(edges)), count)
-        step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
-        begin, end = ((step + shift) / count[edge] for shift in (0.0, 1.0))
-        start, stop = (a[edge] + (b - a)[edge] * share[:, None] for share in (begin, end))
-        seen = self._is_visible(self._to_samples(0.5 * (start + stop)))
-        goes_on = (edge[1:] == edge[:-1]) & seen[1:] & seen[:-1]
-        first, last = seen & ~np.insert(goes_on, 0, False), seen & ~np.append(goes_on, False)
-        return np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
 
     def _is_visible(self, spots: FloatArray) -> BoolArray:
         """Return whether points on the mesh (#N by 3, in samples) are in front, within the mesh's own slope."""

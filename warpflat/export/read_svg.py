@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import FARTHEST, Place, reading
+from warpflat.core.input_files import FARTHEST, reading
 from warpflat.core.text import quote_value
 from warpflat.export.read_dxf import MOST_POINTS, check_closed, outermost, read_quantity
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
@@ -104,7 +104,28 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
                 )
             )
         if not pieces:
-            pieces = _other_pieces(root, page, allowance or 0.0, str(path), place)
+            # A drawing of another program: every closed path that lies in no other one is a piece.
+            found: dict[int, tuple[FloatArray, str]] = {}
+            unclosed = list[FloatArray]()
+            total = 0
+            for element, matrix in _walk(root, page):
+                place.at = f"{element.tag.rpartition('}')[2]} {quote_value(element.get('id', ''))}"
+                for points, closed in _lines(element, matrix):
+                    total += len(points)
+                    if total > MOST_POINTS:
+                        raise InputError(_TOO_MANY)
+                    if closed:
+                        found[id(points)] = points, element.get(_LABEL) or element.get("id") or ""
+                    else:
+                        unclosed.append(points)
+            place.at = ""
+            check_closed(unclosed, [points for points, _ in found.values()], 1.0, str(path))
+            taken = set[str]()
+            for number, ring in enumerate(outermost([points for points, _ in found.values()]), start=1):
+                name = found[id(ring)][1] or f"piece_{number}"
+                name = name if name not in taken else f"{name}_{number}"
+                taken.add(name)
+                pieces.append(Piece(name=name, edges=split_outline(inset(ring, allowance or 0.0, f"{path}: {name}"))))
         if not pieces:
             raise InputError(f"{path}: has no closed path; a piece is a closed path")
         sizes: dict[str, list[Piece]] = {}
@@ -184,31 +205,6 @@ def _transform(text: str) -> FloatArray:
 
 def _times(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.column_stack([a[:, :2] @ b[:, :2], a[:, :2] @ b[:, 2] + a[:, 2]])
-
-
-def _other_pieces(root: ET.Element, page: FloatArray, allowance: float, file: str, place: Place) -> list[Piece]:
-    found: dict[int, tuple[FloatArray, str]] = {}
-    unclosed = list[FloatArray]()
-    total = 0
-    for element, matrix in _walk(root, page):
-        place.at = f"{element.tag.rpartition('}')[2]} {quote_value(element.get('id', ''))}"
-        for points, closed in _lines(element, matrix):
-            total += len(points)
-            if total > MOST_POINTS:
-                raise InputError(_TOO_MANY)
-            if closed:
-                found[id(points)] = points, element.get(_LABEL) or element.get("id") or ""
-            else:
-                unclosed.append(points)
-    place.at = ""
-    check_closed(unclosed, [points for points, _ in found.values()], 1.0, file)
-    pieces, taken = [], set[str]()
-    for number, ring in enumerate(outermost([points for points, _ in found.values()]), start=1):
-        name = found[id(ring)][1] or f"piece_{number}"
-        name = name if name not in taken else f"{name}_{number}"
-        taken.add(name)
-        pieces.append(Piece(name=name, edges=split_outline(inset(ring, allowance, f"{file}: {name}"))))
-    return pieces
 
 
 def _lines(element: ET.Element, matrix: FloatArray) -> Iterator[tuple[FloatArray, bool]]:

@@ -67,7 +67,9 @@ def write_svg(
             displayed.
         width: of the sheet [m].
     """
-    chosen = _chosen(garment, sizes)
+    for size in sizes or ():
+        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+    chosen = tuple(size for size in garment.pieces if sizes is None or size in sizes)
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     if not nested:
         groups = [(piece,) for size in chosen for nest in groups for piece in nest if piece.size == size]
@@ -105,15 +107,6 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     for index, copy in enumerate(marker.placements):
         page.marker_copy(copy, index)
     page.write(path)
-
-
-def _chosen(garment: DraftedGarment, sizes: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the sizes to draw, in their order."""
-    if sizes is None:
-        return tuple(garment.pieces)
-    for size in sizes:
-        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
-    return tuple(size for size in garment.pieces if size in sizes)
 
 
 class SvgPage:

@@ -14,7 +14,7 @@ from warpflat.core.polyline import arc_lengths, resample
 from warpflat.core.text import name_without_number
 from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import nest_label
-from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
+from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import Label, Words, text_width
 from warpflat.pattern.words import translate, translate_name
@@ -210,7 +210,10 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
         if dart.fold is not None
     ]
     for index, notch in enumerate(piece.notches):
-        strokes += _notch_strokes(notch, index)
+        for slit, base in enumerate(notch.base):
+            name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
+            line = np.stack([base, base + notch.depth * notch.direction])
+            strokes.append(Stroke(role="notch", name=name, points=line))
     for hole in piece.drill_holes:
         turn = np.linspace(0, 2 * np.pi, 17)[:-1]
         ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -228,14 +231,6 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
             Stroke(role="dart", name=f"{name}.right", points=right),
             Stroke(role="dart_fold", name=f"{name}.fold", points=left[[0, -1]]),
         ]
-    return strokes
-
-
-def _notch_strokes(notch: Notch, index: int) -> list[Stroke]:
-    strokes = []
-    for slit, base in enumerate(notch.base):
-        name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
-        strokes.append(Stroke(role="notch", name=name, points=np.stack([base, base + notch.depth * notch.direction])))
     return strokes
 
 
@@ -285,7 +280,18 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True, joints: Sequence[F
     """
     import shapely
 
-    lines = _named_lines(piece, borders=borders)
+    # The lines that get a name: the name, its line, and whether it stands to the left of the line.
+    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
+    second_legs = {dart.dart.right for dart in piece.darts}
+    named = [(name, line, False) for name, line in piece.internal_lines.items()]
+    for edge in piece.edges:
+        if edge.name in first_legs:
+            named.append((first_legs[edge.name], piece.drawn_line(edge), True))
+        elif borders and edge.kind != "fold" and edge.name not in second_legs:
+            named.append((edge.name, edge.line, True))
+    named += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
+    called = {name for name, _, _ in named}
+    lines = [(translate_name(name_without_number(name, called)), line, inwards) for name, line, inwards in named]
     drawn = [shapely.LineString(line) for _, line, _ in lines]
     obstacles = [
         *[
@@ -304,21 +310,6 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True, joints: Sequence[F
             words.append(placed)
             obstacles.append(_text_box(placed))
     return words
-
-
-def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, FloatArray, bool]]:
-    """Return the lines that get a name: the name, its line, and whether it stands to the left of the line."""
-    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
-    second_legs = {dart.dart.right for dart in piece.darts}
-    lines = [(name, line, False) for name, line in piece.internal_lines.items()]
-    for edge in piece.edges:
-        if edge.name in first_legs:
-            lines.append((first_legs[edge.name], piece.drawn_line(edge), True))
-        elif borders and edge.kind != "fold" and edge.name not in second_legs:
-            lines.append((edge.name, edge.line, True))
-    lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
-    called = {name for name, _, _ in lines}
-    return [(translate_name(name_without_number(name, called)), line, inwards) for name, line, inwards in lines]
 
 
 def _place_name(name: str, line: FloatArray, obstacles: Geometry, *, inwards: bool) -> Words | None:

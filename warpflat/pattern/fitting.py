@@ -149,7 +149,10 @@ def _keep_near(
     tolerance: float | None,
 ) -> None:
     """Bring the curves of clean edges within the tolerance of their points, where their seams allow it."""
-    tried = fitted | _near_curves(pieces, lines, fitted, TOLERANCE if tolerance is None else tolerance)
+    within = TOLERANCE if tolerance is None else tolerance
+    keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
+    clean = [key for key in keys if fitted[key][1] <= within]
+    tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in clean}
     unchecked = list(_sewn(pieces, seams))
     # The edges of a mirror pair are sewn at two seams: a curve that one of them rejects changes the other.
     while unequal := [seam for seam in unchecked if _difference(*_both(seam, lines, tried)) > SAFE]:
@@ -160,18 +163,6 @@ def _keep_near(
                 tried |= {key: fitted[key] for row in sides for key in ((side.piece, side.edge) for side in row)}
         unchecked = [seam for seam in unchecked if seam not in unequal]
     fitted |= tried
-
-
-def _near_curves(
-    pieces: Sequence[Piece],
-    lines: Mapping[EdgeKey, FloatArray],
-    fitted: Mapping[EdgeKey, tuple[Curve, float]],
-    tolerance: float,
-) -> dict[EdgeKey, tuple[Curve, float]]:
-    """Return curves that keep within the tolerance [m] of their points, for all clean edges that are not on a fold."""
-    keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
-    clean = [key for key in keys if fitted[key][1] <= tolerance]
-    return {key: (fit_curve(lines[key], tolerance, near=True), tolerance) for key in clean}
 
 
 def _both(

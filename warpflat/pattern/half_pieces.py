@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -165,9 +165,31 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         title=piece.piece.title,
         units=piece.piece.units,
     )
-    notches = _kept_notches(piece, garment.garment.seams, side, names, [(e.name, e.line - shift) for e in edges[:-1]])
+    # The notches of seams on one side of the axis, each on its edge of the half. A seam across the axis (a waist) whose
+    # notches all lie on the other side gets their mirror images.
+    lines = [(e.name, e.line - shift) for e in edges[:-1]]
+    axis, dart_names = _axis(piece), {dart.dart.name for dart in piece.darts}
+    on_side = [
+        n for n in piece.notches if n.seam not in dart_names and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS
+    ]
+    across = {
+        seam.name
+        for seam in garment.garment.seams
+        for row in seam.sides
+        for s in row
+        if s.piece == piece.name and s.edge in names
+    }
+    across -= {notch.seam for notch in on_side}
+    flip, moved_by = np.array([-1.0, 1.0]), np.array([2 * axis, 0.0])
+    for notch in piece.notches:
+        if notch.seam in across:
+            bases = tuple(base * flip + moved_by for base in notch.base)
+            on_side.append(replace(notch, at=notch.at * flip + moved_by, base=bases, direction=notch.direction * flip))
+    drawn = [shapely.LineString(line) for _, line in lines]
+    nearest = [lines[int(np.argmin(shapely.distance(drawn, shapely.Point(notch.at))))][0] for notch in on_side]
     notches = tuple(
-        _along_fold(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base))) for n in notches
+        _along_fold(replace(n, edge=edge, at=n.at + shift, base=tuple(base + shift for base in n.base)))
+        for n, edge in zip(on_side, nearest, strict=True)
     )
     return replace(draft_half(half, garment.name, tuple(edges), notches, piece.notes), enlarged=piece.enlarged)
 
@@ -181,44 +203,6 @@ def _along_fold(notch: Notch) -> Notch:
         notch, at=notch.at * upright, base=(notch.base[0] * upright,),
         direction=np.sign(notch.direction[1]) * upright,
     )  # fmt: skip
-
-
-def _kept_notches(
-    piece: DraftedPiece,
-    seams: Sequence[Seam],
-    side: float,
-    names: Mapping[str, str],
-    lines: Sequence[tuple[str, FloatArray]],
-) -> tuple[Notch, ...]:
-    """Return the notches of seams on one side of the axis, each on its edge of the half.
-
-    A seam across the axis (a waist) whose notches all lie on the other side gets their mirror images.
-
-    Args:
-        piece: whole.
-        seams: of the garment.
-        side: that is kept, -1 or 1 along x.
-        names: of the half's edges, by those of the whole.
-        lines: the half's edges by name, where they lie on the whole piece.
-    """
-    import shapely
-
-    axis, dart_names = _axis(piece), {dart.dart.name for dart in piece.darts}
-    kept = [
-        n for n in piece.notches if n.seam not in dart_names and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS
-    ]
-    across = {
-        seam.name for seam in seams for row in seam.sides for s in row if s.piece == piece.name and s.edge in names
-    }
-    across -= {notch.seam for notch in kept}
-    flip, shift = np.array([-1.0, 1.0]), np.array([2 * axis, 0.0])
-    for notch in piece.notches:
-        if notch.seam in across:
-            bases = tuple(base * flip + shift for base in notch.base)
-            kept.append(replace(notch, at=notch.at * flip + shift, base=bases, direction=notch.direction * flip))
-    drawn = [shapely.LineString(line) for _, line in lines]
-    nearest = [lines[int(np.argmin(shapely.distance(drawn, shapely.Point(notch.at))))][0] for notch in kept]
-    return tuple(replace(notch, edge=edge) for notch, edge in zip(kept, nearest, strict=True))
 
 
 def _kept_part(edge: DraftedEdge, axis: float, side: float) -> DraftedEdge | None:

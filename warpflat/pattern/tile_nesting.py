@@ -236,7 +236,23 @@ def _lay(
         for mask in masks[k]:
             if (np.array(mask.cells.shape) > sheet.occupied.shape).any():
                 continue
-            price = _prices(mask, used, grid, sheet.free(mask))
+            # A place costs the new tiles that it takes, and a little for rows, columns and distance.
+            free = sheet.free(mask)
+            (per_row, per_column), tile_rows = grid.per_tile, grid.tiles[0]
+            down, across = free.shape
+            touched, cells = grid.touched(mask), mask.cells
+            over = touched.shape[1], touched.shape[3]
+            new = np.pad(np.where(used, 0.0, 1.0), ((0, over[0]), (0, over[1])))
+            windows = np.lib.stride_tricks.sliding_window_view(new, over)  # by the tile where a mask starts
+            cost = np.tensordot(windows, touched, axes=([2, 3], [1, 3])).transpose(0, 2, 1, 3)
+            flat = cost.reshape((tile_rows + 1) * per_row, -1)[:down, :across]
+            r, c = np.arange(down)[:, None], np.arange(across)[None, :]
+            # Among places that take equally few tiles: a compact sheet, and the upper left.
+            lower, right = (r + cells.shape[0]) / per_row, (c + cells.shape[1]) / per_column
+            lowest = int(np.flatnonzero(used.any(axis=1))[-1]) + 1 if used.any() else 0
+            widest = int(np.flatnonzero(used.any(axis=0))[-1]) + 1 if used.any() else 0
+            spread = SPREAD * (np.maximum(0, np.ceil(lower) - lowest) + np.maximum(0, np.ceil(right) - widest))
+            price = np.where(free, flat + spread + 1e-3 * (lower + right), np.inf)
             row, column = divmod(int(np.argmin(price)), price.shape[1])
             if np.isfinite(price[row, column]) and (best is None or price[row, column] < best[0] - 1e-9):
                 best = float(price[row, column]), mask, row, column
@@ -247,25 +263,6 @@ def _lay(
         used |= _touched(best[1].cells, best[2], best[3], grid)
     spread = SPREAD * (int(used.any(axis=1).sum()) + int(used.any(axis=0).sum()))
     return float(used.sum()) + spread, [places[k] for k in range(len(masks))]
-
-
-def _prices(mask: Mask, used: BoolArray, grid: _Grid, free: BoolArray) -> FloatArray:
-    """Return for every place of a mask how many new tiles it takes, and a little for rows, columns and distance."""
-    (per_row, per_column), tile_rows = grid.per_tile, grid.tiles[0]
-    down, across = free.shape
-    touched, cells = grid.touched(mask), mask.cells
-    over = touched.shape[1], touched.shape[3]
-    new = np.pad(np.where(used, 0.0, 1.0), ((0, over[0]), (0, over[1])))
-    windows = np.lib.stride_tricks.sliding_window_view(new, over)  # by the tile where a mask starts
-    price = np.tensordot(windows, touched, axes=([2, 3], [1, 3])).transpose(0, 2, 1, 3)
-    flat = price.reshape((tile_rows + 1) * per_row, -1)[:down, :across]
-    r, c = np.arange(down)[:, None], np.arange(across)[None, :]
-    # Among places that take equally few tiles: a compact sheet, and the upper left.
-    lower, right = (r + cells.shape[0]) / per_row, (c + cells.shape[1]) / per_column
-    lowest = int(np.flatnonzero(used.any(axis=1))[-1]) + 1 if used.any() else 0
-    widest = int(np.flatnonzero(used.any(axis=0))[-1]) + 1 if used.any() else 0
-    spread = SPREAD * (np.maximum(0, np.ceil(lower) - lowest) + np.maximum(0, np.ceil(right) - widest))
-    return np.where(free, flat + spread + 1e-3 * (lower + right), np.inf)
 
 
 def _blocks(size: int, per_tile: int, shared: int) -> tuple[IntArray, IntArray]:

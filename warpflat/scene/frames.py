@@ -368,7 +368,23 @@ class Film:
             for frame in range(count):
                 for name, (stage, _, _) in shots.items():
                     begins = frame == 0 and number < len(pieces[name])
-                    self._write_frame(writer, name, stage, next(frames[name]), number=number, begins=begins)
+                    shown = next(frames[name])
+                    measures = {
+                        "stage": _STEPS if 0 < shown.measures.get("step", 0) <= stage.last_first_step else stage.name,
+                        "stage_number": number,
+                        "interpolated": shown.face_energy_density is None,
+                        **{key: round(value) if key in _COUNTS else value for key, value in shown.measures.items()},
+                    }
+                    if shown.positions is None or shown.face_energy_density is None:
+                        writer.write_between(name, shown.positions, measures)
+                        continue
+                    writer.write(
+                        name,
+                        positions=shown.positions,
+                        face_energy_density=shown.face_energy_density,
+                        **(stage.topology if begins else {}),  # type: ignore[arg-type]
+                        measures=measures,
+                    )
 
     def _shot(self, stages: Sequence[FilmStage], number: int) -> tuple[FilmStage, list[Key], int]:
         """Return a stage of a piece, the keys that are shown and the number of frames that it needs.
@@ -399,31 +415,6 @@ class Film:
             self._keys.frames(stage, [key], 1 if key is not keys[-1] else count - len(keys) + 1, between=False)
             for key in keys
         )
-
-    def _write_frame(
-        self, writer: FrameWriter, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool
-    ) -> None:
-        measures = {
-            "stage": _STEPS if 0 < frame.measures.get("step", 0) <= stage.last_first_step else stage.name,
-            "stage_number": number,
-            "interpolated": frame.face_energy_density is None,
-            **_counts_whole(frame.measures),
-        }
-        if frame.positions is None or frame.face_energy_density is None:
-            writer.write_between(name, frame.positions, measures)
-            return
-        writer.write(
-            name,
-            positions=frame.positions,
-            face_energy_density=frame.face_energy_density,
-            **(stage.topology if begins else {}),  # type: ignore[arg-type]
-            measures=measures,
-        )
-
-
-def _counts_whole(measures: Mapping[str, float]) -> dict[str, float | int]:
-    """Return measures with counts as whole numbers."""
-    return {key: round(value) if key in _COUNTS else value for key, value in measures.items()}
 
 
 #: Stage of the paper's steps with which a relaxation begins (`warpflat.flattening.progress`, which loads the solver).
@@ -517,7 +508,12 @@ class FrameRecorder:
             self._faces = surface.faces
             topology |= {"faces": surface.faces, "lines": surface.lines}
         if self._plans:
-            topology["cuts"] = self._cut_lines()
+            topology["cuts"] = {
+                plan.name: [
+                    run for path in plan.paths for run in path_in_pattern(self._surface.faces, self._faces, path)
+                ]
+                for plan in self._plans
+            }
         self.stages.append(
             FilmStage(
                 name=name, vertex_count=len(positions), face_count=len(surface.faces), topology=topology, still=still
@@ -536,12 +532,6 @@ class FrameRecorder:
         assert self._keys is not None
         self.stages[-1].keys.append(self._keys.append(positions, density, measures))
         self._last = positions
-
-    def _cut_lines(self) -> dict[str, list[IntArray]]:
-        return {
-            plan.name: [run for path in plan.paths for run in path_in_pattern(self._surface.faces, self._faces, path)]
-            for plan in self._plans
-        }
 
 
 def path_in_pattern(faces: IntArray, pattern_faces: IntArray, path: IntArray) -> list[IntArray]:

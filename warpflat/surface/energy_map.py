@@ -190,9 +190,15 @@ def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_l
     density = _checked_density(face_density, len(surface.faces), "face")
     if not (np.isfinite(smoothing_length) and smoothing_length >= 0):
         raise InputError(f"smoothing_length is a length in metres, 0 or more, got {smoothing_length!r}")
-    area, energy = _given_to_vertices(surface, density)
+    # Each face gives its vertices equal parts of its area [m2] and its energy [J].
+    count = len(surface.vertices)
+    is_corner = surface.faces >= 0
+    part = _face_areas(surface) / is_corner.sum(axis=1)
+    spread = np.broadcast_to(part[:, None], is_corner.shape)[is_corner]
+    held = spread * np.broadcast_to(density[:, None], is_corner.shape)[is_corner]
+    corner = surface.faces[is_corner]
+    area, energy = (np.bincount(corner, parts, minlength=count).astype(np.float64) for parts in (spread, held))
     if smoothing_length > 0:
-        count = len(surface.vertices)
         system, edge = _diffusion_matrix(surface, area, smoothing_length)
         used = np.flatnonzero(area > 0)
         if len(used) < count:
@@ -219,18 +225,6 @@ def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_l
         smooth[used] += (energy[used].sum() - area[used] @ smooth[used]) / area[used].sum()
         energy = area * smooth
     return np.divide(energy, area, out=np.zeros(len(area)), where=area > 0)
-
-
-def _given_to_vertices(surface: Surface, density: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the area [m2] and the energy [J] of each vertex, #V each."""
-    count = len(surface.vertices)
-    used = surface.faces >= 0
-    part = _face_areas(surface) / used.sum(axis=1)
-    spread = np.broadcast_to(part[:, None], used.shape)[used]
-    corner = surface.faces[used]
-    held = spread * np.broadcast_to(density[:, None], used.shape)[used]
-    area = np.bincount(corner, weights=spread, minlength=count).astype(np.float64)
-    return area, np.bincount(corner, weights=held, minlength=count).astype(np.float64)
 
 
 def _diffusion_matrix(surface: Surface, area: FloatArray, length: float) -> tuple[csr_array, float]:

@@ -153,7 +153,23 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
                 f"cutting edge {_edge(chain, int(whole[0]))} separates nothing, since both its ends lie inside and "
                 "stay whole; start at the border, end on another cut, or take at least two edges"
             )
-        seams.extend(_seams(chain, left_ends, right_ends))
+        # A seam is a stretch along which both sides run on without a break.
+        count = len(left_ends)
+        joined = (left_ends[:-1, 1] == left_ends[1:, 0]) & (right_ends[:-1, 1] == right_ends[1:, 0])
+        starts = [0, *(np.flatnonzero(~joined) + 1).tolist()]
+        runs = [list(range(a, b)) for a, b in zip(starts, [*starts[1:], count], strict=True)]
+        closes = chain[0] == chain[-1] and left_ends[-1, 1] == left_ends[0, 0] and right_ends[-1, 1] == right_ends[0, 0]
+        if closes and len(runs) > 1:
+            runs[0] = runs.pop() + runs[0]
+        for run in runs:
+            last = run[-1]
+            seams.append(
+                Seam(
+                    path=np.append(chain[run], chain[last + 1]),
+                    left=np.append(left_ends[run, 0], left_ends[last, 1]),
+                    right=np.append(right_ends[run, 0], right_ends[last, 1]),
+                )
+            )
 
     nowhere = np.empty((0, 3))
     cut_mesh = Surface(
@@ -299,28 +315,6 @@ def _double(
                 copies.append(old)
         vertex[corner] = given[group]
     return vertex, np.append(np.arange(vertex_count), copies).astype(np.int32), fans
-
-
-def _seams(chain: IntArray, left_ends: IntArray, right_ends: IntArray) -> list[Seam]:
-    """Return the path as stretches along which both sides run on without a break."""
-    count = len(left_ends)
-    joined = (left_ends[:-1, 1] == left_ends[1:, 0]) & (right_ends[:-1, 1] == right_ends[1:, 0])
-    starts = [0, *(np.flatnonzero(~joined) + 1).tolist()]
-    runs = [list(range(a, b)) for a, b in zip(starts, [*starts[1:], count], strict=True)]
-    closes = chain[0] == chain[-1] and left_ends[-1, 1] == left_ends[0, 0] and right_ends[-1, 1] == right_ends[0, 0]
-    if closes and len(runs) > 1:
-        runs[0] = runs.pop() + runs[0]
-    seams = []
-    for run in runs:
-        last = run[-1]
-        seams.append(
-            Seam(
-                path=np.append(chain[run], chain[last + 1]),
-                left=np.append(left_ends[run, 0], left_ends[last, 1]),
-                right=np.append(right_ends[run, 0], right_ends[last, 1]),
-            )
-        )
-    return seams
 
 
 def _kind(

@@ -93,7 +93,19 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
     stage = Usd.Stage.Open(str(path))
     if not stage:
         raise InputError(UNREADABLE)
-    chosen = _choose(stage, prim)
+    meshes = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
+    paths = [str(p.GetPath()) for p in meshes]
+    if not meshes:
+        raise InputError("holds no mesh prim")
+    chosen = meshes
+    if prim is None and len(meshes) > 1:
+        some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
+        raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
+    if prim is not None and prim != ALL_PRIMS:
+        chosen = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
+        if len(chosen) != 1:
+            what = "names several mesh prims" if chosen else "is not a mesh prim"
+            raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
     notes: list[str] = []
     if metres_per_unit is None:
         metres_per_unit = float(UsdGeom.GetStageMetersPerUnit(stage))
@@ -142,27 +154,6 @@ def _value(attribute: Any) -> Any:
 
     value = attribute.Get()
     return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
-
-
-def _choose(stage: Any, prim: str | None) -> list[Any]:
-    from pxr import Usd, UsdGeom
-
-    meshes = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
-    paths = [str(p.GetPath()) for p in meshes]
-    if not meshes:
-        raise InputError("holds no mesh prim")
-    if prim == ALL_PRIMS:
-        return meshes
-    if prim is None:
-        if len(meshes) > 1:
-            some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
-            raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
-        return meshes
-    found = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
-    if len(found) != 1:
-        what = "is not a mesh prim" if not found else "names several mesh prims"
-        raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
-    return found
 
 
 def _faces(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IndexArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
 from warpflat.surface.connectivity import border_loops
@@ -146,8 +146,11 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
     turn = np.asarray(np.pi - np.bincount(sides.tail, angle, minlength=len(x))[loop])
     if len(set(at.values())) == 4 and turn[list(at.values())].min() > _CORNER:
         return at
-    sharp = _four_sharpest(turn)
-    if sharp is not None:
+    order = np.argsort(-turn, kind="stable")
+    least = float(turn[order[3]]) if len(turn) > 3 else 0.0
+    if least >= _CORNER and not (len(turn) > 4 and turn[order[4]] > _SHARPER * least):
+        # There are four corners, and the border hardly turns anywhere else.
+        sharp = np.sort(order[:4])
         # The sides between four corners lie where their names say. Of each the mean place, weighed by length.
         middle = np.empty((4, 3))
         for k in range(4):
@@ -199,15 +202,6 @@ def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int)
     distance = np.abs(station[:-1] - station[place])
     near = np.minimum(distance, station[-1] - distance) < _NEAR * station[-1]
     return int(np.argmax(np.where(near, turn, -np.inf)))
-
-
-def _four_sharpest(turn: FloatArray) -> IndexArray | None:
-    """Return the positions of four corners, in order, of a border that hardly turns anywhere else; None for any other border."""
-    order = np.argsort(-turn, kind="stable")
-    least = float(turn[order[3]]) if len(turn) > 3 else 0.0
-    if least < _CORNER or (len(turn) > 4 and turn[order[4]] > _SHARPER * least):
-        return None
-    return np.sort(order[:4])
 
 
 def _standing(surface: Surface) -> tuple[FloatArray, FloatArray]:

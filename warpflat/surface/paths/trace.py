@@ -186,7 +186,16 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
         if len(end) > 1:
             stop = size + len(inserted)
             inserted[stop] = end
-            triangles = _insert(triangles, stop, end)
+            # A vertex inside a triangle or on an edge divides the triangles at its place.
+            hit = np.isin(triangles, list(end)).sum(axis=1) == len(end)
+            parts = []
+            for corner in range(3):
+                # A part for each corner that the point has a share in: that corner gives way to the new vertex.
+                shares = hit & np.isin(triangles[:, corner], list(end))
+                piece = triangles[shares]
+                piece[:, corner] = stop
+                parts.append(piece)
+            triangles = np.concatenate([triangles[~hit], *parts])
         stops.append(stop)
     extra = [sum(w * surface.vertices[v] for v, w in place.items()) for place in inserted.values()]
     positions = np.concatenate([surface.vertices, np.reshape(extra, (-1, 3))])
@@ -274,19 +283,6 @@ class VertexStar:
         for vertex in rest:
             found = found[(self.triangles[found] == vertex).any(axis=1)]
         return [int(t) for t in found]
-
-
-def _insert(triangles: IntArray, new: int, place: Place) -> IntArray:
-    """Insert a vertex inside a triangle or on an edge, and return the triangles, of which those at that place are divided."""
-    hit = np.isin(triangles, list(place)).sum(axis=1) == len(place)
-    parts = []
-    for corner in range(3):
-        # A part for each corner that the point has a share in: that corner gives way to the new vertex.
-        shares = hit & np.isin(triangles[:, corner], list(place))
-        part = triangles[shares]
-        part[:, corner] = new
-        parts.append(part)
-    return np.concatenate([triangles[~hit], *parts])
 
 
 def _in_old_vertices(place: Place, inserted: dict[int, Place]) -> Place:
