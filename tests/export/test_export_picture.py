@@ -16,7 +16,6 @@ from warpflat.export.labels import (
     LabelRoom,
     Spot,
     leader_line,
-    points_on,
     space_out,
     spots_along,
     spots_beside,
@@ -432,7 +431,7 @@ def test_labels_do_not_overlap() -> None:
 
 
 def test_labels_avoid_other_lines_where_they_can() -> None:
-    crossing = points_on(np.array([[1.0, 0.0], [1.0, 2.0]]), 0.05)
+    crossing = [np.array([[1.0, 0.0], [1.0, 2.0]])]
     spots = [Spot(x=1.0, y=1.0, angle=0.0), Spot(x=2.0, y=1.0, angle=0.0)]
     room = LabelRoom()
     assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), crossing) == spots[1]
