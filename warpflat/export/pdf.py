@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,9 +32,6 @@ from warpflat.pattern.layout import Placed, Sheet, lay_out, nests, occupied_poin
 from warpflat.pattern.sewing_order import seam_letters
 from warpflat.pattern.tile_nesting import nest_on_tiles
 from warpflat.pattern.words import printed_in, translate
-
-if TYPE_CHECKING:
-    from reportlab.pdfgen.canvas import Canvas
 
 __all__ = ["PAPERS", "write_pdf"]
 
@@ -128,6 +125,7 @@ def _pages(
         guide: whether the legend and the guide come first.
     """
     from reportlab.pdfbase import pdfmetrics
+    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
     kind, stream = tiling.paper, BytesIO()
@@ -137,73 +135,10 @@ def _pages(
     canvas.setTitle(f"{whole.name}, {' / '.join(chosen)}")
     canvas.setCreator("warpflat")
     canvas.setViewerPreference("PrintScaling", "None")
-    _sheet_form(canvas, tiling, printed, chosen)
-    if guide:
-        legend_page(canvas, printed, chosen, tiling.sheet, tiling)
-        guide_pages(canvas, whole, printed, kind)
-    for row, column in tiling.tiles:
-        _tile(canvas, tiling, row, column, whole.name.replace("_", " "))
-    if len(chosen) > 1:
-        _name_layers(canvas, chosen)
-    canvas.save()
-    return stream.getvalue()
-
-
-def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
-    """Return a layout that needs few pages."""
-    if paper.tiled:
-        sheet = _nested(groups, paper)
-        return sheet, make_tiling(sheet, paper)
-    if paper.endless:
-        widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
-        sheet = lay_out(groups, width=max(PROJECTED_WIDTH, widest + 0.05), gap=0.016, reserved=LEGEND_SIZE)
-        width, height = sheet.size + 2 * paper.margin + paper.overlap
-        paper = replace(paper, width=float(width), height=float(height))
-        return sheet, make_tiling(sheet, paper)
-    width = paper.step[0] + paper.overlap
-    sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
-    return sheet, make_tiling(sheet, paper)
-
-
-def _nested(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet:
-    """Return pieces, turned where that helps, on the tiles of a grid, of which they take few."""
-    import shapely
-
-    shapes = []
-    for group in groups:
-        label = nest_label(group)
-        parts = [shapely.Polygon(piece.cut_line) for piece in group]
-        # A label beside its piece belongs to it, with all between.
-        shape = shapely.union_all(parts)
-        if label.leader is not None:
-            shape = shapely.union_all([*parts, shapely.Polygon(label.box)]).convex_hull
-        shapes.append(shape)
-    places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
-    placed = []
-    for group, shape, place in zip(groups, shapes, places, strict=True):
-        quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
-        turn = np.linalg.matrix_power(quarter, place.quarters)
-        corners = np.asarray(shapely.get_coordinates(shape)) @ turn.T
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        matrix = np.column_stack([turn, place.corner - low])
-        box = np.stack([place.corner, place.corner + high - low])
-        placed.append(Placed(pieces=group, matrix=matrix, box=box))
-    return Sheet(placed=tuple(placed), size=size)
-
-
-def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
-    """Return a piece whose label is turned round where it would stand on its head on the sheet."""
-    turn = float(np.degrees(piece.label.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
-    if -89.5 < (turn + 180.0) % 360.0 - 180.0 < 90.5:
-        return piece
-    return replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
-
-
-def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: Sequence[str]) -> None:
-    """Draw the whole sheet once, as a form; every page shows its part of it."""
+    # The whole sheet is drawn once, as a form; every page shows its part of it.
     border, sheet = 0.05, tiling.sheet
     low, high = np.array([-border, -3.0]), sheet.size + 3.0
-    letters = seam_letters(garment)
+    letters = seam_letters(printed)
     widen = tiling.paper.line_width
     canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
     for placed in sheet.placed:
@@ -219,7 +154,7 @@ def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: 
             for words in (words for words in drawing.words if not words.tag):
                 _words(canvas, words, placed.matrix, "#000000")
             if nested:
-                canvas._code.append(f"/OC /size{sizes.index(drawing.piece.size)} BDC")
+                canvas._code.append(f"/OC /size{chosen.index(drawing.piece.size)} BDC")
             for stroke in of_size:
                 _stroke(canvas, stroke, placed.matrix, index, widen)
             for words in (words for words in drawing.words if words.tag):
@@ -227,31 +162,77 @@ def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: 
             if nested:
                 canvas._code.append("EMC")
     if sheet.reserved is not None:
-        draw_legend(canvas, sheet.reserved, garment, sizes, tiling.paper.name)
+        draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
     canvas.endForm()
+    if guide:
+        legend_page(canvas, printed, chosen, tiling.sheet, tiling)
+        guide_pages(canvas, whole, printed, kind)
+    for row, column in tiling.tiles:
+        _tile(canvas, tiling, row, column, whole.name.replace("_", " "))
+    if len(chosen) > 1:
+        # The layers of the sheet, one a size, are optional content that readers list and can hide.
+        document = canvas._doc
+        groups = {
+            f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
+            for k, size in enumerate(chosen)
+        }
+        form = document.idToObject[xObjectName("sheet")]
+        form.Resources = PDFResourceDictionary(Properties=groups)
+        form.Resources.basicFonts()
+        order = PDFArray(list(groups.values()))
+        catalog = document.Catalog
+        catalog.OCProperties = PDFDictionary(
+            {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
+        )
+        catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
+    canvas.save()
+    return stream.getvalue()
 
 
-def _name_layers(canvas: Any, sizes: Sequence[str]) -> None:
-    """Declare the layers of the sheet, one a size, as optional content that readers list and can hide.
+def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
+    """Return a layout that needs few pages."""
+    import shapely
 
-    reportlab has no call for this; the entries are those of ISO 32000-1, 8.11.
-    """
-    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
+    if paper.tiled:
+        # Pieces, turned where that helps, on the tiles of a grid, of which they take few.
+        shapes = []
+        for group in groups:
+            label = nest_label(group)
+            parts = [shapely.Polygon(piece.cut_line) for piece in group]
+            # A label beside its piece belongs to it, with all between.
+            shape = shapely.union_all(parts)
+            if label.leader is not None:
+                shape = shapely.union_all([*parts, shapely.Polygon(label.box)]).convex_hull
+            shapes.append(shape)
+        places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
+        placed = []
+        for group, shape, place in zip(groups, shapes, places, strict=True):
+            quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+            turn = np.linalg.matrix_power(quarter, place.quarters)
+            corners = np.asarray(shapely.get_coordinates(shape)) @ turn.T
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            matrix = np.column_stack([turn, place.corner - low])
+            box = np.stack([place.corner, place.corner + high - low])
+            placed.append(Placed(pieces=group, matrix=matrix, box=box))
+        sheet = Sheet(placed=tuple(placed), size=size)
+        return sheet, make_tiling(sheet, paper)
+    if paper.endless:
+        widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
+        sheet = lay_out(groups, width=max(PROJECTED_WIDTH, widest + 0.05), gap=0.016, reserved=LEGEND_SIZE)
+        width, height = sheet.size + 2 * paper.margin + paper.overlap
+        paper = replace(paper, width=float(width), height=float(height))
+        return sheet, make_tiling(sheet, paper)
+    width = paper.step[0] + paper.overlap
+    sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
+    return sheet, make_tiling(sheet, paper)
 
-    document = canvas._doc
-    groups = {
-        f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
-        for k, size in enumerate(sizes)
-    }
-    form = document.idToObject[xObjectName("sheet")]
-    form.Resources = PDFResourceDictionary(Properties=groups)
-    form.Resources.basicFonts()
-    order = PDFArray(list(groups.values()))
-    catalog = document.Catalog
-    catalog.OCProperties = PDFDictionary(
-        {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
-    )
-    catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
+
+def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
+    """Return a piece whose label is turned round where it would stand on its head on the sheet."""
+    turn = float(np.degrees(piece.label.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
+    if -89.5 < (turn + 180.0) % 360.0 - 180.0 < 90.5:
+        return piece
+    return replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
 
 
 def _stroke(canvas: Any, stroke: Stroke, matrix: FloatArray, size_index: int | None, widen: float = 1.0) -> None:

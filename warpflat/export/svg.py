@@ -12,7 +12,6 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.output import atomic_path
 from warpflat.core.text import control_in, format_count, size_words
-from warpflat.pattern.curves import Curve
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.drawing import Drawing, Stroke, draw_nest, grain_strokes
 from warpflat.pattern.label import CAPITALS, LEADING, Words, text_width
@@ -175,7 +174,15 @@ class SvgPage:
         if stroke.hidden:
             attributes["display"] = "none"
         if stroke.curve is not None:
-            attributes["d"] = self._bezier(stroke.curve.transformed(matrix))
+            curve = stroke.curve.transformed(matrix)
+            control = self._page(curve.bezier.reshape(-1, 2)).reshape(-1, 4, 2)
+            text = ["M" + _pair(control[0, 0])]
+            for segment, straight in zip(control, curve.straight, strict=True):
+                if straight:
+                    text.append("L" + _pair(segment[3]))
+                else:
+                    text.append("C" + " ".join(_pair(p) for p in segment[1:]))
+            attributes["d"] = " ".join(text)
         else:
             points = self._page(stroke.points @ matrix[:, :2].T + matrix[:, 2])
             attributes["d"] = "M" + " L".join(_pair(p) for p in points) + (" Z" if stroke.closed else "")
@@ -235,17 +242,6 @@ class SvgPage:
     def _page(self, points: FloatArray) -> FloatArray:
         """Return points [m] in the millimetres of the page, y downwards."""
         return np.column_stack([points[:, 0] * 1000, self.height - points[:, 1] * 1000])
-
-    def _bezier(self, curve: Curve) -> str:
-        """Return a curve as path data."""
-        control = self._page(curve.bezier.reshape(-1, 2)).reshape(-1, 4, 2)
-        text = ["M" + _pair(control[0, 0])]
-        for segment, straight in zip(control, curve.straight, strict=True):
-            if straight:
-                text.append("L" + _pair(segment[3]))
-            else:
-                text.append("C" + " ".join(_pair(p) for p in segment[1:]))
-        return " ".join(text)
 
     def _id(self, name: str) -> str:
         """Return a valid id that no other element has."""

@@ -98,28 +98,23 @@ def _corner_allowance(
     sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, after: int, body: Polygon
 ) -> list[Geometry]:
     """Return what is added where two edges meet; a folded hem's strips are trimmed in place."""
+    import shapely
+
     side, follows = sides[index], sides[after]
     if not isinstance(side, Side) or not isinstance(follows, Side):
         return []
     end = find_hem_end(sides, index, after)
     if end is not None:
         far = index - 1 if end.hem == index else (after + 1) % len(sides)
-        return fold_hem(end, strips, body, _outside_of(sides, strips, far))
+        far_side = sides[far]
+        if isinstance(far_side, Side):
+            outside = strips[far]
+        else:
+            outside = shapely.Polygon(np.concatenate([far_side.left, far_side.right[1:]])).buffer(0)
+        return fold_hem(end, strips, body, outside)
     a, b = unit_vector(side.points[-1] - side.points[-2]), unit_vector(follows.points[1] - follows.points[0])
     fill = corner_fill(side.points[-1], a, b, side.width, follows.width)
     return [] if fill is None else [fill]
-
-
-def _outside_of(sides: Sequence[Side | Wedge], strips: Sequence[Geometry], index: int) -> Geometry:
-    """Return the cloth outside the outline at a side: an edge's strip, or a dart's wedge."""
-    import shapely
-
-    side = sides[index]
-    return (
-        strips[index]
-        if isinstance(side, Side)
-        else shapely.Polygon(np.concatenate([side.left, side.right[1:]])).buffer(0)
-    )
 
 
 def cut_hole(ring: FloatArray, width: float) -> FloatArray | None:

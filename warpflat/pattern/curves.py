@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray, IndexArray
+from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length, segment_lengths, turning_angles
 
 __all__ = ["Curve", "adjust_lengths", "chords", "fit_curve"]
@@ -105,7 +105,8 @@ def fit_curve(
         lengths: #P, the wanted length [m] of the curve up to each point; None for that of the chords.
         near: keep within the tolerance everywhere, and the chords' length only as far as that allows.
     """
-    keep = _distinct(points)
+    apart = np.concatenate([[True], segment_lengths(points) > 1e-9])
+    keep = np.flatnonzero(apart) if apart.sum() > 1 else np.array([0, len(points) - 1])
     clean = points[keep]
     clean[-1] = points[-1]
     wanted = None if lengths is None else lengths[keep]
@@ -138,11 +139,6 @@ def _corners(points: FloatArray, tolerance: float) -> list[int]:
         if abs(float(turning_angles(np.stack([near, points[i], far]))[0])) > sharp:
             corners.append(i)
     return corners
-
-
-def _distinct(points: FloatArray) -> IndexArray:
-    keep = np.concatenate([[True], segment_lengths(points) > 1e-9])
-    return np.flatnonzero(keep) if keep.sum() > 1 else np.array([0, len(points) - 1])
 
 
 def _within_tolerance(curve: Curve, points: FloatArray, tolerance: float) -> Curve:

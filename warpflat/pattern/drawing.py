@@ -143,7 +143,15 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             label = nest_label(pieces)
             strokes += [*grain_strokes(piece.grain), *_internal_strokes(piece), *_leader_strokes(label)]
             sizes = ", ".join(p.size for p in pieces)
-            words += [*_list_sizes(label, piece.size, sizes), *_line_names(piece, borders=False, joints=joints)]
+            # The label names all sizes in place of its own, no wider than it is.
+            rows = label.words()
+            for number, row in enumerate(rows):
+                one_size, all_sizes = translate("size {size}", size=piece.size), translate("sizes {sizes}", sizes=sizes)
+                if row.text == one_size[0].upper() + one_size[1:]:
+                    text = all_sizes[0].upper() + all_sizes[1:]
+                    height = row.height * min(1.0, label.width / text_width(text, row.height))
+                    rows[number] = replace(row, text=text, height=height)
+            words += [*rows, *_line_names(piece, borders=False, joints=joints)]
             words += _notch_letters(piece, paper)
             for fold in piece.fold_edges:
                 fold_strokes, fold_words = _fold_bracket(fold, joints)
@@ -321,7 +329,19 @@ def _place_name(name: str, line: FloatArray, obstacles: Geometry, *, inwards: bo
     for share in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
         if not half <= share * length <= length - half:
             continue
-        words = _words_along(name, line, share, half, inwards=inwards)
+        # The name stands above its line, or to the left of a border (`inwards`).
+        near, far = resample(line, share - half / length), resample(line, share + half / length)
+        along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+        left = np.array([-along[1], along[0]])
+        # Upright, and steep ones read upwards.
+        if along[0] < -0.2 or (abs(along[0]) <= 0.2 and along[1] < 0):
+            along = -along
+        aside = left if inwards else np.array([-along[1], along[0]])
+        # Clear of the whole stretch, however it bends.
+        stretch = [resample(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
+        bulge = max(float((point - near) @ aside) for point in stretch)
+        at = (near + far) / 2 + (bulge + NAME_GAP) * aside
+        words = Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
         distance = float(obstacles.distance(_text_box(words)))
         if distance > clear:
             clear, chosen = distance, words
@@ -338,23 +358,6 @@ def _text_box(words: Words) -> Polygon:
     cosine, sine = np.cos(words.angle), np.sin(words.angle)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     return shapely.Polygon(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ turn.T)
-
-
-def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwards: bool) -> Words:
-    """Write a name beside a line, upright: above it, or to its left (`inwards`) if the line is a border."""
-    length = max(float(arc_lengths(line)[-1]), 1e-12)
-    near, far = resample(line, share - half / length), resample(line, share + half / length)
-    along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
-    left = np.array([-along[1], along[0]])
-    # Upright, and steep ones read upwards.
-    if along[0] < -0.2 or (abs(along[0]) <= 0.2 and along[1] < 0):
-        along = -along
-    aside = left if inwards else np.array([-along[1], along[0]])
-    # Clear of the whole stretch, however it bends.
-    stretch = [resample(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
-    bulge = max(float((point - near) @ aside) for point in stretch)
-    at = (near + far) / 2 + (bulge + NAME_GAP) * aside
-    return Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
 
 
 def grain_strokes(grain: FloatArray) -> list[Stroke]:
@@ -398,18 +401,6 @@ def _fold_bracket(edge: DraftedEdge, joints: Sequence[FloatArray] = ()) -> tuple
 
 def _leader_strokes(label: Label) -> list[Stroke]:
     return [] if label.leader is None else [Stroke(role="leader", name="", points=label.leader)]
-
-
-def _list_sizes(label: Label, size: str, sizes: str) -> list[Words]:
-    """Return the label's words with all sizes in place of its own, no wider than the label is."""
-    words = label.words()
-    for index, row in enumerate(words):
-        one_size, all_sizes = translate("size {size}", size=size), translate("sizes {sizes}", sizes=sizes)
-        if row.text == one_size[0].upper() + one_size[1:]:
-            text = all_sizes[0].upper() + all_sizes[1:]
-            height = row.height * min(1.0, label.width / text_width(text, row.height))
-            words[index] = replace(row, text=text, height=height)
-    return words
 
 
 def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[Words]:

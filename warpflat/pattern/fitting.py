@@ -67,7 +67,27 @@ def fit_edges(
         for first, second, against, ease in _paired_edges(pieces, seams):
             wide = max(fitted[first][1], fitted[second][1])
             if wide > TOLERANCE and len(lines[first]) == len(lines[second]):
-                fitted[first], fitted[second] = _fit_ragged_seam(lines[first], lines[second], against, ease)
+                # Both sides of a ragged seam are smoothed, and get the lengths of the one that is then shorter.
+                sides = [lines[first], lines[second][::-1] if against else lines[second]]
+                longer = np.array([1.0, 1.0 + ease])
+                # A short zigzag may have no smooth line of the right length: a wiggle is better than a seam that does not match.
+                found, used = [fit_curve(side) for side in sides], TOLERANCES[-1]
+                for width in TOLERANCES[1:]:
+                    reached = [
+                        _lengths_along(fit_curve(side, width), side) / share
+                        for side, share in zip(sides, longer, strict=True)
+                    ]
+                    lengths = min(reached, key=lambda places: float(places[-1]))
+                    curves = [
+                        fit_curve(side, width, lengths=lengths * share)
+                        for side, share in zip(sides, longer, strict=True)
+                    ]
+                    difference = abs(curves[1].length - curves[0].length * longer[1])
+                    if difference <= SAFE * LOCAL_TOLERANCE:
+                        found, used = curves, width
+                    if difference <= EQUAL and not any(map(_ragged, curves)):
+                        break
+                fitted[first], fitted[second] = (found[0], used), (found[1].reversed() if against else found[1], used)
     _keep_near(pieces, lines, seams, fitted, tolerance)
     for piece in pieces:
         # Curves that cross themselves or each other are replaced by their chords.
@@ -215,30 +235,6 @@ def _paired_edges(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tu
     for piece in pieces:
         for dart in piece.darts:
             yield (piece.name, dart.left), (piece.name, dart.right), True, 0.0
-
-
-def _fit_ragged_seam(
-    first: FloatArray, second: FloatArray, against: bool, ease: float
-) -> tuple[tuple[Curve, float], tuple[Curve, float]]:
-    """Smooth both sides of a ragged seam, and give both the lengths of the one that is then shorter."""
-    sides = [first, second[::-1] if against else second]
-    longer = np.array([1.0, 1.0 + ease])
-    # A short zigzag may have no smooth line of the right length: a wiggle is better than a seam that does not match.
-    found, used = [fit_curve(side) for side in sides], TOLERANCES[-1]
-    for tolerance in TOLERANCES[1:]:
-        reached = [
-            _lengths_along(fit_curve(side, tolerance), side) / share for side, share in zip(sides, longer, strict=True)
-        ]
-        lengths = min(reached, key=lambda places: float(places[-1]))
-        curves = [
-            fit_curve(side, tolerance, lengths=lengths * share) for side, share in zip(sides, longer, strict=True)
-        ]
-        difference = abs(curves[1].length - curves[0].length * longer[1])
-        if difference <= SAFE * LOCAL_TOLERANCE:
-            found, used = curves, tolerance
-        if difference <= EQUAL and not any(map(_ragged, curves)):
-            break
-    return (found[0], used), (found[1].reversed() if against else found[1], used)
 
 
 def _lengths_along(curve: Curve, points: FloatArray) -> FloatArray:

@@ -123,7 +123,27 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     if len(set(names.values())) < len(names):
         names = {name: name for name in names}
     edges = [replace(edge, edge=replace(edge.edge, name=names[edge.name])) for edge in edges]
-    edges.append(_fold_edge(piece, edges[-1].line[-1], edges[0].line[0], {edge.name for edge in edges}))
+    # The edge along the axis is named as the line of the piece that lies there.
+    start, end = edges[-1].line[-1], edges[0].line[0]
+    taken = {edge.name for edge in edges}
+    candidates = [
+        name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - _axis(piece)).max() < INNER
+    ]
+    name = next((name for name in candidates if name not in taken), "fold")
+    thirds = np.stack([start + k / 3 * (end - start) for k in range(4)])
+    curve = Curve(bezier=thirds[None], straight=np.array([True]))
+    edge = Edge(name=name, points=np.stack([start, end]), kind="fold")
+    edges.append(
+        DraftedEdge(
+            edge=edge,
+            curve=curve,
+            line=np.stack([start, end]),
+            width=0.0,
+            places=np.array([0.0, float(np.linalg.norm(end - start))]),
+            fit_error=0.0,
+            tolerance=0.0,
+        )
+    )
     darts = [
         replace(dart.dart, name=without_side(dart.dart.name), left=names[dart.dart.left], right=names[dart.dart.right])
         for dart in piece.darts
@@ -241,21 +261,3 @@ def _with_curve(edge: DraftedEdge, curve: Curve) -> DraftedEdge:
     shortened = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
     places = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     return replace(edge, edge=shortened, curve=curve, line=line, places=places)
-
-
-def _fold_edge(piece: DraftedPiece, start: FloatArray, end: FloatArray, taken: set[str]) -> DraftedEdge:
-    """Return the edge along the axis, named as the line of the piece that lies there."""
-    names = [name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - _axis(piece)).max() < INNER]
-    name = next((name for name in names if name not in taken), "fold")
-    thirds = np.stack([start + k / 3 * (end - start) for k in range(4)])
-    curve = Curve(bezier=thirds[None], straight=np.array([True]))
-    edge = Edge(name=name, points=np.stack([start, end]), kind="fold")
-    return DraftedEdge(
-        edge=edge,
-        curve=curve,
-        line=np.stack([start, end]),
-        width=0.0,
-        places=np.array([0.0, float(np.linalg.norm(end - start))]),
-        fit_error=0.0,
-        tolerance=0.0,
-    )

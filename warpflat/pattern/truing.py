@@ -245,7 +245,12 @@ def turned_end(curve: Curve, turn: float, reach: float, *, keep_length: bool) ->
         reach: over which it may move [m].
         keep_length: whether its length is kept.
     """
-    reach = min(reach, _first_kink(curve))
+    # An end moves up to the first corner inside the curve at most.
+    arrive, leave = curve.bezier[:-1, 3] - curve.bezier[:-1, 2], curve.bezier[1:, 1] - curve.bezier[1:, 0]
+    angle = np.arctan2(arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0], np.einsum("ij,ij->i", arrive, leave))
+    kinks = np.flatnonzero(np.abs(angle) > KINK)
+    count = int(kinks[0]) + 1 if len(kinks) else len(curve.bezier)
+    reach = min(reach, Curve(bezier=curve.bezier[:count], straight=curve.straight[:count]).length)
     slope = float(np.tan(turn))
     peak = 4.0 / 27.0
     reach = min(reach, max(LEAST_REACH, STRAY / (peak * max(abs(slope), 1e-9))))
@@ -271,15 +276,6 @@ def _move(slope: float, back: float | FloatArray, reach: float, u: FloatArray) -
     move = reach * slope * u * (1 - u) ** 2 * (1 - back * u)
     rate = slope * ((1 - u) * (1 - 3 * u) * (1 - back * u) - back * u * (1 - u) ** 2)
     return move, rate
-
-
-def _first_kink(curve: Curve) -> float:
-    """Return the length [m] up to the first corner inside a curve, or up to its end."""
-    arrive, leave = curve.bezier[:-1, 3] - curve.bezier[:-1, 2], curve.bezier[1:, 1] - curve.bezier[1:, 0]
-    turn = np.arctan2(arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0], np.einsum("ij,ij->i", arrive, leave))
-    kinks = np.flatnonzero(np.abs(turn) > KINK)
-    count = int(kinks[0]) + 1 if len(kinks) else len(curve.bezier)
-    return Curve(bezier=curve.bezier[:count], straight=curve.straight[:count]).length
 
 
 class _Stretch:

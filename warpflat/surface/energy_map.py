@@ -346,42 +346,31 @@ def _place(
     marks = {name: _landmark(surface, name, place) for name, place in landmarks.items()}
     to_lines = _by_distance({name: float(np.linalg.norm(offset)) for name, offset in offsets.items()})
     to_marks = _by_distance({name: float(np.linalg.norm(mark - here)) for name, mark in marks.items()})
+    # For example "4 mm above bust line, 12 mm from princess front; 13 mm from bust point".
+    phrases = []
+    for name, distance in list(to_lines.items())[:2]:
+        if distance < 1e-3:
+            phrases.append(f"on {name}")
+            continue
+        rise = -float(offsets[name] @ upwards / norm) / distance
+        # Within 45 degrees of the vertical a line lies above or below, else beside.
+        side = "above" if rise > np.sqrt(0.5) else "below" if rise < -np.sqrt(0.5) else "from"
+        phrases.append(f"{distance * 1e3:.0f} mm {side} {name}")
+    words = ", ".join(phrases)
+    if to_marks:
+        name, distance = next(iter(to_marks.items()))
+        mark = f"at {name}" if distance < 1e-3 else f"{distance * 1e3:.0f} mm from {name}"
+        words = f"{words}; {mark}" if words else mark
+    if not words:
+        words = f"vertex {vertex} at ({', '.join(f'{x:.3f}' for x in here)}) m"
     return EnergyPeak(
         vertex=vertex,
         position=here.copy(),
         density=density,
         lines=to_lines,
         landmarks=to_marks,
-        words=_in_words(vertex, here, offsets, to_lines, to_marks, upwards / norm),
+        words=words,
     )
-
-
-def _in_words(
-    vertex: int,
-    here: FloatArray,
-    offsets: Mapping[str, FloatArray],
-    lines: Mapping[str, float],
-    landmarks: Mapping[str, float],
-    up: FloatArray,
-) -> str:
-    """Return words such as "4 mm above bust line, 12 mm from princess front; 13 mm from bust point"."""
-    phrases = []
-    for name, distance in list(lines.items())[:2]:
-        if distance < 1e-3:
-            phrases.append(f"on {name}")
-            continue
-        rise = -float(offsets[name] @ up) / distance
-        # Within 45 degrees of the vertical a line lies above or below, else beside.
-        side = "above" if rise > np.sqrt(0.5) else "below" if rise < -np.sqrt(0.5) else "from"
-        phrases.append(f"{distance * 1e3:.0f} mm {side} {name}")
-    words = ", ".join(phrases)
-    if landmarks:
-        name, distance = next(iter(landmarks.items()))
-        mark = f"at {name}" if distance < 1e-3 else f"{distance * 1e3:.0f} mm from {name}"
-        words = f"{words}; {mark}" if words else mark
-    if not words:
-        words = f"vertex {vertex} at ({', '.join(f'{x:.3f}' for x in here)}) m"
-    return words
 
 
 def _by_distance(distances: Mapping[str, float]) -> dict[str, float]:

@@ -139,7 +139,34 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
             raise InputError(f"edge {_edge(chain, int(again[0]))} is cut by two paths; leave it out of one of them")
         marked[edge] = True
 
-    vertex, origin, fans = _double(he, marked, on_path, [left for left, _ in sides], vertex_count)
+    # Each fan of faces around a vertex on a path gets a vertex of its own.
+    by_edge = np.argsort(he.edge, kind="stable")
+    same = (he.edge[by_edge[1:]] == he.edge[by_edge[:-1]]) & ~marked[he.edge[by_edge[1:]]]
+    a, b = by_edge[:-1][same], by_edge[1:][same]
+    # Wound consistently, one face's half-edge starts where the other's ends.
+    rows, columns = np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b])
+    fan = join_labels(len(he.tail), rows, columns)
+
+    vertex = he.tail.copy()
+    keep: dict[int, int] = {}
+    for half in np.concatenate([left for left, _ in sides]).tolist():
+        for corner in (half, int(he.next[half])):
+            keep.setdefault(int(he.tail[corner]), int(fan[corner]))
+    at_path = np.flatnonzero(np.isin(he.tail, on_path))
+    copies: list[int] = []
+    given: dict[int, int] = {}
+    fans = dict.fromkeys(on_path.tolist(), 0)
+    for corner in at_path.tolist():
+        old, group = int(he.tail[corner]), int(fan[corner])
+        if group not in given:
+            fans[old] += 1
+            if keep.setdefault(old, group) == group:
+                given[group] = old
+            else:
+                given[group] = vertex_count + len(copies)
+                copies.append(old)
+        vertex[corner] = given[group]
+    origin = np.append(np.arange(vertex_count), copies).astype(np.int32)
     new_faces = faces.copy()
     new_faces[near[he.face], he.slot] = vertex
     seams: list[Seam] = []
@@ -267,54 +294,6 @@ def _sides(
             "only and nothing to separate; start the path where it leaves the border"
         )
     return left, right
-
-
-def _double(
-    he: HalfEdges,
-    marked: BoolArray,
-    on_path: IntArray,
-    left: Sequence[IndexArray],
-    vertex_count: int,
-) -> tuple[IntArray, IntArray, dict[int, int]]:
-    """Give each fan of faces around a vertex on a path a vertex of its own.
-
-    Args:
-        he: half-edges of all faces that touch a path vertex.
-        marked: #E, the edges to cut.
-        on_path: the path vertices, sorted.
-        left: the half-edges on the left of each path: the left side keeps the old numbers.
-        vertex_count: #V.
-
-    Returns:
-        #H, the new vertex at each corner; #W, vertex_origin; the number of fans at each path vertex.
-    """
-    by_edge = np.argsort(he.edge, kind="stable")
-    same = (he.edge[by_edge[1:]] == he.edge[by_edge[:-1]]) & ~marked[he.edge[by_edge[1:]]]
-    a, b = by_edge[:-1][same], by_edge[1:][same]
-    # Wound consistently, one face's half-edge starts where the other's ends.
-    rows, columns = np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b])
-    fan = join_labels(len(he.tail), rows, columns)
-
-    vertex = he.tail.copy()
-    keep: dict[int, int] = {}
-    for half in np.concatenate(left).tolist():
-        for corner in (half, int(he.next[half])):
-            keep.setdefault(int(he.tail[corner]), int(fan[corner]))
-    at_path = np.flatnonzero(np.isin(he.tail, on_path))
-    copies: list[int] = []
-    given: dict[int, int] = {}
-    fans = dict.fromkeys(on_path.tolist(), 0)
-    for corner in at_path.tolist():
-        old, group = int(he.tail[corner]), int(fan[corner])
-        if group not in given:
-            fans[old] += 1
-            if keep.setdefault(old, group) == group:
-                given[group] = old
-            else:
-                given[group] = vertex_count + len(copies)
-                copies.append(old)
-        vertex[corner] = given[group]
-    return vertex, np.append(np.arange(vertex_count), copies).astype(np.int32), fans
 
 
 def _kind(

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.surface.cut.dart_legs import check_tip_back
@@ -220,7 +220,17 @@ def shape_dart(
         if rolled[1 % len(rolled)] == side[1]:
             rolled = np.roll(rolled[::-1], 1)
         run = rolled[: len(rolled) // 2]
-        points, touched = _with_start_moved(x[run], end, blend)
+        # The first point moves to `end`, and the next ones less and less over `blend` [m].
+        line = x[run]
+        reach = arc_lengths(line)
+        fade = (
+            np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0)
+            if blend > 0
+            else np.zeros(len(reach))
+        )
+        fade[0] = 1.0
+        points, touched = line + np.multiply.outer(fade, end - line[0]), fade > 0
+        points[0] = end
         beside.append(points)
         moved.update(zip(run[touched].tolist(), points[touched], strict=True))
     folded = 0 if fold == "left" else 1
@@ -237,18 +247,6 @@ def shape_dart(
         moved=np.array(list(moved), dtype=np.int32),
         moved_to=np.array(list(moved.values())).reshape(-1, 2),
     )
-
-
-def _with_start_moved(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArray, BoolArray]:
-    """Return a line with its first point moved to `end` and the next ones less and less over `blend` [m]; and #P, true for those moved."""
-    reach = arc_lengths(points)
-    fade = (
-        np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0) if blend > 0 else np.zeros(len(reach))
-    )
-    fade[0] = 1.0
-    moved = points + np.multiply.outer(fade, end - points[0])
-    moved[0] = end
-    return moved, fade > 0
 
 
 def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> FishEyeMeasure:

@@ -158,7 +158,11 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
             length = segment_lengths(points)
             middle[k] = np.average(0.5 * (points[1:] + points[:-1]), axis=0, weights=length)
         size = float(np.linalg.norm(np.ptp(surface.vertices[loop], axis=0)))
-        for right, up in (_standing(surface), viewing_frame(surface)[:2]):
+        # As it is seen by somebody who stands before the piece, also if it faces up or down; then as it faces.
+        towards, upright = viewing_frame(surface)[2] * [1.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0])
+        level = float(np.linalg.norm(towards))
+        standing = np.cross(upright, towards / level) if level > _FACING else np.array([1.0, 0.0, 0.0])
+        for right, up in ((standing, upright), viewing_frame(surface)[:2]):
             x, y = middle @ right, middle @ up
             # Beginning with each side in turn: bottom, right, top, left.
             fits = np.array([x[(k + 1) % 4] - x[(k + 3) % 4] + y[(k + 2) % 4] - y[k] for k in range(4)])
@@ -202,11 +206,3 @@ def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int)
     distance = np.abs(station[:-1] - station[place])
     near = np.minimum(distance, station[-1] - distance) < _NEAR * station[-1]
     return int(np.argmax(np.where(near, turn, -np.inf)))
-
-
-def _standing(surface: Surface) -> tuple[FloatArray, FloatArray]:
-    """Return right and up for somebody who stands before the piece, also if it faces up or down."""
-    towards, up = viewing_frame(surface)[2] * [1.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0])
-    size = float(np.linalg.norm(towards))
-    right = np.cross(up, towards / size) if size > _FACING else np.array([1.0, 0.0, 0.0])
-    return right, up

@@ -210,7 +210,23 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
             f"no straight path can be drawn from {describe_place(ends[0])} to {describe_place(ends[1])}: faces of the part meet in more "
             "than an edge; give triangles there"
         ) from None
-    walked = _retrace(positions, triangles, np.asarray(drawn), stops[0], stops[1])
+    # The vertex or edge on which each point of the path lies is found from triangle to triangle.
+    star = VertexStar(triangles)
+    walked: list[Place] = [{stops[0]: 1.0}]
+    for target in np.asarray(drawn)[1:-1]:
+        around = star.triangles[star.sharing(list(walked[-1]))]
+        edges = np.concatenate([around[:, [0, 1]], around[:, [1, 2]], around[:, [2, 0]]])
+        tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
+        share, distance = project_on_segments(target, tails, heads)
+        best = int(np.argmin(distance))
+        if distance[best] > 1e-6 * float(np.linalg.norm(heads - tails, axis=1).max()):
+            raise InputError(f"no straight path found near {describe_place(walked[-1])}: repair the triangles there")
+        walked.append(_tidy(edges[best].tolist(), [1.0 - share[best], share[best]]))
+    if not star.sharing([*walked[-1], stops[1]]):
+        raise InputError(
+            f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there"
+        )
+    walked.append({stops[1]: 1.0})
     return make_path(surface, simplify_places([_in_old_vertices(place, inserted) for place in walked]))
 
 
@@ -291,44 +307,6 @@ def _in_old_vertices(place: Place, inserted: dict[int, Place]) -> Place:
         for v, w in inserted.get(vertex, {vertex: 1.0}).items():
             old[v] = old.get(v, 0.0) + weight * w
     return _tidy(list(old), list(old.values()))
-
-
-def _retrace(
-    positions: FloatArray,
-    triangles: IntArray,
-    drawn: FloatArray,
-    start: int,
-    stop: int,
-) -> list[Place]:
-    """Find the vertex or edge on which each point of a path lies, from triangle to triangle.
-
-    The solver gives positions only. Each point lies on the border of the triangles around the one before.
-    """
-    star = VertexStar(triangles)
-    walked: list[Place] = [{start: 1.0}]
-    for target in drawn[1:-1]:
-        place, distance, size = _nearest_on_edges(positions, star, walked[-1], target)
-        if distance > 1e-6 * size:
-            raise InputError(f"no straight path found near {describe_place(walked[-1])}: repair the triangles there")
-        walked.append(place)
-    if not star.sharing([*walked[-1], stop]):
-        raise InputError(
-            f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there"
-        )
-    return [*walked, {stop: 1.0}]
-
-
-def _nearest_on_edges(
-    positions: FloatArray, star: VertexStar, here: Place, target: FloatArray
-) -> tuple[Place, float, float]:
-    """Return the nearest place on the edges of the triangles at `here`, its distance [m], and their longest edge [m]."""
-    around = star.triangles[star.sharing(list(here))]
-    edges = np.concatenate([around[:, [0, 1]], around[:, [1, 2]], around[:, [2, 0]]])
-    starts, ends = positions[edges[:, 0]], positions[edges[:, 1]]
-    share, distance = project_on_segments(target, starts, ends)
-    best = int(np.argmin(distance))
-    place = _tidy(edges[best].tolist(), [1.0 - share[best], share[best]])
-    return place, float(distance[best]), float(np.linalg.norm(ends - starts, axis=1).max())
 
 
 def describe_place(place: Place) -> str:
