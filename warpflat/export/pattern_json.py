@@ -481,7 +481,14 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
     darts = [
         Dart(name=d.name, left=d.left, right=d.right, fold_to=d.fold_to or None, pleat=d.pleat) for d in data.darts
     ]
-    cutouts = {key: _cutout(data, key) for key in data.cutouts}
+    cutouts = {
+        key: DraftedCutout(
+            sew_line=np.array(data.cutout_sew_lines.get(key, line)),
+            cut_line=np.array(line),
+            width=data.cutout_allowances.get(key, 0.0),
+        )
+        for key, line in data.cutouts.items()
+    }
     fisheyes = {key: np.array(line) for key, line in data.fisheye_darts.items()}
     internal_lines = {key: np.array(line) for key, line in data.internal_lines.items()}
     grain = np.array(data.grain)
@@ -534,7 +541,16 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
             for edge, d in zip(piece.edges, data.edges, strict=True)
         ),
         cut_line=np.array(data.cut_line),
-        darts=tuple(_dart(dart, d) for dart, d in zip(darts, data.darts, strict=True)),
+        darts=tuple(
+            DraftedDart(
+                dart=dart,
+                tip=np.array(d.tip),
+                fold=None if d.fold is None else np.array(d.fold),
+                fold_to=d.fold_to,
+                opening=d.opening,
+            )
+            for dart, d in zip(darts, data.darts, strict=True)
+        ),
         drill_holes=tuple(DrillHole(name=hole.name, at=np.array(hole.at)) for hole in data.drill_holes),
         notches=tuple(
             Notch(
@@ -561,20 +577,6 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         notes=tuple(data.notes),
         enlarged=(data.enlarged[0], data.enlarged[1]),
     )
-
-
-def _cutout(data: PieceEntry, name: str) -> DraftedCutout:
-    line = data.cutouts[name]
-    return DraftedCutout(
-        sew_line=np.array(data.cutout_sew_lines.get(name, line)),
-        cut_line=np.array(line),
-        width=data.cutout_allowances.get(name, 0.0),
-    )
-
-
-def _dart(dart: Dart, data: DartEntry) -> DraftedDart:
-    fold = None if data.fold is None else np.array(data.fold)
-    return DraftedDart(dart=dart, tip=np.array(data.tip), fold=fold, fold_to=data.fold_to, opening=data.opening)
 
 
 def _to_mesh(points: FloatArray, frame: FloatArray) -> FloatArray:

@@ -186,7 +186,10 @@ class DrawnView:
     def draw(self, axes: Any, face_colours: FloatArray) -> None:
         """Draw the coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
         left, bottom = (round(place * DPI) - _MARGIN for place in (self.left, self.bottom))
-        facets = self.view.facets
+        # Of a fine mesh each triangle has a normal, else each vertex.
+        facets, normals = self.view.facets, self.view.vectors
+        if normals is not None and not self._fine:
+            normals = vertex_normals(normals, facets.triangles, len(self.view.points))
         axes.add_artist(
             Pixels(
                 shade(
@@ -196,9 +199,7 @@ class DrawnView:
                     facets.triangles,
                     face_colours,
                     face=facets.face_of_triangle,
-                    lighting=Lighting(
-                        normals=self._normals(), at_vertices=not self._fine, direction=_LIGHT, back=_BACK
-                    ),
+                    lighting=Lighting(normals=normals, at_vertices=not self._fine, direction=_LIGHT, back=_BACK),
                 ),
                 left=left,
                 bottom=bottom,
@@ -267,13 +268,6 @@ class DrawnView:
         result[:, 1] = (self._rows - ((points[:, 1] - self._low[1]) * per_metre + _MARGIN)) * self._per_pixel
         result[:, 2] = points[:, 2]
         return result
-
-    def _normals(self) -> FloatArray | None:
-        """Return normals of any length at the vertices; of a fine mesh each triangle's own."""
-        vectors, facets = self.view.vectors, self.view.facets
-        if vectors is None or self._fine:
-            return vectors
-        return vertex_normals(vectors, facets.triangles, len(self.view.points))
 
     def _is_visible(self, spots: FloatArray) -> BoolArray:
         """Return whether points on the mesh (#N by 3, in samples) are in front, within the mesh's own slope."""

@@ -206,7 +206,9 @@ def _texts(entities: Iterable[Any], place: Place) -> _Block:
         kind, layer = entity.dxftype(), str(entity.dxf.layer)
         if kind in ("TEXT", "MTEXT", "POINT"):
             place.at = f"{kind} on layer {quote_value(layer)}"
-            at = _finite(np.array(tuple(entity.dxf.location if kind == "POINT" else entity.dxf.insert)[:2]))
+            at = np.array(tuple(entity.dxf.location if kind == "POINT" else entity.dxf.insert)[:2])
+            if not np.isfinite(at).all():
+                raise InputError("its place is no number")
             if kind == "POINT":
                 found.points.setdefault(layer, []).append(at)
             else:
@@ -246,12 +248,6 @@ def _add_lines(found: _Block, entities: Iterable[Any], metres: float, most: int,
         if len(points) > 1:
             closed = bool(np.linalg.norm(points[0] - points[-1]) < 1e-6 * max(1.0, float(np.ptp(points))))
             found.lines.setdefault(layer, []).append((points[:-1] if closed else points, closed))
-
-
-def _finite(at: FloatArray) -> FloatArray:
-    if not np.isfinite(at).all():
-        raise InputError("its place is no number")
-    return at
 
 
 def _piece(
@@ -296,15 +292,13 @@ def _piece(
         words[size, name] = [(name, edge, text) for edge, text in sewn]
     else:
         edges = _edges_without_names(block, metres, allowance, where)
-    grain = [points * metres for points, _ in block.lines.get("7", []) if len(points) > 1]
+    grain = next((points[[0, -1]] * metres for points, _ in block.lines.get("7", []) if len(points) > 1), None)
+    if grain is not None and grain[1, 1] < grain[0, 1]:
+        grain = grain[::-1]
     return Piece(
         name=name, size=size, edges=edges, darts=darts, quantity=quantity,
-        grain=_upwards(grain[0][[0, -1]]) if grain else None, fabric=block.value("FABRIC"),
+        grain=grain, fabric=block.value("FABRIC"),
     )  # fmt: skip
-
-
-def _upwards(grain: FloatArray) -> FloatArray:
-    return grain if grain[1, 1] >= grain[0, 1] else grain[::-1]
 
 
 def _edges_without_names(block: _Block, metres: float, allowance: float | None, where: str) -> list[Any]:

@@ -205,7 +205,7 @@ def _fit_run(
         lengths: #P, the wanted length [m] up to each point; None for that of the chords.
         room: largest distance [m] of a point from the curve; None for the tolerance, or more if `lengths` are given.
     """
-    if len(points) == 2 or _chord_distance(points).max() <= tolerance:
+    if _stray(points[[0, -1]], points) <= tolerance:
         return chords(points[[0, -1]])
     # What a curve along the points is measured by.
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -293,14 +293,6 @@ def chords(points: FloatArray) -> Curve:
     return Curve(
         bezier=np.stack([a, a + (b - a) / 3, b - (b - a) / 3, b], axis=1), straight=np.ones(len(a), dtype=bool)
     )
-
-
-def _chord_distance(points: FloatArray) -> FloatArray:
-    """Return each point's distance [m] from the chord between the first and the last."""
-    import shapely
-
-    chord = shapely.LineString(points[[0, -1]])
-    return np.asarray(shapely.distance(chord, shapely.points(points)), dtype=np.float64)
 
 
 def _stray(line: FloatArray, points: FloatArray) -> float:

@@ -68,8 +68,11 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
         fold_to = dart.fold_to or _fold_side(left.line, right.line)
         wedge = Wedge(name=dart.name, left=left.line, right=right.line, fold_to=fold_to)
         legs = DartLegs(dart=dart, left=left, right=right, wedge=wedge)
-        # Legs that are one line (a dart of no width) have nothing to fold.
-        folded = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and dart.pleat is None and _has_room(legs))
+        # A dart is cut away if its mouth is so wide that something is left between the legs' allowances. Legs that are one
+        # line (a dart of no width) have nothing to fold.
+        widths = _leg_width(left) + _leg_width(right)
+        has_room = widths == 0 or legs.mouth >= widths + LEAST_WASTE
+        folded = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and dart.pleat is None and has_room)
         found[dart.name] = replace(
             legs,
             left=replace(left, width=0.0 if folded else _leg_width(left)),
@@ -77,12 +80,6 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
             wedge=wedge if folded else None,
         )
     return found
-
-
-def _has_room(legs: DartLegs) -> bool:
-    """Return whether the mouth is so wide that something is cut away between the legs' allowances."""
-    widths = _leg_width(legs.left) + _leg_width(legs.right)
-    return widths == 0 or legs.mouth >= widths + LEAST_WASTE
 
 
 def _leg_width(leg: DraftedEdge) -> float:

@@ -274,7 +274,11 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
     places = _Remembered(_roomy_places([part for part in parts if part.area > 1e-7]))
     best, reached = None, 0.0
     for label, penalty in _wrapped_labels(tuple(lines)):
-        shape = np.asarray(shapely.MultiPoint(_corners(label)).convex_hull.exterior.coords)
+        corners = []
+        for row in label.words():
+            half = np.array([text_width(row.text, row.height, bold=row.bold), row.height * LEADING]) / 2
+            corners.append(row.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        shape = np.asarray(shapely.MultiPoint(np.concatenate(corners)).convex_hull.exterior.coords)
         for part, at, angle in places:
             if reached >= 1.0:  # most often at the first place
                 break
@@ -317,15 +321,6 @@ def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Labe
                 seen.add(rows)
                 breaks = sum(text.count("\n") for text, _ in rows)
                 yield Label(at=np.zeros(2), lines=rows), penalty * BROKEN**breaks
-
-
-def _corners(label: Label) -> FloatArray:
-    """Return the corners of all rows' boxes [m]."""
-    corners = []
-    for words in label.words():
-        half = np.array([text_width(words.text, words.height, bold=words.bold), words.height * LEADING]) / 2
-        corners.append(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    return np.concatenate(corners)
 
 
 def _roomy_places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, FloatArray, float]]:

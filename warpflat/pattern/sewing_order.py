@@ -129,9 +129,17 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         )
     seams = sewn_seams(garment, size)
     for stage in sorted({seam.stage for seam in seams}):
-        joined = [seam for seam in seams if seam.stage == stage]
         what = translate(_STAGES[stage][0] if stage < len(_STAGES) else "Sew")
-        parts = [f"{seam.letter} ({_join(seam)}{_eased(seam)})" for seam in joined]
+        parts = []
+        for seam in (seam for seam in seams if seam.stage == stage):
+            first, second = seam.sides
+            words = translate("{seam}: {first} to {second}", seam=seam.name, first=first, second=second)
+            if first == second:
+                words = translate("{seam} of the {first}", seam=seam.name, first=first)
+            if abs(seam.ease) >= 5e-4:
+                longer, share = (second, seam.ease) if seam.ease > 0 else (first, 1.0 / (1.0 + seam.ease) - 1.0)
+                words += translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
+            parts.append(f"{seam.letter} ({words})")
         steps.append(translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(parts)))
     free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
     if free:
@@ -186,21 +194,6 @@ def _letter(number: int) -> str:
 
 def _words(side: Sequence[SeamSide], titles: Mapping[str, str]) -> str:
     return " + ".join(dict.fromkeys(titles[part.piece] for part in side))
-
-
-def _join(seam: SewnSeam) -> str:
-    first, second = seam.sides
-    if first == second:
-        return translate("{seam} of the {first}", seam=seam.name, first=first)
-    return translate("{seam}: {first} to {second}", seam=seam.name, first=first, second=second)
-
-
-def _eased(seam: SewnSeam) -> str:
-    if abs(seam.ease) < 5e-4:
-        return ""
-    longer = seam.sides[1] if seam.ease > 0 else seam.sides[0]
-    share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
-    return translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
 
 
 def _dart_names(piece: DraftedPiece, *, pleats: bool = False) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import zlib
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -239,16 +239,16 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
         )
         blocks += [_planes(triangles.astype(np.uint32)), _planes(edges.astype(np.uint32))]
         blocks.append(_planes(space.steps(shape.surface)))
-    layouts = [
-        (number, shape, piece.positions(time, len(shape.surface)), time)
-        for number, shape, time in _at(piece, shapes, stored)
-    ]
-    box = _Box(np.concatenate([positions for _, _, positions, _ in layouts]))
+    layouts = []
+    for time in stored:
+        number, at = sum(change <= time for change in piece.changes) - 1, min(time, piece.times[-1])
+        layouts.append((number, piece.positions(at, len(shapes[number].surface)), at))
+    box = _Box(np.concatenate([positions for _, positions, _ in layouts]))
     before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
     painted = [
         VertexColours(shape.faces, face_areas(shape.surface, shape.faces), len(shape.surface)) for shape in shapes
     ]
-    for number, _, positions, time in layouts:
+    for number, positions, time in layouts:
         steps, colours = box.steps(positions), piece.rows(time, painted[number])
         same = before is not None and before[0] == number
         blocks.append(_planes(steps - before[1] if same and before else steps))
@@ -263,13 +263,6 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
         "frames": list(stored),
     }
     return entry, blocks
-
-
-def _at(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> Iterator[tuple[int, Shape, int]]:
-    """Yield for each stored frame the number of its topology, that topology, and the frame."""
-    for time in stored:
-        number = sum(change <= time for change in piece.changes) - 1
-        yield number, shapes[number], min(time, piece.times[-1])
 
 
 class _Box:

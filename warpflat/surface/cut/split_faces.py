@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
@@ -199,7 +198,9 @@ class Refinement:
         self._vertices = vertices
         self._snap = snap
         near = np.flatnonzero(np.isin(triangles, list(around)).any(axis=1))
-        self._corner: dict[int, _Triangle] = {t: (a, b, c) for t, (a, b, c) in _rows(near, triangles[near])}
+        self._corner: dict[int, _Triangle] = {
+            t: (a, b, c) for t, (a, b, c) in zip(near.tolist(), triangles[near].tolist(), strict=True)
+        }
         self._base = {t: t for t in self._corner}
         self._children: dict[int, list[int]] = {t: [t] for t in self._corner}
         self._base_of = {frozenset(c): t for t, c in self._corner.items()}
@@ -369,7 +370,7 @@ class Refinement:
     def _towards(self, here: int, goal: int, ends: Iterable[int]) -> int:
         """Return the next vertex on the straight path inside one base triangle, splitting the edge that it crosses."""
         inside = set(ends)
-        for base in {self._base[t] for v in [here] for t in self._around(v)}:
+        for base in {self._base[t] for t, corner in self._corner.items() if here in corner}:
             if not inside <= set(self.triangles[base].tolist()):
                 continue
             p, q = self._flat(self.place(here), base), self._flat(self.place(goal), base)
@@ -387,9 +388,6 @@ class Refinement:
                     return u
                 return v if share > 1.0 - self._snap else self._split_at(u, v, share)
         raise _crosses(self.place(here))
-
-    def _around(self, vertex: int) -> list[int]:
-        return [t for t, corner in self._corner.items() if vertex in corner]
 
     def _flat(self, place: Place, base: int) -> tuple[float, float]:
         """Return coordinates in the plane of a base triangle, whose corners are (0, 0), (1, 0) and (0, 1)."""
@@ -428,10 +426,6 @@ class Refinement:
             return 0.0
         cosine = (sides[1] ** 2 + sides[2] ** 2 - sides[0] ** 2) / (2 * sides[1] * sides[2])
         return math.acos(min(1.0, max(-1.0, cosine)))
-
-
-def _rows(index: NDArray[np.int64], triangles: IntArray) -> Iterable[tuple[int, list[int]]]:
-    return zip(index.tolist(), triangles.tolist(), strict=True)
 
 
 def _rim(corner: _Triangle) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:

@@ -265,16 +265,14 @@ def simplify_places(places: Sequence[Place]) -> list[Place]:
     kept: list[Place] = []
     for index, place in enumerate(places):
         inner = 0 < index < len(places) - 1
-        if (inner and len(place) == 3) or (kept and kept[-1].keys() == place.keys() and _same(kept[-1], place)):
+        before = kept[-1] if kept else {}
+        same = before.keys() == place.keys() and all(abs(before[v] - place[v]) < _AT_CORNER for v in place)
+        if (inner and len(place) == 3) or same:
             continue
         if len(kept) > 1 and len(kept[-2].keys() | kept[-1].keys() | place.keys()) <= 2:
             kept.pop()
         kept.append(place)
     return kept
-
-
-def _same(a: Place, b: Place) -> bool:
-    return all(abs(a[v] - b[v]) < _AT_CORNER for v in a)
 
 
 class VertexStar:

@@ -389,11 +389,11 @@ class _Patch:
 
     def _across(self, face: int, p: int, q: int) -> int | None:
         """Return the face beside `face` at its side p-q."""
-        return next((f for f in self.around(p) & self.around(q) if f != face and self._has_edge(f, q, p)), None)
-
-    def _has_edge(self, face: int, a: int, b: int) -> bool:
-        ring = self.corners(face)
-        return ring[(ring.index(a) + 1) % len(ring)] == b
+        for other in self.around(p) & self.around(q) - {face}:
+            ring = self.corners(other)
+            if ring[(ring.index(q) + 1) % len(ring)] == p:
+                return other
+        return None
 
     def result(self) -> tuple[IntArray, IntArray]:
         """Return all faces, in the order of the faces they come from, and these."""
