@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from usd_validation import validate_usd
 
-from warpflat.scene.frames_keys import FilmStage, KeyFile, spread
+from warpflat.scene.frames import FilmStage, KeyFile, spread
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 

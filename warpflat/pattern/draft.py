@@ -5,7 +5,7 @@ Everything that the files show is worked out here once; the writers of DXF, SVG,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -17,7 +17,6 @@ from warpflat.pattern.allowance import cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve
 from warpflat.pattern.drafted import (
     DraftedCutout,
-    DraftedDart,
     DraftedEdge,
     DraftedGarment,
     DraftedPiece,
@@ -26,7 +25,6 @@ from warpflat.pattern.drafted import (
     SeamReport,
 )
 from warpflat.pattern.drafted_darts import (
-    DartLegs,
     dart_legs,
     dart_line,
     dart_notes,
@@ -70,29 +68,25 @@ def draft_garment(
         InputError: an unknown size, or a half piece that reaches across its fold.
     """
     with printed_in(garment.words):
-        return _drafted(garment, tolerance, sizes, true=true)
-
-
-def _drafted(garment: Garment, tolerance: float | None, sizes: Sequence[str] | None, *, true: bool) -> DraftedGarment:
-    chosen = garment.sizes if sizes is None else tuple(sizes)
-    for size in chosen:
-        garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
-    drafted: dict[str, tuple[DraftedPiece, ...]] = {}
-    reports: list[SeamReport] = []
-    corners: list[CornerReport] = []
-    for size in chosen:
-        edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance, true=true)
-        corners += trued
-        pieces = {
-            piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
-        }
-        seams = [seam.of_size(size) for seam in garment.seams]
-        notches = seam_notches([*seams, *cut_darts(pieces)], pieces)
-        drafted[size] = tuple(
-            replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
-        )
-        reports += seam_reports(garment.seams, pieces, size)
-    return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
+        chosen = garment.sizes if sizes is None else tuple(sizes)
+        for size in chosen:
+            garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
+        drafted: dict[str, tuple[DraftedPiece, ...]] = {}
+        reports: list[SeamReport] = []
+        corners: list[CornerReport] = []
+        for size in chosen:
+            edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance, true=true)
+            corners += trued
+            pieces = {
+                piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
+            }
+            seams = [seam.of_size(size) for seam in garment.seams]
+            notches = seam_notches([*seams, *cut_darts(pieces)], pieces)
+            drafted[size] = tuple(
+                replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
+            )
+            reports += seam_reports(garment.seams, pieces, size)
+        return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
 
 
 def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
@@ -138,16 +132,36 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     darts = dart_legs(piece, edges)
     drafted_legs = {leg.name: leg for legs in darts.values() for leg in (legs.left, legs.right)}
     edges = tuple(drafted_legs.get(edge.name, edge) for edge in edges)
-    cut = cut_outline(_sides(edges, darts))
+    # The outline in order; a wedge stands for both legs of a folded dart.
+    folded = {legs.dart.left: legs.wedge for legs in darts.values() if legs.wedge is not None}
+    right_legs = {legs.dart.right for legs in darts.values() if legs.wedge is not None}
+    sides: list[Side | Wedge] = []
+    for edge in edges:
+        if edge.name in folded:
+            sides.append(folded[edge.name])
+        elif edge.name not in right_legs:
+            sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
+    cut = cut_outline(sides)
     drafted_darts = tuple(dart_line(legs, cut.points) for legs in darts.values())
     holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
     fisheyes = {hole.name: smooth_fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
     cutouts = {hole.name: _cutout(hole, holes[hole.name]) for hole in piece.holes if hole.kind == "cutout"}
-    internal = _internal_lines(piece, frame, tolerance)
+    lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
+    internal = {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
     grain = default_grain(sew_line, list(holes.values())) if piece.grain is None else _moved(piece.grain, frame)
     leg_lines = [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
     widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
+    # Pleats are not marked through the cloth.
+    drilled = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts if dart.dart.pleat is None]
+    drilled += [
+        DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]
+    ]
+    uneven = []
+    for name, line in fisheyes.items():
+        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in fisheye_legs(line)))))
+        if apart > SEAM_TOLERANCE:
+            uneven.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
     return DraftedPiece(
         piece=piece,
         frame=frame,
@@ -155,10 +169,10 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         cut_line=cut.points,
         darts=drafted_darts,
         drill_holes=(
-            *_drill_holes(drafted_darts, fisheyes),
+            *drilled,
             *(DrillHole(name=name, at=_moved(at[None], frame)[0]) for name, at in piece.marks.items()),
         ),
-        notches=dart_notches(piece, _wedges(darts), cut),
+        notches=dart_notches(piece, {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}, cut),
         internal_lines=internal,
         cutouts=cutouts,
         fisheyes=fisheyes,
@@ -175,28 +189,14 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
             *cut.notes,
             *_ragged_edges(edges, tolerance),
             *chain.from_iterable(map(dart_notes, darts.values())),
-            *_small_cutouts(piece, cutouts),
-            *_uneven_fisheyes(fisheyes),
+            *[
+                f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
+                for hole in piece.holes
+                if hole.name in cutouts and cutouts[hole.name].width < hole.width
+            ],
+            *uneven,
         ),
     )
-
-
-def _wedges(darts: Mapping[str, DartLegs]) -> dict[str, Wedge]:
-    """Return the darts that are folded."""
-    return {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}
-
-
-def _internal_lines(piece: Piece, frame: FloatArray, tolerance: float | None) -> dict[str, FloatArray]:
-    """Return the lines inside, without the teeth in which they run along a mesh unless a tolerance is given."""
-    lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
-    return {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
-
-
-def _drill_holes(darts: Sequence[DraftedDart], fisheyes: Mapping[str, FloatArray]) -> tuple[DrillHole, ...]:
-    """Return the tips of all darts but pleats, which are marked through the cloth."""
-    holes = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in darts if dart.dart.pleat is None]
-    holes += [DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]]
-    return tuple(holes)
 
 
 def _ragged_edges(edges: Sequence[DraftedEdge], tolerance: float | None) -> list[str]:
@@ -209,25 +209,6 @@ def _ragged_edges(edges: Sequence[DraftedEdge], tolerance: float | None) -> list
         f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
         f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
     ]
-
-
-def _small_cutouts(piece: Piece, cutouts: Mapping[str, DraftedCutout]) -> list[str]:
-    """Return notes on the holes that are too small for their allowance."""
-    return [
-        f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
-        for hole in piece.holes
-        if hole.name in cutouts and cutouts[hole.name].width < hole.width
-    ]
-
-
-def _uneven_fisheyes(fisheyes: Mapping[str, FloatArray]) -> list[str]:
-    """Return notes on the fish-eye darts whose sides differ in length."""
-    notes = []
-    for name, line in fisheyes.items():
-        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in fisheye_legs(line)))))
-        if apart > SEAM_TOLERANCE:
-            notes.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
-    return notes
 
 
 def _frame(piece: Piece) -> FloatArray:
@@ -298,19 +279,6 @@ def _drafted_edge(edge: Edge, curve: Curve, fitted: tuple[Curve, float], points:
     return DraftedEdge(
         edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1]
     )
-
-
-def _sides(edges: Sequence[DraftedEdge], darts: Mapping[str, DartLegs]) -> list[Side | Wedge]:
-    """Return the outline in order; a wedge stands for both legs of a folded dart."""
-    folded = {legs.dart.left: legs.wedge for legs in darts.values() if legs.wedge is not None}
-    right_legs = {legs.dart.right for legs in darts.values() if legs.wedge is not None}
-    sides: list[Side | Wedge] = []
-    for edge in edges:
-        if edge.name in folded:
-            sides.append(folded[edge.name])
-        elif edge.name not in right_legs:
-            sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
-    return sides
 
 
 def _cutout(hole: Hole, points: FloatArray) -> DraftedCutout:

@@ -72,7 +72,11 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 notches.setdefault(piece, []).append(notch)
         for line, other in ((first, second), (second, first)):
             for joint in line.joints[1:-1] / line.length:
-                length = _opposite(seam, float(joint), forward=line is first) * other.length
+                # The joint's share of one side's length, and that of the place on the other side opposite to it.
+                shares = np.linspace(0.0, 1.0, 1001)
+                reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
+                table = (shares, reached) if line is first else (reached, shares)
+                length = float(np.interp(float(joint), *table)) * other.length
                 if np.abs(other.joints - length).min() > CLEAR and not other.mirrored(length):
                     single = other.notch(seam.name, length, double=False)
                     if single is not None:
@@ -95,13 +99,6 @@ def _notch_pair(seam: Seam, lines: Sequence[SeamLine], fraction: float) -> list[
         if len(matched) == len(found):
             return matched
     return []
-
-
-def _opposite(seam: Seam, share: float, *, forward: bool) -> float:
-    """Return the share of one side's length opposite to that of the other's; `forward`: from the first side to the second."""
-    shares = np.linspace(0.0, 1.0, 1001)
-    reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
-    return float(np.interp(share, *((shares, reached) if forward else (reached, shares))))
 
 
 def _fractions(seam: Seam, first: SeamLine, second: SeamLine) -> list[float]:
