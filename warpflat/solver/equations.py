@@ -30,7 +30,7 @@ __all__ = ["ConstrainedOutcome", "factor_pays", "relax_under_equations"]
 
 # A round ends when by the metric the next step could release at most this times the squared residual tolerance, as a share of the energy,
 # or after so many steps.
-_NEGLIGIBLE_RELEASE = 0.1
+_NEGLIGIBLE_RELEASE = 0.05
 _STEPS_PER_ROUND = 200
 _MOST_ROUNDS = 50
 # Rounds over which the violation must come down, or the equations contradict each other.
