@@ -2,8 +2,8 @@
 
 A metric A stands for the second derivative of the energy; the direction of descent is A^-1 times the force. Two matrices are factored.
 `LaplacianFactor`: the Laplacian of the surface times the cloth's stiffness, the same for all layouts (Liu et al. 2017). On surfaces too
-large to factor its solution is a V-cycle: damped Jacobi before and after a correction by the coarser mesh, whose matrix is P^T L P, down
-to one that is factored (Briggs, Henson and McCormick, A Multigrid Tutorial); L-BFGS takes as many iterations with it.
+large to factor its solution is a V-cycle: damped Jacobi before and after a correction by the Laplacian of the coarser mesh, down to one
+that is factored (Briggs, Henson and McCormick, A Multigrid Tutorial); L-BFGS takes as many iterations with it.
 `StiffnessFactor`: the Gauss-Newton stiffness J^T J of springs, guard and equations in one layout, in which stiff seams cost no more
 iterations than soft ones.
 
@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array, vstack
 
 from warpflat.core.arrays import FloatArray, IntArray
@@ -68,32 +67,27 @@ class Factor(Protocol):
 
 
 @once_per_surface
-def laplacian_solution(surface: Surface) -> Callable[[FloatArray], FloatArray]:
+def laplacian_solution(surface: Surface) -> Solve:
     """Return the solution by the Laplacian (`warpflat.surface.laplacian`), or on a large surface what a V-cycle makes of it.
 
     Right sides are #V by #N. Both are symmetric, and in single precision.
     """
-    if factor_pays(surface):
+    step = None if factor_pays(surface) else next(iterate_coarsenings(surface, CHEAP), None)
+    if step is None:
         return laplacian_solver(surface)
-    matrix, levels = csr_array(held_laplacian(surface)), []
-    for step in iterate_coarsenings(surface, CHEAP):
-        up = step.prolongation
-        down = csr_array(up.T)
-        inverse = (_DAMPING / matrix.diagonal()).astype(np.float32)[:, None]
-        levels.append((matrix.astype(np.float32), inverse, up.astype(np.float32), down.astype(np.float32)))
-        matrix = csr_array(down @ matrix @ up)
-    lowest = factor_symmetric(csc_array(matrix), dtype=np.float32)
+    coarser, matrix = laplacian_solution(step.surface), csr_array(held_laplacian(surface), dtype=np.float32)
+    inverse = (_DAMPING / matrix.diagonal())[:, None]
+    up = step.prolongation.astype(np.float32)
+    down = csr_array(up.T)
 
-    def cycle(level: int, right: NDArray[np.float32]) -> NDArray[np.float32]:
-        if level == len(levels):
-            return lowest(right.astype(np.float64)).astype(np.float32)
-        fine, inverse, up, down = levels[level]
-        x = inverse * right
-        x += up @ cycle(level + 1, down @ (right - fine @ x))
-        x += inverse * (right - fine @ x)
-        return x
+    def cycle(right: FloatArray) -> FloatArray:
+        force = right.astype(np.float32)
+        x = inverse * force
+        x += up @ coarser(down @ (force - matrix @ x)).astype(np.float32)
+        x += inverse * (force - matrix @ x)
+        return np.ascontiguousarray(x, dtype=np.float64)
 
-    return lambda right: np.ascontiguousarray(cycle(0, right.astype(np.float32)), dtype=np.float64)
+    return cycle
 
 
 class LaplacianFactor:

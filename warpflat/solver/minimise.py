@@ -281,23 +281,20 @@ def relax(
         return relax_by_steps(state, watch=watch, each_step=each_step)
     if state.check_start().at_rest:
         return state.make_outcome(state.steps, state.work_units, began_at=time.perf_counter())
-    start = state.positions()
+    start = measured = state.positions()
     align_grain(state.alignments, start)
     state.place(start)
     first = take_first_steps(state, each_step=each_step) if first_steps else None
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
     start = state.positions()
     layout = None if first is None else start
-    align_grain(state.alignments, start)
-    if measure is not None and first is not None:
-        state = _continued(measure(start, start), state)
     problem = _Cloth(state)
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return state.make_outcome(steps_before, work_before, began_at=began_at)
     descent, options = Descent(problem, point), state.options
     estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
-    directions = None if measure is None else _Directions(measure, start)
+    directions = None if measure is None else _Directions(measure, measured)
 
     done = False
     while not done:

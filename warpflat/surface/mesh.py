@@ -15,7 +15,6 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "Surface",
-    "face_results",
     "once_per_faces",
     "once_per_surface",
     "read_only",
@@ -103,7 +102,7 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
     def remembered(surface: Surface) -> Result:
         known = surface.of_faces
         if known.get("faces") is not surface.faces:
-            known = face_results(surface.faces)
+            known = {"faces": surface.faces}
             object.__setattr__(surface, "of_faces", known)
         # Read only once, as another thread may drop it.
         result: Result = known.get(name, _UNKNOWN)
@@ -114,9 +113,6 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
     return remembered
 
 
-def face_results(faces: IntArray, results: Mapping[Callable[[Surface], Any], Any] | None = None) -> dict[str, Any]:
-    """Make `Surface.of_faces` for surfaces with these faces (#F by 4) from results of functions decorated with `once_per_faces`."""
-    return {"faces": faces} | {_name(measure): result for measure, result in (results or {}).items()}
 
 
 def _name(measure: Callable[..., Any]) -> str:
