@@ -337,7 +337,7 @@ def test_cuts_are_tried_with_the_options_of_the_run(monkeypatch: pytest.MonkeyPa
         given.append(relax)
         return cut(piece, plan, relax=relax)
 
-    monkeypatch.setattr("warpflat.cutting.cut_piece.cut", noted)
+    monkeypatch.setattr("warpflat.cutting.remedies.cut", noted)
     options = RelaxOptions(solver="paper", check_every=7, energy_tolerance=1e-5)
     front = flatten(make_shape("bodice", resolution=13), fabric="denim", datum="centre", wear=Wear(), relax=options)
     assert not given

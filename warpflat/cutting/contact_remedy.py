@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -12,15 +11,15 @@ from scipy.sparse.csgraph import dijkstra
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.progress import CONTACT
+from warpflat.flattening.result import Flattening
 from warpflat.solver.contact import Barrier
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.injective import border_edges_of
 from warpflat.surface.mesh import Surface
-
-if TYPE_CHECKING:
-    from warpflat.flattening.result import Flattening
 
 __all__ = ["contact_note", "cut_between_contacts"]
 
@@ -48,9 +47,6 @@ def contact_note(result: Flattening) -> str | None:
         residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
         gap_mm=0.0,
     )
-    from warpflat.cutting.cut_piece import cut
-    from warpflat.cutting.cut_plan import CutPlan
-
     try:
         opened = None if path is None else cut(piece, CutPlan(name="trial", paths=(path,)), relax=quick)
     except InputError:

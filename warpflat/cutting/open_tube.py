@@ -41,7 +41,7 @@ def open_tube(surface: Surface, line: str | None = None) -> Surface:
     if not borders:
         raise InputError(f"piece {surface.name!r} is no tube: no second border runs around it; it needs no opening")
     if line is not None:
-        surface = _cut(surface, line)
+        surface = make_cuts(surface, [CutPlan(name=line, paths=(line_part(surface, line),))]).surface
         if len(tube_borders(surface)) == len(borders):
             raise InputError(
                 f"line {quote_value(line)} does not cut piece {surface.name!r} open; it must run from one border to another"
@@ -201,10 +201,6 @@ def _between_borders(surface: Surface, path: SurfacePath) -> SurfacePath:
     start = max(index for index in range(end) if at[index] >= 0)
     part = slice(start, end + 1)
     return replace(path, support=path.support[part], weights=path.weights[part], points=path.points[part])
-
-
-def _cut(surface: Surface, line: str) -> Surface:
-    return make_cuts(surface, [CutPlan(name=line, paths=(line_part(surface, line),))]).surface
 
 
 def _nearest_borders(surface: Surface, border: IntArray) -> tuple[int, int]:

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
-from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.cutting.contact_remedy import contact_note
-from warpflat.model.fit import Misfit, WornFit, assess_fit
-
-if TYPE_CHECKING:
-    from warpflat.flattening.result import Flattening
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.fit_report import Remedy
+from warpflat.flattening.result import Flattening
+from warpflat.model.fit import Misfit, WornFit, assess_fit
+from warpflat.surface.connectivity import border_of
+from warpflat.surface.paths.lines import line_between
 
 __all__ = ["advise", "remedies"]
 
@@ -67,47 +68,38 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
     unsewn = result.unsewn or result
     if fit.fits or unsewn.fit.fits:
         return []
-    found = list(islice(_remedies_for(result, fit), _MOST_TRIALS if trial else _KEPT))
+    found: list[Remedy] = []
+    # One by one, since a path over a large mesh takes a while.
+    paths = (remedy for misfit in fit.misfits[:4] for remedy in _candidates(result, misfit))
+    while len(found) < (_MOST_TRIALS if trial else _KEPT) and (remedy := next(paths, None)) is not None:
+        known = any(np.array_equal(remedy.path, other.path) for other in found)
+        if not known and remedy.length >= _LEAST_CUT:
+            found.append(remedy)
     if not trial:
         return found
-    tried = [_try(unsewn, remedy) for remedy in found]
-    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * unsewn.fit.outside]
-    return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:_KEPT]
-
-
-def _remedies_for(result: Flattening, fit: WornFit) -> Iterator[Remedy]:
-    """Yield remedies for the largest misfits, each path once.
-
-    They are made one by one, since a path over a large mesh takes a while.
-    """
-    found: list[Remedy] = []
-    for misfit in fit.misfits[:4]:
-        for remedy in _candidates(result, misfit):
-            known = any(np.array_equal(remedy.path, other.path) for other in found)
-            if not known and remedy.length >= _LEAST_CUT:
-                found.append(remedy)
-                yield remedy
+    options = unsewn.options
+    quick = replace(
+        options,
+        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
+        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
+        max_steps=min(options.max_steps, unsewn.stages[-1].steps + 2000),
+        gap_mm=0.0,
+    )
+    helpful = []
+    for remedy in found:
+        # A path that meets a cut which was made before is refused.
+        with suppress(InputError):
+            opened = cut(unsewn, CutPlan(name="trial", paths=(remedy.path,)), relax=quick)
+            outside = assess_fit(opened.network, opened.positions).outside
+            if outside < 0.9 * unsewn.fit.outside:
+                helpful.append((outside, replace(remedy, outside=outside)))
+    return [remedy for _, remedy in sorted(helpful, key=lambda tried: tried[0])[:_KEPT]]
 
 
 def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
-    from warpflat.surface.connectivity import border_of
-
-    border = border_of(result.surface)
+    """Yield darts and seams along the feature lines that pass near the worst place, then darts from the border to it."""
+    border, points = border_of(result.surface), result.surface.vertices
     worst = int(result.vertex_origin[misfit.vertex])
-    yield from _candidates_along_lines(result, border, worst)
-    if worst in border:
-        # A short cut at the border relieves nothing: it has to reach behind the region.
-        points = result.surface.vertices
-        inside = np.setdiff1d(result.vertex_origin[result.faces[misfit.faces].ravel()], border)
-        if len(inside) == 0:
-            return
-        worst = int(inside[np.argmax(np.linalg.norm(points[inside] - points[worst], axis=1))])
-    yield from _candidates_from_border(result, border, worst)
-
-
-def _candidates_along_lines(result: Flattening, border: IntArray, worst: int) -> Iterator[Remedy]:
-    """Yield darts and seams along the feature lines that pass near the vertex `worst`."""
-    points = result.surface.vertices
     for name, line in result.surface.lines.items():
         row = np.asarray(line)
         if len(row) < 2 or np.isin(row, border).all():
@@ -117,73 +109,44 @@ def _candidates_along_lines(result: Flattening, border: IntArray, worst: int) ->
             continue
         dart = min(row[: nearest + 1], row[nearest:][::-1], key=len)
         if len(dart) > 2 and dart[0] in border and not np.isin(dart[1:], border).any():
-            yield _remedy(result, dart, f"a dart along {name}", {"line": name, "part": _part(points, row, dart)})
+            # The shares of the line's length between which it lies, from its mouth.
+            share = polyline_length(points[dart]) / polyline_length(points[row])
+            part = [0.0, round(share, 4)] if dart[0] == row[0] else [1.0, round(1.0 - share, 4)]
+            yield _remedy(result, dart, f"a dart along {name}", {"line": name, "part": part})
         if row[0] in border and row[-1] in border and not np.isin(row[1:-1], border).any():
             yield _remedy(result, row, f"a seam along {name}", {"line": name})
-
-
-def _candidates_from_border(result: Flattening, border: IntArray, worst: int) -> Iterator[Remedy]:
-    """Yield darts from the border to the vertex `worst`."""
-    from warpflat.surface.paths.lines import line_between
-
-    for start in _border_feet(result.surface.vertices, border, worst):
-        try:
-            path = line_between(result.surface, int(start), worst)
-        except InputError:
-            continue
-        # A shortest path may run along the border first.
-        last = int(np.flatnonzero(np.isin(path, border))[-1])
-        if len(path) - last > 1:
-            ends = ([round(x, 5) for x in result.surface.vertices[path[at]].tolist()] for at in (last, -1))
-            yield _remedy(result, path[last:], "a dart from the border", dict(zip(("from", "to"), ends, strict=True)))
-
-
-def _border_feet(points: FloatArray, border: IntArray, worst: int) -> list[int]:
-    """Return the border vertex nearest to `worst`, and the nearest one in a direction more than 72 degrees from that."""
+    if worst in border:
+        # A short cut at the border relieves nothing: it has to reach behind the region.
+        inside = np.setdiff1d(result.vertex_origin[result.faces[misfit.faces].ravel()], border)
+        if len(inside) == 0:
+            return
+        worst = int(inside[np.argmax(np.linalg.norm(points[inside] - points[worst], axis=1))])
+    # From the nearest vertex of the border, and from the nearest in a direction more than 72 degrees from that.
     away = points[border] - points[worst]
     distance = np.linalg.norm(away, axis=1)
     first = int(np.argmin(distance))
     cosine = away @ away[first] / np.maximum(distance * distance[first], 1e-300)
     others = np.flatnonzero(cosine < 0.3)
-    feet = [int(border[first])]
-    if len(others):
-        feet.append(int(border[others[np.argmin(distance[others])]]))
-    return feet
+    feet = [first, *([int(others[np.argmin(distance[others])])] if len(others) else [])]
+    for foot in feet:
+        try:
+            path = line_between(result.surface, int(border[foot]), worst)
+        except InputError:
+            continue
+        # A shortest path may run along the border first.
+        last = int(np.flatnonzero(np.isin(path, border))[-1])
+        if len(path) - last > 1:
+            ends = ([round(x, 5) for x in points[path[at]].tolist()] for at in (last, -1))
+            yield _remedy(result, path[last:], "a dart from the border", dict(zip(("from", "to"), ends, strict=True)))
 
 
-def _part(points: FloatArray, row: IntArray, dart: IntArray) -> list[float]:
-    """Return the shares of a line's length between which a dart lies, from its mouth."""
-    share = polyline_length(points[dart]) / polyline_length(points[row])
-    return [0.0, round(share, 4)] if dart[0] == row[0] else [1.0, round(1.0 - share, 4)]
-
-
-def _remedy(result: Flattening, path: NDArray[np.integer], words: str, table: Mapping[str, Any]) -> Remedy:
+def _remedy(result: Flattening, path: NDArray[np.integer], what: str, table: Mapping[str, Any]) -> Remedy:
     points = result.surface.vertices[path]
     length = polyline_length(points)
     start, end = (f"({', '.join(f'{100 * x:.0f}' for x in point)})" for point in (points[0], points[-1]))
     return Remedy(
-        words=f"{words}, {100 * length:.1f} cm, from {start} to {end} cm",
+        words=f"{what}, {100 * length:.1f} cm, from {start} to {end} cm",
         path=path.astype(np.int32),
         length=length,
         table=table,
     )
-
-
-def _try(result: Flattening, remedy: Remedy) -> Remedy:
-    from warpflat.cutting.cut_piece import cut
-    from warpflat.cutting.cut_plan import CutPlan
-
-    options = result.options
-    quick = replace(
-        options,
-        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
-        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
-        max_steps=min(options.max_steps, result.stages[-1].steps + 2000),
-        gap_mm=0.0,
-    )
-    try:
-        opened = cut(result, CutPlan(name="trial", paths=(remedy.path,)), relax=quick)
-    except InputError:
-        # The path meets a cut that was made before.
-        return remedy
-    return replace(remedy, outside=assess_fit(opened.network, opened.positions).outside)

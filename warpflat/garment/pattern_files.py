@@ -207,6 +207,9 @@ def _write_pattern(
     from shapely.errors import ShapelyError
 
     from warpflat.core.output import file_in, output_folder
+    from warpflat.pattern.curves import TOLERANCE
+    from warpflat.pattern.cut_list import cut_list
+    from warpflat.pattern.draft import draft_garment
     from warpflat.pattern.walked import walk_seams
 
     if not options.formats and options.cloth is None:
@@ -216,20 +219,42 @@ def _write_pattern(
         pattern, notes = make()
         pattern = add_lining(pattern, options.lining) if options.lining else pattern
         pattern = add_interfacing(pattern, options.interfacing) if options.interfacing else pattern
-        drafted, remarks = _draft(_in_words(pattern, options), options.tolerance)
+        # In the printed names and units that were asked for.
+        titled = {
+            size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row)
+            for size, row in pattern.pieces.items()
+        }
+        drafted = draft_garment(replace(pattern, pieces=titled, words=options.words), tolerance=options.tolerance)
     except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
         why = " ".join(str(error).split())
         return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})
-    notes = (*notes, *remarks)
-    notes = (
-        *notes,
-        *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
-    )
+    pieces = [piece for row in drafted.pieces.values() for piece in row]
+    ragged: dict[str, float] = {}
+    for piece in pieces:
+        for edge in piece.edges:
+            if options.tolerance is None and edge.tolerance > TOLERANCE:
+                name_of = f"{piece.name}.{edge.name}"
+                ragged[name_of] = max(ragged.get(name_of, 0.0), edge.fit_error)
+    if ragged:
+        within = max(ragged.values()) * 1000
+        notes = (
+            *notes, f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it",
+        )  # fmt: skip
+    notes = (*notes, *(f"{piece.name}: {note}" for piece in pieces for note in piece.notes))
     walked = walk_seams(drafted)
     drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
+    near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
+    edges = [edge for row in drafted.pieces.values() for piece in row for edge in piece.edges]
+    cloths = cut_list(drafted.pieces[drafted.garment.sample])
     metrics: dict[str, Any] = {
-        "pattern": _quality(drafted),
-        "cloths": _cloths(drafted),
+        # How far curves stray from the mesh, and sides of seams from each other, at worst.
+        "pattern": {
+            "fit_error_mm": 1000 * max(edge.fit_error for edge in edges),
+            "seam_difference_mm": max((abs(seam.difference_mm) for seam in drafted.seams), default=None),
+            "seam_difference_per_50mm_mm": max(near, default=None),
+            "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
+        },
+        "cloths": [{"name": cloth, "pieces": [asdict(entry) for entry in rows]} for cloth, rows in cloths.items()],
         "corners": [asdict(corner) for corner in drafted.corners],
         "walked": [
             {key: getattr(seam, key) for key in ("name", "size", "distance_mm", "difference_mm", "notch_mm")}
@@ -268,55 +293,6 @@ def check_names(names: Mapping[str, str], pieces: Iterable[str]) -> None:
     for name in names:
         if name not in known:
             raise InputError(f"names: there is no piece {name!r}; {nearest(name, known)}")
-
-
-def _in_words(pattern: Pattern, options: PatternOptions) -> Pattern:
-    """Return the pattern with the printed names and units that were asked for."""
-    pieces = {
-        size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in of_size)
-        for size, of_size in pattern.pieces.items()
-    }
-    return replace(pattern, pieces=pieces, words=options.words)
-
-
-def _quality(drafted: DraftedGarment) -> dict[str, Any]:
-    """Return how far curves stray from the mesh, and sides of seams from each other, at worst."""
-    edges = [edge for pieces in drafted.pieces.values() for piece in pieces for edge in piece.edges]
-    near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
-    return {
-        "fit_error_mm": 1000 * max(edge.fit_error for edge in edges),
-        "seam_difference_mm": max((abs(seam.difference_mm) for seam in drafted.seams), default=None),
-        "seam_difference_per_50mm_mm": max(near, default=None),
-        "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
-    }
-
-
-def _cloths(drafted: DraftedGarment) -> list[dict[str, Any]]:
-    """Return what is cut from each cloth in the sample size."""
-    from warpflat.pattern.cut_list import cut_list
-
-    rows = cut_list(drafted.pieces[drafted.garment.sample])
-    return [{"name": cloth, "pieces": [asdict(entry) for entry in entries]} for cloth, entries in rows.items()]
-
-
-def _draft(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:
-    """Return the drafted pattern, and a note where its curves had to leave the border of the mesh."""
-    from warpflat.pattern.curves import TOLERANCE
-    from warpflat.pattern.draft import draft_garment
-
-    drafted = draft_garment(pattern, tolerance=tolerance)
-    ragged: dict[str, float] = {}
-    for pieces in drafted.pieces.values():
-        for piece in pieces:
-            for edge in piece.edges:
-                if tolerance is None and edge.tolerance > TOLERANCE:
-                    name = f"{piece.name}.{edge.name}"
-                    ragged[name] = max(ragged.get(name, 0.0), edge.fit_error)
-    if not ragged:
-        return drafted, ()
-    return drafted, (
-        f"the border is ragged at {', '.join(ragged)}: the curves keep within {max(ragged.values()) * 1000:.1f} mm of it",
-    )
 
 
 def _write(

@@ -22,7 +22,7 @@ from warpflat.garment.garment import Garment
 from warpflat.garment.sewing import sew
 from warpflat.garment.sewn import SeamPair
 from warpflat.solver.options import RelaxOptions
-from warpflat.surface.border_seams import SAME_PLACE, NamedSeam, SurfaceSeam, surface_seams
+from warpflat.surface.border_seams import SAME_PLACE, NamedSeam, surface_seams
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, lies_within
@@ -68,7 +68,16 @@ def sew_pieces(
     flat = {piece.surface.name: piece for piece in pieces}
     first = next(iter(flat))
     found = surface_seams(flat[first].network.surface, seams)
-    flat[first] = _with_fullness(flat[first], found, options)
+    # More cloth along the sides that are meant to be longer.
+    longer = [(seam, seam.vertices[seam.named.longer]) for seam in found if seam.named.factor > 1.0]
+    if longer and flat[first].cuts:
+        raise InputError(
+            f"seam {longer[0][0].named.name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
+        )
+    if longer:
+        full = [FullEdge(vertices=row, factor=seam.named.factor, gathered=seam.named.gathered) for seam, row in longer]
+        plain = [row for seam in found for row in seam.vertices if not any(row is edge.vertices for edge in full)]
+        flat[first] = give_fullness(flat[first], full, plain, options=options)
     pairs = [
         SeamPair(
             name=title, pieces=(own, own), vertices=(seam.left, seam.right),
@@ -94,11 +103,16 @@ def sew_pieces(
         if len(flat) > 1:
             pairs.append(replace(pair, sides=pair.pieces))
             continue
-        # What was cut open before, here or in the file, is sewn like any cut.
-        opening = _opening(flat[first].network.surface, pair)
+        # What was cut open before, here or in the file, is sewn like any cut, and called by the line along which that was.
+        sides, opening = {frozenset(side[:2].tolist()) for side in pair.vertices}, None
+        for line, row in flat[first].network.surface.lines.items():
+            side = re.fullmatch(r"(.+)\.(left|right)(\.\d+)?'*", line)
+            if side is not None and not sides.isdisjoint(map(frozenset, pairwise(row.tolist()))):
+                opening = side[1]
+                break
         title = find_unused_name(opening or pair.name, {other.name for other in pairs})
-        line = f"{first}.{opening or title}"
-        pairs.append(replace(pair, name=title, sides=(f"{line}.left", f"{line}.right")))
+        along = f"{first}.{opening or title}"
+        pairs.append(replace(pair, name=title, sides=(f"{along}.left", f"{along}.right")))
     garment = Garment(name=name or first, pieces=flat, seam_pairs=pairs, named_seams=seams)
     if not pairs and not constraints:
         return garment
@@ -260,10 +274,7 @@ class _BorderEdges:
                 here.setdefault(tuple(sorted(ends)), []).append(edge)
         self._partner = {a: b for both in here.values() if len(both) == 2 for a, b in (both, both[::-1])}
         self._without = without
-        self._leave_layers_apart(surfaces)
-
-    def _leave_layers_apart(self, surfaces: Mapping[str, Surface]) -> None:
-        """Sew no lining to its outer layer along its whole outline: both would be a bag."""
+        # No lining is sewn to its outer layer along its whole outline: both would be a bag.
         others: dict[str, set[str]] = {}
         for edge, name in enumerate(self.names):
             others.setdefault(name, set()).add(self.names[self._partner[edge]] if edge in self._partner else "")
@@ -312,36 +323,3 @@ class _BorderEdges:
         if self.next[edges[0]] == edges[1]:
             return np.array([*(self.tail[edge] for edge in edges), self.head[edges[-1]]], dtype=np.int32)
         return np.array([*(self.head[edge] for edge in edges), self.tail[edges[-1]]], dtype=np.int32)
-
-
-def _opening(surface: Surface, pair: SeamPair) -> str | None:
-    """Return the name of the line along which a stretch of border was cut open."""
-    first = {frozenset(side[:2].tolist()) for side in pair.vertices}
-    for name, line in surface.lines.items():
-        side = re.fullmatch(r"(.+)\.(left|right)(\.\d+)?'*", name)
-        if side is not None and not first.isdisjoint(map(frozenset, pairwise(line.tolist()))):
-            return side[1]
-    return None
-
-
-def _with_fullness(result: Flattening, seams: Sequence[SurfaceSeam], options: RelaxOptions | None) -> Flattening:
-    """Return the piece with more cloth along the sides that are meant to be longer."""
-    full = [
-        FullEdge(vertices=seam.vertices[seam.named.longer], factor=seam.named.factor, gathered=seam.named.gathered)
-        for seam in seams
-        if seam.named.factor > 1.0
-    ]
-    if not full:
-        return result
-    if result.cuts:
-        name = next(seam.named.name for seam in seams if seam.named.factor > 1.0)
-        raise InputError(
-            f"seam {name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
-        )
-    plain = [
-        ids
-        for seam in seams
-        for side, ids in enumerate(seam.vertices)
-        if seam.named.factor == 1.0 or side != seam.named.longer
-    ]
-    return give_fullness(result, full, plain, options=options)

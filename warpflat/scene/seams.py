@@ -81,51 +81,26 @@ def scene_constraints(
     found: list[Constraint] = []
     for number, table in enumerate(tables):
         where = f"constraints[{number}]"
-        for piece in _pieces_with_line(where, table, lines):
-            found += _constraints_on(where, table, piece, on_fold=folds.get(piece) == table.line)
-    return found
-
-
-def _pieces_with_line(where: str, table: ConstraintTable, lines: Mapping[str, Collection[str]]) -> list[str]:
-    """Return the pieces that a constraint is about.
-
-    Raises:
-        InputError: there is no such piece or line.
-    """
-    if table.piece is not None and table.piece not in lines:
-        raise InputError(f"{where}: no piece {table.piece!r}; {nearest(table.piece, lines)}")
-    asked = [piece for piece in lines if table.piece in (None, piece)]
-    pieces = [piece for piece in asked if table.line in lines[piece]]
-    if not pieces:
-        known = {line for piece in asked for line in lines[piece]}
-        what = "no piece has a line" if table.piece is None else f"piece {table.piece!r} has no line"
-        raise InputError(f"{where}: {what} {table.line!r}; {nearest(table.line, known)}")
-    return pieces
-
-
-def _constraints_on(where: str, table: ConstraintTable, piece: str, *, on_fold: bool) -> list[Constraint]:
-    """Return the constraints that a table puts on one piece.
-
-    Args:
-        where: the table, as messages name it.
-        table: of the scene.
-        piece: name of the piece.
-        on_fold: whether the line is the piece's fold, which is straight anyway.
-
-    Raises:
-        InputError: symmetry of a piece on the fold.
-    """
-    found: list[Constraint] = []
-    if table.straight is not None and not on_fold:
-        found.append(Straight(piece=piece, line=table.line, along=table.straight))
-    if table.length_mm is not None:
-        length = None if table.length_mm == "body" else 1e-3 * float(table.length_mm)
-        found.append(FixedLength(piece=piece, line=table.line, length=length))
-    if table.symmetric and on_fold:
-        raise InputError(
-            f"{where}: piece {piece!r} is a half on the fold, its other half the mirror image anyway; leave "
-            "symmetric out, or set half = false"
-        )
-    if table.symmetric:
-        found.append(Symmetric(piece=piece, line=table.line))
+        if table.piece is not None and table.piece not in lines:
+            raise InputError(f"{where}: no piece {table.piece!r}; {nearest(table.piece, lines)}")
+        asked = [piece for piece in lines if table.piece in (None, piece)]
+        pieces = [piece for piece in asked if table.line in lines[piece]]
+        if not pieces:
+            known = {line for piece in asked for line in lines[piece]}
+            what = "no piece has a line" if table.piece is None else f"piece {table.piece!r} has no line"
+            raise InputError(f"{where}: {what} {table.line!r}; {nearest(table.line, known)}")
+        for piece in pieces:
+            on_fold = folds.get(piece) == table.line
+            if table.straight is not None and not on_fold:
+                found.append(Straight(piece=piece, line=table.line, along=table.straight))
+            if table.length_mm is not None:
+                length = None if table.length_mm == "body" else 1e-3 * float(table.length_mm)
+                found.append(FixedLength(piece=piece, line=table.line, length=length))
+            if table.symmetric and on_fold:
+                raise InputError(
+                    f"{where}: piece {piece!r} is a half on the fold, its other half the mirror image anyway; leave "
+                    "symmetric out, or set half = false"
+                )
+            if table.symmetric:
+                found.append(Symmetric(piece=piece, line=table.line))
     return found
