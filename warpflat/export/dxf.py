@@ -151,7 +151,19 @@ def write_dxf(
             blocks += [begin, *block, _tags((0, "ENDBLK"), (8, "0"))]
             space.append(_tags((0, "INSERT"), (8, "1"), (2, name), *_place(placed.offset * scale)))
     table = _ascii(garment.name)[:20]
-    _write_style(space, garment, units, scale, created, table="" if rules is None else table)
+    style = [
+        f"STYLE NAME: {garment.name}",
+        f"CREATION DATE: {created:%d-%m-%Y}",
+        f"CREATION TIME: {created:%H:%M}",
+        "AUTHOR: warpflat",
+        f"SAMPLE SIZE: {garment.garment.sample}",
+        *([f"GRADE RULE TABLE: {table}"] if rules is not None and table else []),
+        f"UNITS: {units.upper()}",
+        "PRODUCT: warpflat",
+        f"VERSION: {__version__}",
+    ]
+    for row, text in enumerate(style):
+        _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
     with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii") as stream:
         for section, content in (("HEADER", []), ("BLOCKS", blocks), ("ENTITIES", space)):
             stream.write(_tags((0, "SECTION"), (2, section)) + "".join(content) + _tags((0, "ENDSEC")))
@@ -206,25 +218,6 @@ def _ascii(text: str) -> str:
 def _is_written(name: str) -> bool:
     """Return whether 7 bits leave anything of a name."""
     return any(letter.isalnum() for letter in _ascii(name))
-
-
-def _write_style(
-    space: list[str], garment: DraftedGarment, units: str, scale: float, created: datetime, *, table: str
-) -> None:
-    """Write the texts that describe the whole file."""
-    texts = [
-        f"STYLE NAME: {garment.name}",
-        f"CREATION DATE: {created:%d-%m-%Y}",
-        f"CREATION TIME: {created:%H:%M}",
-        "AUTHOR: warpflat",
-        f"SAMPLE SIZE: {garment.garment.sample}",
-        *([f"GRADE RULE TABLE: {table}"] if table else []),
-        f"UNITS: {units.upper()}",
-        "PRODUCT: warpflat",
-        f"VERSION: {__version__}",
-    ]
-    for row, text in enumerate(texts):
-        _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
 
 
 def _polyline(block: list[str], points: FloatArray, scale: float, layer: str, *, closed: bool = False) -> None:

@@ -34,7 +34,7 @@ from warpflat.pattern.drafted_darts import (
 from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
-from warpflat.pattern.piece_parts import Edge, Hole
+from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Garment, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
@@ -145,7 +145,14 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     drafted_darts = tuple(dart_line(legs, cut.points) for legs in darts.values())
     holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
     fisheyes = {hole.name: smooth_fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
-    cutouts = {hole.name: _cutout(hole, holes[hole.name]) for hole in piece.holes if hole.kind == "cutout"}
+    cutouts = {}
+    for hole in (hole for hole in piece.holes if hole.kind == "cutout"):
+        # A hole that is too small for an allowance is cut on its sewing line.
+        points = holes[hole.name]
+        line = cut_hole(points, hole.width)
+        cutouts[hole.name] = DraftedCutout(
+            sew_line=points, cut_line=points if line is None else line, width=0.0 if line is None else hole.width
+        )
     lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
     internal = {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
@@ -162,6 +169,12 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in fisheye_legs(line)))))
         if apart > SEAM_TOLERANCE:
             uneven.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
+    # What even the widest tolerance leaves wavy.
+    wavy = [e.name for e in edges if tolerance is None and e.tolerance > TOLERANCE and is_wavy(e.curve)]
+    ragged = [
+        f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
+        f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
+    ]
     return DraftedPiece(
         piece=piece,
         frame=frame,
@@ -187,7 +200,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         ),
         notes=(
             *cut.notes,
-            *_ragged_edges(edges, tolerance),
+            *(ragged if wavy else ()),
             *chain.from_iterable(map(dart_notes, darts.values())),
             *[
                 f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
@@ -197,18 +210,6 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
             *uneven,
         ),
     )
-
-
-def _ragged_edges(edges: Sequence[DraftedEdge], tolerance: float | None) -> list[str]:
-    """Return a note on the edges that even the widest tolerance leaves wavy."""
-    smoothed = [edge for edge in edges if tolerance is None and edge.tolerance > TOLERANCE]
-    wavy = [edge.name for edge in smoothed if is_wavy(edge.curve)]
-    if not wavy:
-        return []
-    return [
-        f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
-        f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
-    ]
 
 
 def _frame(piece: Piece) -> FloatArray:
@@ -279,14 +280,6 @@ def _drafted_edge(edge: Edge, curve: Curve, fitted: tuple[Curve, float], points:
     return DraftedEdge(
         edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1]
     )
-
-
-def _cutout(hole: Hole, points: FloatArray) -> DraftedCutout:
-    """Return the sewing and the cutting line of a hole; one line if it is too small for an allowance."""
-    line = cut_hole(points, hole.width)
-    if line is None:
-        return DraftedCutout(sew_line=points, cut_line=points, width=0.0)
-    return DraftedCutout(sew_line=points, cut_line=line, width=hole.width)
 
 
 def nest_label(pieces: Sequence[DraftedPiece]) -> Label:

@@ -112,6 +112,8 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
     """
     if len(pieces) == 1:
         return (draw_piece(pieces[0], paper),)
+    import shapely
+
     joints = () if paper is None else paper.joints
     drawings = []
     middle = len(pieces) // 2
@@ -157,9 +159,14 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
                 fold_strokes, fold_words = _fold_bracket(fold, joints)
                 strokes += fold_strokes
                 words += fold_words
-        drawings.append(
-            Drawing(piece=piece, strokes=tuple(strokes), words=(*words, *_size_tags(piece, edge, index, len(pieces))))
-        )
+        if edge:
+            # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
+            ring = shapely.LinearRing(piece.cut_line)
+            for start in (0.08, 0.62):
+                at = resample(piece.edge(edge).line, start + 0.3 * (index + 0.5) / len(pieces))
+                on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+                words.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
+        drawings.append(Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words)))
     return tuple(drawings)
 
 
@@ -401,18 +408,3 @@ def _fold_bracket(edge: DraftedEdge, joints: Sequence[FloatArray] = ()) -> tuple
 
 def _leader_strokes(label: Label) -> list[Stroke]:
     return [] if label.leader is None else [Stroke(role="leader", name="", points=label.leader)]
-
-
-def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[Words]:
-    """Write the size on its own cut line, staggered along an edge so that the tags of sizes do not collide."""
-    import shapely
-
-    if not edge:
-        return []
-    ring = shapely.LinearRing(piece.cut_line)
-    words = []
-    for start in (0.08, 0.62):
-        at = resample(piece.edge(edge).line, start + 0.3 * (index + 0.5) / count)
-        on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
-        words.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
-    return words

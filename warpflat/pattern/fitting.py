@@ -62,7 +62,13 @@ def fit_edges(
     for piece in pieces:
         for edge in piece.edges:
             line = lines[piece.name, edge.name]
-            fitted[piece.name, edge.name] = _fit_edge(line[[0, -1]] if edge.kind == "fold" else line, tolerance)
+            line = line[[0, -1]] if edge.kind == "fold" else line
+            # The least of `TOLERANCES` that makes the curve clean, or the largest.
+            for tried in TOLERANCES if tolerance is None else (tolerance,):
+                curve = fit_curve(line, tried)
+                if tolerance is not None or not _ragged(curve):
+                    break
+            fitted[piece.name, edge.name] = curve, tried
     if tolerance is None:
         for first, second, against, ease in _paired_edges(pieces, seams):
             wide = max(fitted[first][1], fitted[second][1])
@@ -131,17 +137,6 @@ def smooth_line(line: FloatArray) -> FloatArray:
     return smooth
 
 
-def _fit_edge(line: FloatArray, tolerance: float | None) -> tuple[Curve, float]:
-    """Fit a curve within the tolerance, or within the least of `TOLERANCES` that makes it clean; return both."""
-    if tolerance is not None:
-        return fit_curve(line, tolerance), tolerance
-    for tried in TOLERANCES:
-        curve = fit_curve(line, tried)
-        if not _ragged(curve):
-            break
-    return curve, tried
-
-
 def _ragged(curve: Curve) -> bool:
     """Return whether a curve has too many segments or waves for a clean border."""
     return len(curve.bezier) > CURVES + curve.length / CURVE or is_wavy(curve)
@@ -173,7 +168,11 @@ def _keep_near(
     keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
     clean = [key for key in keys if fitted[key][1] <= within]
     tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in clean}
-    unchecked = list(_sewn(pieces, seams))
+    # Both sides of every seam and dart, in one direction, and the second side's ease.
+    unchecked: list[tuple[Sides, Eased]] = [(seam.sides, (seam.ease, seam.eased)) for seam in seams]
+    for name, dart in ((piece.name, dart) for piece in pieces for dart in piece.darts):
+        left, right = SeamSide(piece=name, edge=dart.left), SeamSide(piece=name, edge=dart.right, reversed=True)
+        unchecked.append((((left,), (right,)), (0.0, (0.0, 1.0))))
     # The edges of a mirror pair are sewn at two seams: a curve that one of them rejects changes the other.
     while unequal := [seam for seam in unchecked if _difference(*_both(seam, lines, tried)) > SAFE]:
         for sides, ease in unequal:
@@ -191,16 +190,6 @@ def _both(
     """Return the lengths along both sides of a seam at their points, and the second side's ease."""
     (first, second), ease = seam
     return _lengths_at_points(first, lines, curves), _lengths_at_points(second, lines, curves), ease
-
-
-def _sewn(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Sides, Eased]]:
-    """Yield both sides of every seam and dart, in one direction, and the second side's ease."""
-    for seam in seams:
-        yield seam.sides, (seam.ease, seam.eased)
-    for piece in pieces:
-        for dart in piece.darts:
-            left, right = SeamSide(piece=piece.name, edge=dart.left), SeamSide(piece=piece.name, edge=dart.right)
-            yield ((left,), (SeamSide(piece=right.piece, edge=right.edge, reversed=True),)), (0.0, (0.0, 1.0))
 
 
 def _lengths_at_points(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -248,10 +248,26 @@ def place_label(
         found += [] if label is None else [label]
         if label is not None and _relative_size(label) >= ENOUGH:
             break
-    return (
-        max(found, key=_relative_size)
-        if found
-        else _label_beside(cut.buffer(0).difference(shapely.union_all(away)), texts)
+    if found:
+        return max(found, key=_relative_size)
+    # To the right of the cloth, with a leader to it at half its height.
+    cloth = cut.buffer(0).difference(shapely.union_all(away))
+    left, bottom, right, top = cloth.bounds
+    rows = tuple(
+        (wrap_text(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
+        for k, (text, height) in enumerate(texts)
+    )
+    beside = Label(at=np.zeros(2), lines=rows)
+    beside = beside.scaled(min(1.0, BESIDE_WIDTH / beside.width))
+    middle = (bottom + top) / 2
+    across = shapely.LineString([(left - 1, middle), (right + 1, middle)]).intersection(cloth)
+    near = max(shapely.get_parts(across), key=lambda part: part.bounds[2] if part.length > 0 else -np.inf)
+    target = near.bounds[2] - min(LEADER, near.length / 2)
+    start = right + BESIDE_GAP
+    return replace(
+        beside,
+        at=np.array([start + 0.001 + beside.width / 2, middle]),
+        leader=np.array([[start, middle], [target, middle]]),
     )
 
 
@@ -356,29 +372,6 @@ def _largest_factor(part: Polygon, shape: FloatArray, at: FloatArray, floor: flo
         middle = (low + high) / 2
         low, high = (middle, high) if fits(middle) else (low, middle)
     return low
-
-
-def _label_beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
-    """Place a label to the right of the cloth, with a leader to it at half its height."""
-    import shapely
-
-    left, bottom, right, top = cloth.bounds
-    rows = tuple(
-        (wrap_text(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
-        for k, (text, height) in enumerate(lines)
-    )
-    label = Label(at=np.zeros(2), lines=rows)
-    label = label.scaled(min(1.0, BESIDE_WIDTH / label.width))
-    middle = (bottom + top) / 2
-    across = shapely.LineString([(left - 1, middle), (right + 1, middle)]).intersection(cloth)
-    near = max(shapely.get_parts(across), key=lambda part: part.bounds[2] if part.length > 0 else -np.inf)
-    target = near.bounds[2] - min(LEADER, near.length / 2)
-    start = right + BESIDE_GAP
-    return replace(
-        label,
-        at=np.array([start + 0.001 + label.width / 2, middle]),
-        leader=np.array([[start, middle], [target, middle]]),
-    )
 
 
 def _rotation(angle: float) -> FloatArray:

@@ -37,6 +37,10 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
     for seam in seams:
         lines = [SeamLine(side, pieces) for side in seam.sides]
         first, second = (line.length for line in lines)
+        # Edges that come from no mesh have no common vertices.
+        worst = None
+        if all(edge.edge.vertices is not None for line in lines for edge in line.edges):
+            worst = worst_difference(lines[0].places, lines[1].places, seam.ease, seam.eased)
         reports.append(
             SeamReport(
                 name=seam.name,
@@ -45,7 +49,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
                 length_mm=(first * 1000, second * 1000),
                 ease=seam.ease,
                 difference_mm=(second - first * (1 + seam.ease)) * 1000,
-                local_mm=_local_difference(lines[0], lines[1], seam),
+                local_mm=None if worst is None else 1000 * worst,
             )
         )
     return reports
@@ -164,14 +168,6 @@ def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_li
     if len(hits) == 0:
         return None
     return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])
-
-
-def _local_difference(one: SeamLine, other: SeamLine, seam: Seam) -> float | None:
-    """Return the worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
-    if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
-        return None
-    worst = worst_difference(one.places, other.places, seam.ease, seam.eased)
-    return None if worst is None else 1000 * worst
 
 
 class SeamLine:

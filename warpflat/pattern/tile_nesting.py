@@ -150,19 +150,17 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
         places.clear()
         length = 0
         for k in order:
-            found = [(*_highest(places, mask), mask) for mask in masks[k]]
+            # The first free place (row, column) of each mask.
+            found = []
+            for mask in masks[k]:
+                free = places.free(mask)
+                row = int(np.argmax(free.any(axis=1)))
+                found.append((row, int(np.argmax(free[row])), mask))
             row, column, mask = min(found, key=lambda item: (max(length, item[0] + len(item[2].cells)), item[0]))
             places.take(mask, row, column)
             length = max(length, row + len(mask.cells))
         lengths.append(length)
     return min(lengths) * float(cell[1])
-
-
-def _highest(places: Places, mask: Mask) -> tuple[int, int]:
-    """Return the first free place (row, column) of a mask."""
-    free = places.free(mask)
-    row = int(np.argmax(free.any(axis=1)))
-    return row, int(np.argmax(free[row]))
 
 
 def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -> list[Mask]:

@@ -129,11 +129,28 @@ def _page(
     film, packed = "", None
     if "frames.usdc" in files:
         packed = packed_film()
-        film = (
-            _film_section(packed)
-            if packed
-            else "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
-        )
+        film = "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
+        if packed:
+            # No text of a film may end the script it stands in.
+            data = json.dumps(packed, separators=(",", ":")).replace("<", "\\u003c")
+            buttons = "".join(
+                f'<button data-view="{view}">{view.capitalize()}</button>'
+                for view in ("all", "front", "side", "back", "pattern")
+            )
+            colours = base64.b64decode(packed["colours"])
+            stops = ",".join(
+                f"rgb({colours[i]},{colours[i + 1]},{colours[i + 2]})" for i in range(0, len(colours), 3 * 15)
+            )
+            hint = "drag to turn, shift-drag to move, wheel to zoom"
+            scale = f'0 <i style="background:linear-gradient(90deg,{stops})"></i> {packed["scale"]:.3g} J/m² strain energy density · '
+            if packed["scale"] <= SMALLEST_SCALE:
+                scale = "No strain energy: the cloth lies flat without strain · "
+            film = (
+                f'<div class="stage"><canvas id="view"></canvas><div class="bar"><button id="play">Play</button>'
+                f'<input id="slider" type="range" min="0" value="0" aria-label="frame"><span id="label"></span>{buttons}</div>'
+                f'<div class="scale">{scale}{hint}</div></div>'
+                f'<script id="film" type="application/json">{data}</script>'
+            )
     notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
     shown = {**pack_pictures(folder, [file for file in files if file not in pictures]), **pictures}
     order = sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
@@ -184,10 +201,17 @@ def _page(
         for name, piece in metrics["pieces"].items()
     ]
     head = ("piece", "vertices", "faces", "area", "length error", "area error", "border error", "flips")
+    worn = ""
+    if "drape.webp" in files:
+        text = base64.b64encode(_bytes(latest_file(folder / "drape.webp"))).decode("ascii")
+        worn = (
+            f'<img alt="drape.webp" src="data:image/webp;base64,{text}"><p>Front, left side and back, coloured by the gap to the body; '
+            "frames.usdc holds the same in space.</p>"
+        )
     sections = [
         ("", f'{verdict}<div class="cards">{boxes}</div>'),
         ("From the development to rest", film),
-        ("Worn: from the designed surface to rest", _worn(folder, files)),
+        ("Worn: from the designed surface to rest", worn),
         ("Pictures", "".join(f'<img alt="{escape(file)}" src="{shown[file]}">' for file in order)),
         ("Pattern", "".join(drawings)),
         ("Cuts and darts", ledger_table(metrics)),
@@ -206,41 +230,6 @@ def _page(
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{_data("page.css")}</style></head>'
         f'<body><main><h1>{escape(name)}</h1><p class="sub">warpflat {escape(str(metrics["warpflat"]))}</p>'
         f"{body}</main>{script}</body></html>\n"
-    )
-
-
-def _film_section(film: Mapping[str, Any]) -> str:
-    """Return the viewer with its film."""
-    # No text of a film may end the script it stands in.
-    data = json.dumps(film, separators=(",", ":")).replace("<", "\\u003c")
-    buttons = "".join(
-        f'<button data-view="{view}">{view.capitalize()}</button>'
-        for view in ("all", "front", "side", "back", "pattern")
-    )
-    colours = base64.b64decode(film["colours"])
-    stops = ",".join(f"rgb({colours[i]},{colours[i + 1]},{colours[i + 2]})" for i in range(0, len(colours), 3 * 15))
-    hint = "drag to turn, shift-drag to move, wheel to zoom"
-    scale = (
-        f'0 <i style="background:linear-gradient(90deg,{stops})"></i> {film["scale"]:.3g} J/m² strain energy density · '
-    )
-    if film["scale"] <= SMALLEST_SCALE:
-        scale = "No strain energy: the cloth lies flat without strain · "
-    return (
-        f'<div class="stage"><canvas id="view"></canvas><div class="bar"><button id="play">Play</button>'
-        f'<input id="slider" type="range" min="0" value="0" aria-label="frame"><span id="label"></span>{buttons}</div>'
-        f'<div class="scale">{scale}{hint}</div></div>'
-        f'<script id="film" type="application/json">{data}</script>'
-    )
-
-
-def _worn(folder: Path, files: Sequence[str]) -> str:
-    """Return the moving picture of the drape."""
-    if "drape.webp" not in files:
-        return ""
-    text = base64.b64encode(_bytes(latest_file(folder / "drape.webp"))).decode("ascii")
-    return (
-        f'<img alt="drape.webp" src="data:image/webp;base64,{text}"><p>Front, left side and back, coloured by the gap to the body; '
-        "frames.usdc holds the same in space.</p>"
     )
 
 

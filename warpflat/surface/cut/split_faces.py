@@ -128,11 +128,19 @@ def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1)
     faces = np.concatenate([surface.faces[whole], np.array(rows, dtype=np.int32).reshape(-1, 4)])
     face_origin = np.concatenate([whole, np.array(origin, dtype=np.int64)]).astype(np.int32)
     order = np.argsort(face_origin, kind="stable")
+    # The new vertices on the edges of a feature line are part of it.
+    lines = {
+        name: np.array(
+            [line[0], *(v for a, b in pairwise(line.tolist()) for v in (*refined.vertices_between(a, b), b))],
+            dtype=np.int32,
+        )
+        for name, line in surface.lines.items()
+    }
     new = replace(
         surface,
         vertices=np.concatenate([surface.vertices, added]),
         faces=np.ascontiguousarray(faces[order]),
-        lines={name: _refined_line(line, refined) for name, line in surface.lines.items()},
+        lines=lines,
         input_vertices=np.concatenate([surface.input_vertices, added]),
         input_index=np.concatenate(
             [surface.input_index, len(surface.input_vertices) + np.arange(len(added), dtype=np.int32)]
@@ -158,14 +166,6 @@ def _without_small(place: Place, snap: float, border: set[tuple[int, ...]]) -> P
             break
         place = rest if len(rest) > 1 else dict.fromkeys(rest, 1.0)
     return place
-
-
-def _refined_line(line: IntArray, refined: Refinement) -> IntArray:
-    """Return a feature line with the new vertices on its edges inserted."""
-    vertices = line[:1].tolist()
-    for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):
-        vertices += [*refined.vertices_between(a, b), b]
-    return np.array(vertices, dtype=np.int32)
 
 
 _Triangle = tuple[int, int, int]

@@ -166,7 +166,9 @@ def read_mesh_file(
             used = np.unique(raw.polygons[raw.polygons >= 0])
             points = raw.vertices[used[used < len(raw.vertices)]]
             points = points[np.isfinite(points).all(axis=1)]
-            sizes = "; ".join(f'"{unit}": {_extent(points, METRES_PER_UNIT[unit])} m' for unit in ("m", "cm", "mm"))
+            sides = {unit: (np.ptp(points, axis=0) * METRES_PER_UNIT[unit]).tolist() for unit in ("m", "cm", "mm")}
+            extents = {unit: " x ".join(f"{side:.3g}" for side in extent) for unit, extent in sides.items()}
+            sizes = "; ".join(f'"{unit}": {extent} m' for unit, extent in extents.items())
             raise InputError(
                 'carries no unit: say which with units = "m" in the scene or --units m on the command line '
                 f"(m, cm, mm, in, ft); the mesh would measure, as {sizes}"
@@ -272,10 +274,6 @@ def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:
         stray = stray_vertex(points)
         if stray is not None:
             raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
-
-
-def _extent(points: FloatArray, scale: float) -> str:
-    return " x ".join(f"{side:.3g}" for side in (np.ptp(points, axis=0) * scale).tolist())
 
 
 def check_size(surface: Surface, file: Path, scale: float) -> None:

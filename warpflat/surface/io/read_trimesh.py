@@ -60,12 +60,13 @@ def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
     if not any(len(faces) for _, _, faces in meshes):
         raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
     start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)]).tolist()
-    visuals = [geometry.visual for geometry in scene.geometry.values() if hasattr(geometry, "visual")]
-    textured = any(getattr(visual, "kind", None) == "texture" for visual in visuals)
+    textured = suffix == ".ply" and any(
+        getattr(getattr(geometry, "visual", None), "kind", None) == "texture" for geometry in scene.geometry.values()
+    )
     return TrimeshMesh(
         vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
         faces=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
-        split_corners=suffix in (".stl", *GLTF) or (suffix == ".ply" and textured),
+        split_corners=suffix in (".stl", *GLTF) or textured,
         groups=[(at, name) for (name, _, _), at in zip(meshes, start, strict=False)] if suffix in GLTF else [],
     )
 

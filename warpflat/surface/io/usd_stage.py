@@ -154,7 +154,11 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
         sizes, corners = all_sizes[kept], all_corners[np.repeat(kept, all_sizes)]
         vertices, mirrored = to_metres(points, one)
         left_handed = _value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
-        parts.append((vertices, sizes, _turned(sizes, corners) if left_handed != mirrored else corners))
+        if left_handed != mirrored:
+            # Faces are wound the other way, from the same first corner.
+            first, size = np.repeat(np.cumsum(sizes) - sizes, sizes), np.repeat(sizes, sizes)
+            corners = corners[first + (size - np.arange(len(corners)) + first) % size]
+        parts.append((vertices, sizes, corners))
     start = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)]).tolist()
     out = UsdMesh(
         name=chosen[0].GetName(),
@@ -196,14 +200,6 @@ def _value(attribute: Any) -> Any:
 
     value = attribute.Get()
     return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
-
-
-def _turned(sizes: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the corners of faces wound the other way, from the same first corner."""
-    start = np.repeat(np.cumsum(sizes) - sizes, sizes)
-    size = np.repeat(sizes, sizes)
-    place = np.arange(len(corners)) - start
-    return corners[start + (size - place) % size]
 
 
 def _curve_prims(mesh: Any) -> list[Any]:

@@ -246,16 +246,13 @@ class _Patch:
                 continue
             if edge and self.neighbours(gone)[kept] != 1:
                 continue
-            if line and not self._consecutive(gone, kept):
+            # Every line through `gone` must also run through `kept` next to it.
+            through = [row for row in self.lines.values() if gone in row] if line else []
+            if not all(any({x, y} == {gone, kept} for x, y in pairwise(row)) for row in through):
                 continue
             if self._collapse(gone, kept):
                 return True
         return False
-
-    def _consecutive(self, gone: int, kept: int) -> bool:
-        """Return whether every line through `gone` also runs through `kept` next to it."""
-        pairs = {gone, kept}
-        return all(gone not in line or any({x, y} == pairs for x, y in pairwise(line)) for line in self.lines.values())
 
     def _collapse(self, gone: int, kept: int) -> bool:
         """Merge the vertex `gone` into `kept`; false, and nothing is changed, where that would spoil the surface."""
