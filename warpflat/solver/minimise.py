@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -29,7 +29,7 @@ from warpflat.solver.steps import Relaxation, Watch, relax_by_steps, take_first_
 from warpflat.solver.stop import Outcome, Remainder, RemainderEstimate, Status, looked_back, relative_change
 from warpflat.surface.connectivity import border_of
 
-__all__ = ["Descent", "Measure", "Problem", "line_search", "relax"]
+__all__ = ["Cloth", "Descent", "Measure", "Problem", "line_search", "relax"]
 
 # Corrections that L-BFGS remembers.
 _MEMORY = 8
@@ -64,6 +64,22 @@ class Problem(Protocol[P]):
 
     def solver(self, point: P) -> Solve:
         """Return the solution by the metric at a point."""
+
+
+@dataclass
+class Cloth:
+    """The energy of a network, with its seams and contacts, and the metric to which each layout adds the stiffness of its contacts."""
+
+    energy: Energy
+    metric: Metric
+
+    def at(self, positions: FloatArray) -> Point:
+        """Evaluate a layout."""
+        return self.energy.at(positions)
+
+    def solver(self, point: Point) -> Solve:
+        """Return the solution by the metric at a point."""
+        return self.metric.solver(point.touch.vertices, point.touch.rows)
 
 
 class _Memory:
@@ -254,22 +270,6 @@ class _Directions:
         return new
 
 
-class _Cloth:
-    """The energy of a network alone, and the metric that is the same in all layouts."""
-
-    def __init__(self, state: Relaxation) -> None:
-        self.energy = Energy(state)
-        self._solve = Metric(LaplacianFactor(state.network), state.alignments).solver()
-
-    def at(self, positions: FloatArray) -> Point:
-        """Evaluate a layout."""
-        return self.energy.at(positions)
-
-    def solver(self, point: Point) -> Solve:
-        """Return the solution by the metric."""
-        return self._solve
-
-
 def relax(
     state: Relaxation,
     *,
@@ -303,7 +303,7 @@ def relax(
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
     start = state.positions()
     layout = None if first is None else start
-    problem = _Cloth(state)
+    problem = Cloth(Energy(state), Metric(LaplacianFactor(state.network), state.alignments))
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return state.make_outcome(steps_before, work_before, began_at=began_at)
