@@ -20,8 +20,8 @@ from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier
 from warpflat.solver.energy import Energy, Point
 from warpflat.solver.grain import align_grain
-from warpflat.solver.metric import Metric, Solve, StiffnessFactor
-from warpflat.solver.minimise import Descent
+from warpflat.solver.metric import Metric, StiffnessFactor
+from warpflat.solver.minimise import Cloth, Descent
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation, relax_by_steps, take_first_steps
 from warpflat.solver.stop import Outcome
@@ -67,26 +67,9 @@ def factor_pays(network: SpringNetwork, options: RelaxOptions) -> bool:
     return options.solver != "paper" and network.vertex_count <= _MOST_VERTICES
 
 
-class _SewnCloth:
-    """The energy of a network and its equations, and the factor of its stiffness in the layout at the start."""
-
-    def __init__(self, state: Relaxation, gap: float) -> None:
-        self._state = state
-        self._energy = Energy(state, Barrier.of(state.network, gap) if gap else None)
-        self.factor_again()
-
-    def factor_again(self) -> None:
-        """Factor the stiffness in the present layout of the state."""
-        state = self._state
-        self._metric = Metric(StiffnessFactor(state.network, state.positions(), state.alignments), state.alignments)
-
-    def at(self, positions: FloatArray) -> Point:
-        """Evaluate a layout."""
-        return self._energy.at(positions)
-
-    def solver(self, point: Point) -> Solve:
-        """Return the solution by the metric: the factor plus the stiffness of the contacts."""
-        return self._metric.solver(point.touch.vertices, point.touch.rows)
+def _stiffness_metric(state: Relaxation) -> Metric:
+    """Factor the stiffness of cloth and equations in the present layout."""
+    return Metric(StiffnessFactor(state.network, state.positions(), state.alignments), state.alignments)
 
 
 def relax_under_equations(
@@ -120,7 +103,7 @@ def relax_under_equations(
     first = None if gap or goes_on else take_first_steps(state)
     layout = None if first is None else state.positions()
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
-    problem = _SewnCloth(state, gap)
+    problem = Cloth(Energy(state, Barrier.of(network, gap) if gap else None), _stiffness_metric(state))
     descent = Descent(problem, problem.at(state.positions()))
     factored_at = 0
     while True:
@@ -153,7 +136,7 @@ def relax_under_equations(
             network.seams.offset.assign(network.seams.offset.numpy() + correction(residuals))
         is_stale = descent.iterations - factored_at > _STEPS_PER_FACTOR
         if is_stale:
-            problem.factor_again()
+            problem.metric = _stiffness_metric(state)
             factored_at = descent.iterations
         descent.renew(forget=is_stale)
 

@@ -14,6 +14,7 @@ which are held as rows of infinite stiffness, without the I.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -184,18 +185,24 @@ class Metric:
         self._factor = factor
         self._chords, self._across = _chords(alignments)
 
-    def solver(self, vertices: IntArray | None = None, lever: FloatArray | None = None) -> Solve:
+    @cached_property
+    def _without_contacts(self) -> Solve:
+        return self._solver(np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3, 2)))
+
+    def solver(self, vertices: IntArray, lever: FloatArray) -> Solve:
         """Return the solution by the factor plus a row R^T R for each contact; it does not move chords sideways.
 
         Args:
             vertices: #C by 3, of contacts, if any.
             lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
         """
+        return self._solver(vertices, lever) if len(vertices) else self._without_contacts
+
+    def _solver(self, vertices: IntArray, lever: FloatArray) -> Solve:
         factor, count = self._factor, len(self._chords)
         chord = np.zeros((count, 3, 2))
         chord[:, 0], chord[:, 1] = self._across, -self._across
-        vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
-        lever = chord if lever is None else np.concatenate([chord, lever])
+        vertices, lever = np.concatenate([self._chords, vertices]), np.concatenate([chord, lever])
         if len(vertices) == 0:
             return factor.solve
         own, at = np.unique(vertices, return_inverse=True)
