@@ -20,7 +20,7 @@ import numpy as np
 import shapely
 from shapely.affinity import affine_transform
 
-from warpflat.export.read_pattern_json import read_pattern_json
+from warpflat.export.pattern_json import read_pattern_json
 from warpflat.export.svg import STYLE
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 

@@ -64,8 +64,8 @@ def approximate_implicit(case: Case, time_step: float, *, damped: bool) -> Energ
     state = Relaxation(case.network, RelaxOptions(time_step=time_step, kinetic_damping=damped), start=case.start)
     while True:
         state.step()
-        energies = state.energies()
-        yield energies.potential, energies.total
+        potential, mass = state.energies().potential, case.network.mass.numpy()
+        yield potential, potential + 0.5 * float(mass @ (state.velocity.numpy() ** 2).sum(axis=1))
 
 
 @dataclass(kw_only=True)

@@ -23,7 +23,7 @@ from pydantic.fields import FieldInfo
 
 import warpflat
 from warpflat.core.toml_file import Table, read_toml
-from warpflat.export.pattern_json_entries import PatternEntry
+from warpflat.export.pattern_json import PatternEntry
 from warpflat.mannequin.blend import Adjustment
 from warpflat.mannequin.ease import EASE_PRESETS
 from warpflat.scene.schema import SceneTable

@@ -263,16 +263,3 @@ def advance(
         v = (at.anchor[i] - here + away * (at.reach[i] / distance)) / time_step
     velocity[i] = v
     position[i] = here + v * time_step
-
-
-@wp.kernel
-def compute_kinetic_energy(
-    mass: wp.array(dtype=wp.float64),
-    velocity: wp.array(dtype=wp.vec2d),
-    first: int,
-    # outputs
-    energy: wp.array(dtype=wp.float64),
-):
-    """Compute 1/2 m v^2. mass [kg], velocity [m/s], energy [J]: #V."""
-    i = natural(wp.tid() + first)
-    energy[i] = wp.float64(0.5) * mass[i] * wp.dot(velocity[i], velocity[i])

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from warpflat.draping.recover_pattern import Recovery, recover_pattern
     from warpflat.draping.result import Drape
     from warpflat.draping.write import save_drape
+    from warpflat.export.pattern_json import read_pattern_json
     from warpflat.export.read_dxf import read_dxf
-    from warpflat.export.read_pattern_json import read_pattern_json
     from warpflat.export.read_svg import read_svg
     from warpflat.fabric.fabric import Fabric
     from warpflat.fabric.library import find_fabric, load_library
@@ -157,7 +157,7 @@ _HOME = {
     "pattern_of_garment": "garment.to_pattern",
     "read_dxf": "export.read_dxf",
     "read_pieces": "surface.io.read_pieces",
-    "read_pattern_json": "export.read_pattern_json",
+    "read_pattern_json": "export.pattern_json",
     "read_surface": "surface.io.read",
     "read_svg": "export.read_svg",
     "recover_pattern": "draping.recover_pattern",

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from warpflat._version import __version__
 from warpflat.cli.main import main
 from warpflat.cli.progress_bar import ProgressBar
 from warpflat.cli.tables import warnings_of
+from warpflat.core.text import energy_words, format_count
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -79,6 +81,23 @@ def test_run_prints_its_metrics_as_json_and_nothing_else(warpflat: Run):
     assert code == 0
     assert json.loads(out) == json.loads(Path("there/metrics.json").read_text())
     assert err == ""
+
+
+@pytest.mark.parametrize("verbose", [[], ["-v"]])
+@pytest.mark.parametrize("solver", ["auto", "paper"])
+def test_it_tells_the_steps_and_the_iterations_and_what_each_released(warpflat: Run, solver: str, verbose: list[str]):
+    Path("cap.toml").write_text(f"[surface]\nshape = 'dome'\nresolution = 9\n[relax]\nsolver = '{solver}'\n{BARE}")
+    _, out, _ = warpflat("run", "cap.toml", "--out", "there", *verbose)
+    stages = json.loads(Path("there/metrics.json").read_text())["pieces"]["cap"]["stages"]
+    released = [a["model_energy_j"] - b["model_energy_j"] for a, b in pairwise(stages)]
+    units = ["step", "iteration"] if solver == "auto" else ["step"]
+    assert len(released) == len(units)
+    told = [
+        f"{format_count(stage['steps'], unit)} released {energy_words(joules)}"
+        for stage, unit, joules in zip(stages[1:], units, released, strict=True)
+    ]
+    assert f"relaxed: {', '.join(told)}\n" in out
+    assert all(joules > 0.0 for joules in released)
 
 
 def test_quiet_prints_nothing(warpflat: Run):

@@ -47,7 +47,7 @@ GARMENT = {
     "picture.png": "warpflat.export.picture_garment.GarmentViews.draw",
     "wear.png": "warpflat.flattening.fit_picture._Sheet.of",
     "walked.png": "warpflat.export.picture_walked.write_figure",
-    "frames.usdc": "warpflat.scene.frames_keys.KeyFile.append",
+    "frames.usdc": "warpflat.scene.frames.KeyFile.append",
     "review.html": "warpflat.review.page.pack_pictures",
     "the guide": "warpflat.export.pdf.legend_page",
 }
@@ -145,9 +145,9 @@ def test_a_garment_is_flattened_without_its_pictures(
 @pytest.mark.parametrize(
     "place",
     [
-        "warpflat.scene.frames_keys.KeyFile.__init__",
+        "warpflat.scene.frames.KeyFile.__init__",
         "warpflat.scene.frames.FrameRecorder._keep",
-        "warpflat.scene.frames_keys.KeyFile.place_frames",
+        "warpflat.scene.frames.KeyFile.place_frames",
         "warpflat.export.usd.FrameWriter.write",
         "warpflat.export.usd.FrameWriter.__exit__",
     ],

@@ -142,7 +142,7 @@ def test_a_signal_while_a_film_is_opened_leaves_no_file(tmp_path: Path, monkeypa
         assert len(os.listdir(tmp_path)) == 1
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("warpflat.export.usd.define_group", interrupted)
+    monkeypatch.setattr("warpflat.export.usd.begin_stage", interrupted)
     with pytest.raises(KeyboardInterrupt), FrameWriter(tmp_path / "frames.usdc", scale=1.0):
         pass
     assert os.listdir(tmp_path) == []

@@ -16,7 +16,6 @@ from warpflat.export.labels import (
     LabelRoom,
     Spot,
     leader_line,
-    points_on,
     space_out,
     spots_along,
     spots_beside,
@@ -25,8 +24,7 @@ from warpflat.export.labels import (
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_garment import Body, crop_body
-from warpflat.export.picture_packing import pack_boxes, pack_rows
-from warpflat.export.picture_page import BETWEEN, place_views
+from warpflat.export.picture_page import BETWEEN, pack_boxes, pack_rows, place_views
 from warpflat.export.picture_views import Silhouette, make_facets, pattern_view
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.half_edges import border_edges
@@ -433,7 +431,7 @@ def test_labels_do_not_overlap() -> None:
 
 
 def test_labels_avoid_other_lines_where_they_can() -> None:
-    crossing = points_on(np.array([[1.0, 0.0], [1.0, 2.0]]), 0.05)
+    crossing = [np.array([[1.0, 0.0], [1.0, 2.0]])]
     spots = [Spot(x=1.0, y=1.0, angle=0.0), Spot(x=2.0, y=1.0, angle=0.0)]
     room = LabelRoom()
     assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), crossing) == spots[1]

@@ -12,8 +12,7 @@ from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.export.dxf import write_dxf
-from warpflat.export.pattern_json import pattern_json
-from warpflat.export.read_pattern_json import pattern_from_json
+from warpflat.export.pattern_json import pattern_from_json, pattern_json
 from warpflat.export.svg import write_svg
 from warpflat.garment.pattern_files import check_names
 from warpflat.pattern.draft import draft_garment

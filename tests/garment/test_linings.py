@@ -7,8 +7,7 @@ import pytest
 import shapely
 
 from warpflat.core.errors import InputError
-from warpflat.export.pattern_json import pattern_json
-from warpflat.export.read_pattern_json import pattern_from_json
+from warpflat.export.pattern_json import pattern_from_json, pattern_json
 from warpflat.garment.facings import with_facings
 from warpflat.garment.linings import add_interfacing, add_lining
 from warpflat.pattern.cut_list import cut_list

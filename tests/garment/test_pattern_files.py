@@ -20,9 +20,8 @@ from sample_dress import sample_dress
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.export.dxf import write_dxf
-from warpflat.export.pattern_json import pattern_json
+from warpflat.export.pattern_json import pattern_from_json, pattern_json, read_pattern_json
 from warpflat.export.pdf import write_pdf
-from warpflat.export.read_pattern_json import pattern_from_json, read_pattern_json
 from warpflat.export.svg import write_svg
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from warpflat.core.errors import InputError
-from warpflat.export.read_pattern_json import read_pattern_json
+from warpflat.export.pattern_json import read_pattern_json
 from warpflat.garment.sew_pieces import meeting_borders
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene

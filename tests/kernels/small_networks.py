@@ -16,7 +16,6 @@ from warpflat.kernels.implicit import (
     BondForces,
     VertexForces,
     advance,
-    compute_kinetic_energy,
     gather_forces,
     gather_potential,
     stop,
@@ -171,10 +170,6 @@ class Launched:
     def spring_tension(self) -> NDArray[np.float64]:
         self._launch(compute_spring_tension, self.network.vertex_count)
         return self["tension"]
-
-    def kinetic_energy(self) -> NDArray[np.float64]:
-        self._launch(compute_kinetic_energy, self.network.vertex_count)
-        return self["energy"]
 
     def guard_energy(self) -> NDArray[np.float64]:
         self._launch(compute_guard_energy, self.network.face_count, per_face=True)

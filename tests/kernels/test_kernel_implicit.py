@@ -155,13 +155,6 @@ def test_a_vertex_of_a_mirrored_cell_stays():
     assert np.isfinite(at["position"]).all()
 
 
-def test_kinetic_energy():
-    network = small_network()
-    velocities = np.random.default_rng(1).normal(size=(network.vertex_count, 2))
-    energy = Launched(network, shaken(network, scale=1.0), velocities).kinetic_energy()
-    np.testing.assert_allclose(energy, 0.5 * network.mass.numpy() * (velocities**2).sum(axis=1), rtol=1e-14)
-
-
 def test_momentum_is_kept_by_forces():
     """Springs and guard push in pairs: whatever the state, forces and viscosity add up to nothing."""
     network = small_network()
@@ -183,7 +176,6 @@ def test_pieces_of_a_launch_equal_the_whole():
     )
     for name in whole.arrays:
         assert np.array_equal(whole[name], parts[name]), name
-    assert np.array_equal(whole.kinetic_energy(), parts.kinetic_energy())
 
 
 @pytest.mark.parametrize("coefficients", [(0.0, 0.0, 4.0 / 3.0), (0.0, 0.2, 2.4), (1.0, 1.0, 1.0)])

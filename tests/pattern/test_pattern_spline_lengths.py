@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, splprep
 
 from warpflat.core.polyline import arc_lengths
-from warpflat.pattern.spline_lengths import MOVE_TOLERANCES, _LengthSystem, adjust_lengths
+from warpflat.pattern.curves import MOVE_TOLERANCES, _LengthSystem, adjust_lengths
 
 FloatArray = NDArray[np.float64]
 TOLERANCE, WEIGHED = 1e-4, 8e-6

@@ -7,10 +7,9 @@ import pytest
 
 from warpflat.pattern.curves import chords, fit_curve
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.end_turn import turned_end
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
-from warpflat.pattern.truing import true_corners
+from warpflat.pattern.truing import true_corners, turned_end
 from warpflat.pattern.walked import walk_seams
 
 

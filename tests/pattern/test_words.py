@@ -8,9 +8,8 @@ from dataclasses import replace
 import pytest
 from sample_dress import sample_dress
 
-from warpflat.export.pattern_json import pattern_json
+from warpflat.export.pattern_json import pattern_from_json, pattern_json
 from warpflat.export.pdf import write_pdf
-from warpflat.export.read_pattern_json import pattern_from_json
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.words import language_words, printed_in, translate, translate_name
 

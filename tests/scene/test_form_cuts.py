@@ -12,7 +12,7 @@ import tomllib
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.export.read_pattern_json import read_pattern_json
+from warpflat.export.pattern_json import read_pattern_json
 from warpflat.garment.pattern_files import PatternOptions, garment_files
 from warpflat.scene.form import scene_form
 from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart, turn_dart

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from usd_validation import validate_usd
 
-from warpflat.scene.frames_keys import FilmStage, KeyFile, spread
+from warpflat.scene.frames import FilmStage, KeyFile, spread
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 
@@ -60,13 +60,10 @@ def test_no_frame_moves_a_vertex_by_more_than_a_twentieth_of_its_stage(tmp_path:
     }
     assert types == {"stage": "string", "step": "int", "interpolated": "bool", "model_energy_j": "double"}
     names = prim.GetAttribute("warpflat:stage")
-    assert [names.Get(at) for at in (1, 60, 61, 70, stage.GetEndTimeCode())] == [
-        "relax",
-        "relax",
-        "cut:slit",
-        "steps",
-        "sew",
-    ]
+    shown = [names.Get(at) for at in range(1, int(stage.GetEndTimeCode()) + 1)]
+    order = ["relax", "steps", "relax", "cut:slit", "steps", "cut:slit", "sew"]
+    assert [name for name, _ in groupby(shown)] == order
+    assert (shown[59], shown[60]) == ("relax", "cut:slit")
     tags = [prim.GetAttribute("warpflat:interpolated").Get(at) for at in range(1, 61)]
     assert (tags[0], tags[1], tags[-1]) == (False, True, False)
     assert validate_usd(tmp_path / "frames.usdc") == []

@@ -9,7 +9,7 @@ import pytest
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.export.read_pattern_json import read_pattern_json
+from warpflat.export.pattern_json import read_pattern_json
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 

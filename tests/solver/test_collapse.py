@@ -1,4 +1,4 @@
-"""Edge collapse: what they keep, how layouts go up from them, and that nothing is glued."""
+"""Coarser meshes: what they keep, how layouts go up from them, and that nothing is glued."""
 
 from __future__ import annotations
 
@@ -31,6 +31,16 @@ def sheet(columns: int, rows: int, *, triangles: bool = False) -> Surface:
         none = np.full((len(faces), 1), -1)
         faces = np.concatenate([np.hstack([faces[:, k], none]) for k in ([0, 1, 2], [0, 2, 3])])
     return make_surface(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces)
+
+
+def numbered_grid(rows: int, columns: int, turn: int = 0, *, mirrored: bool = False) -> Surface:
+    """A grid of 10 mm numbered row by row, all its faces begun at the same of their corners, wound one way or the other."""
+    i = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = np.roll(faces[:, ::-1] if mirrored else faces, turn, axis=1)
+    y, x = np.divmod(np.arange(rows * columns), columns)
+    vertices = np.column_stack([0.01 * x, 0.01 * y, 0.001 * x * y])
+    return Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=i.ravel())
 
 
 def flat(surface: Surface) -> FloatArray:
@@ -182,6 +192,26 @@ def test_levels_of_a_surface_are_made_once_the_finest_first():
         assert again is not None
         np.testing.assert_array_equal(again.surface.faces, step.surface.faces)
         assert (again.prolongation != step.prolongation).nnz == 0
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(33, 21), (30, 21), (24, 26)])
+@pytest.mark.parametrize("turn", [0, 1, 3])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_grid_keeps_every_second_row_and_column_and_the_last(rows: int, columns: int, turn: int, mirrored: bool):
+    surface = numbered_grid(rows, columns, turn, mirrored=mirrored)
+    step = next(iterate_coarsenings(surface))
+    coarse = step.surface
+    assert len(coarse.vertices) == (rows // 2 + 1) * (columns // 2 + 1)
+    assert len(coarse.faces) == (rows // 2) * (columns // 2)
+    np.testing.assert_array_equal(coarse.vertices, surface.vertices[step.kept])
+    # Its places are bilinear in row and column, and so is the interpolation.
+    np.testing.assert_allclose(step.prolongation @ coarse.vertices, surface.vertices, atol=1e-14)
+    np.testing.assert_array_equal(step.into[step.kept], np.arange(len(step.kept)))
+    assert np.abs(coarse.vertices[step.into] - surface.vertices)[:, :2].max() < 0.011
+    finer = surface.faces[step.face_of]
+    assert (finer[:, :, None] == step.kept[coarse.faces][:, None, :]).any(axis=(1, 2)).all()
+    side = np.sign(signed_cell_areas(surface.faces[:, :3], flat(surface)))
+    assert (np.sign(signed_cell_areas(coarse.faces[:, :3], flat(coarse))) == side[0]).all()
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])

@@ -65,6 +65,9 @@ def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
             browser.wait(f"{head}?.includes('at rest') && {head}")
             whole = page.session.solution
             assert whole is not None
+            steps, rest = whole.pieces["trial"].stages[1:]
+            assert f"{steps.steps} steps released " in browser.run(head)
+            assert f", {rest.steps} iterations released " in browser.run(head)
             client = wait_for(lambda: next(iter(page.server.get_clients().values()), None))
             # That there is no graphics card is told over the form.
             browser.run("document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())")

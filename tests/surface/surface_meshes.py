@@ -78,13 +78,3 @@ def check_invariants(surface: Surface) -> None:
     edges = {tuple(edge) for edge in mesh_edges(faces).tolist()}
     for line in surface.lines.values():
         assert all((min(a, b), max(a, b)) in edges for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True))
-
-
-def numbered_grid(rows: int, columns: int, turn: int = 0, *, mirrored: bool = False) -> Surface:
-    """A grid of 10 mm numbered row by row, all its faces begun at the same of their corners, wound one way or the other."""
-    i = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
-    faces = np.roll(faces[:, ::-1] if mirrored else faces, turn, axis=1)
-    y, x = np.divmod(np.arange(rows * columns), columns)
-    vertices = np.column_stack([0.01 * x, 0.01 * y, 0.001 * x * y])
-    return Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=i.ravel())

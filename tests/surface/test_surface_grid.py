@@ -1,17 +1,13 @@
-"""Rows and columns of quads, with concave corners, holes and cracks; and coarser lattices and what they carry."""
+"""Rows and columns of rectangular grids of quads; none for concave corners, holes and cracks."""
 
 from __future__ import annotations
-
-from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from surface_meshes import numbered_grid as grid
 
-from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.cut_mesh import cut_along
-from warpflat.surface.grid import Lattice, cut_lattice, find_lattice, rows_and_columns
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -64,33 +60,19 @@ PIECES = {
 @pytest.mark.parametrize("name", PIECES)
 def test_rows_and_columns_are_found_however_the_mesh_is_numbered(name: str) -> None:
     surface = PIECES[name]
-    lattice = find_lattice(surface)
-    assert lattice is not None
+    found = rows_and_columns(surface)
+    assert (found is not None) == (name == "rectangle")
+    if found is None:
+        return
+    assert sorted(found.shape) == [10, 17]
+    assert sorted(found.ravel().tolist()) == list(range(170))
     # Up to a turn of the whole by quarters.
-    places = np.column_stack([lattice.column, lattice.row, np.ones(len(lattice.row))])
-    turn, left, _, _ = np.linalg.lstsq(places, 100.0 * surface.vertices[:, :2], rcond=None)
+    row, column = np.indices(found.shape).reshape(2, -1)
+    places = np.column_stack([column, row, np.ones(len(row))])
+    turn, left, _, _ = np.linalg.lstsq(places, 100.0 * surface.vertices[found.ravel(), :2], rcond=None)
     assert np.abs(left).max() < 1e-20
     assert np.linalg.det(turn[:2]) == pytest.approx(1.0)
     assert sorted(np.abs(turn[:2]).round(9).ravel().tolist()) == [0.0, 0.0, 1.0, 1.0]
-    assert lattice.row.min() == lattice.column.min() == 0
-    np.testing.assert_array_equal(np.sort(lattice.corner, axis=1), np.sort(surface.faces, axis=1))
-    for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
-        np.testing.assert_array_equal(lattice.row[lattice.corner[:, k]], lattice.face_row + up)
-        np.testing.assert_array_equal(lattice.column[lattice.corner[:, k]], lattice.face_column + right)
-    grid = rows_and_columns(surface)
-    assert (grid is not None) == (name == "rectangle")
-    if grid is not None:
-        assert sorted(grid.shape) == [10, 17]
-
-
-def test_border_turns_at_corners_and_tips() -> None:
-    # Four corners, both sides of the mouth of the crack, and its tip.
-    lattice = find_lattice(PIECES["crack"])
-    assert lattice is not None
-    assert np.count_nonzero(lattice.bends) == 7
-    ell_lattice = find_lattice(PIECES["L"])
-    assert ell_lattice is not None
-    assert np.count_nonzero(ell_lattice.bends) == 6
 
 
 def ring() -> Surface:
@@ -116,46 +98,5 @@ def corner_of_a_box() -> Surface:
 
 
 @pytest.mark.parametrize("surface", [ring(), corner_of_a_box(), make_shape("dome", resolution=9, triangles=True)])
-def test_what_lies_on_no_lattice(surface: Surface) -> None:
-    assert find_lattice(surface) is None
+def test_what_is_no_grid(surface: Surface) -> None:
     assert rows_and_columns(surface) is None
-
-
-def area(surface: Surface) -> float:
-    p = surface.vertices[surface.faces]
-    return float(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])[:, 2].sum())
-
-
-def border_length(surface: Surface) -> float:
-    loops = border_loops(surface.faces)
-    return sum(
-        float(np.linalg.norm(np.diff(surface.vertices[[*loop, loop[0]]], axis=0), axis=1).sum()) for loop in loops
-    )
-
-
-def walked(surface: Surface) -> Lattice | None:
-    """The lattice found by a walk over the faces, whatever is known of them."""
-    return find_lattice(replace(surface, of_faces={}))
-
-
-def assert_same(ours: Lattice | None, theirs: Lattice | None) -> None:
-    assert ours is not None
-    assert theirs is not None
-    for field in fields(Lattice):
-        assert getattr(ours, field.name).dtype == getattr(theirs, field.name).dtype, field.name
-        np.testing.assert_array_equal(getattr(ours, field.name), getattr(theirs, field.name), err_msg=field.name)
-
-
-@pytest.mark.parametrize("name", ["rectangle", "L", "hole", "numbered"])
-def test_a_cut_piece_has_the_lattice_of_the_whole_one(name: str) -> None:
-    whole = grid(12, 15, 1) if name == "numbered" else PIECES[name]
-    lattice = find_lattice(whole)
-    assert lattice is not None
-    at = {(int(i), int(j)): v for v, (i, j) in enumerate(zip(lattice.row, lattice.column, strict=True))}
-    made = cut_along(whole.faces, [at[row, 4] for row in range(6)], vertex_count=len(whole.vertices))
-    assert made.component_count == 1
-    surface = make_surface(whole.vertices[made.vertex_origin], made.faces)
-    ours = cut_lattice(surface, whole, made.vertex_origin)
-    assert ours is not None
-    assert ours.bends.sum() > lattice.bends.sum()
-    assert_same(ours, walked(surface))

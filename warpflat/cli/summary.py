@@ -1,4 +1,4 @@
-"""The short report of a run: a line each for pieces, girths, fit, seams, drape and files; `-v` prints the tables instead."""
+"""The short report of a run: a line each for pieces, relaxation, girths, fit, seams, drape, files; `-v` prints the tables instead."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 from warpflat.core.text import energy_words, format_count
 from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words, wearer_words
+from warpflat.flattening.progress import relaxation_words
 from warpflat.garment.rings import rings_line
 
 __all__ = ["WIDTH", "notes_line", "summary_lines"]
@@ -31,6 +32,8 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         folder: where they lie.
     """
     lines = [_pieces_line(metrics["pieces"])]
+    if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
+        lines.append(f"relaxed: {relaxed}")
     if girths := metrics.get("girths"):
         lines.append(_girths_line(girths))
     wearer = metrics.get("wear", {}).get("wearer")

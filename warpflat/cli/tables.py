@@ -65,6 +65,10 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
         )
     tables = [_aligned(head, rows)]
+    from warpflat.flattening.progress import relaxation_words
+
+    if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
+        tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
         rows = [
             (

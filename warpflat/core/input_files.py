@@ -139,12 +139,12 @@ def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator
         with np.errstate(all="ignore"):  # what is no number is refused where it is checked, not warned of on the way
             yield place
     except InputError as error:
-        told = str(error)
-        # An error that names a file already, this one or one beside it, is not told of another.
+        message = str(error)
+        # An error that already names a file, this one or one beside it, names no second one.
         named = str(file), f"{file.parent}{os.sep}"
         for before in (place.at, str(file)):
-            told = told if told.startswith((before, *named)) else f"{before}: {told}"
-        raise InputError(told) from error
+            message = message if message.startswith((before, *named)) else f"{before}: {message}"
+        raise InputError(message) from error
     except FileNotFoundError as error:
         if error.filename is not None and Path(error.filename) != file:
             raise InputError(f"{file}: needs {error.filename}, which is missing") from None
@@ -152,8 +152,8 @@ def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator
     except Exception as error:
         at = f"{place.at}: " if place.at else ""
         if is_out_of_memory(error):
-            told = ", ".join(filter(None, ["not enough memory to read it", memory_limit()]))
-            raise InputError(f"{file}: {at}{told}; give a smaller file, or more memory") from error
+            message = ", ".join(filter(None, ["not enough memory to read it", memory_limit()]))
+            raise InputError(f"{file}: {at}{message}; give a smaller file, or more memory") from error
         if isinstance(error, OSError):
             raise InputError(f"{file}: {at}cannot be read: {system_reason(error)}") from error
         raise InputError(f"{file}: {at}cannot be read as {form.name} ({_reason(error)}); {form.right}") from error

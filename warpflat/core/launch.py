@@ -28,7 +28,7 @@ import warp as wp
 from warpflat.core.compile import compile_common_modules, kernel_cache_errors, start_warp
 from warpflat.core.threads import thread_count
 
-__all__ = ["Launch", "Sequence", "launch_each", "record", "record_copy", "record_zero", "split_range"]
+__all__ = ["Launch", "Sequence", "launch_each", "record", "split_range"]
 
 Command = Callable[[], None]
 
@@ -153,17 +153,6 @@ _known: set[wp.Kernel] = set()
 def _run_all(commands: SequenceOf[Command]) -> None:
     for command in commands:
         command()
-
-
-def record_copy(source: wp.array, target: wp.array, *, begin: int = 0) -> Launch:
-    """Record that values are copied, as many as the target has, from `begin` on; both are on one device."""
-    copy = partial(wp.copy, target, source, src_offset=begin, count=len(target))
-    return Launch([copy], keep=(source, target), device=target.device)
-
-
-def record_zero(target: wp.array) -> Launch:
-    """Record that an array is filled with zeros."""
-    return Launch([target.zero_], keep=target, device=target.device)
 
 
 def launch_each(

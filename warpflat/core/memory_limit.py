@@ -94,9 +94,9 @@ def _require(megabytes: float, what: str, remedy: str) -> None:
         mmap.mmap(-1, int(megabytes * 1e6)).close()
     except OSError:
         limit = memory_limit()
-        told = f", and {limit}" if limit else ""
+        note = f", and {limit}" if limit else ""
         raise InputError(
-            f"not enough memory: {what} takes {megabytes:,.0f} MB more{told}; raise the limit{remedy}"
+            f"not enough memory: {what} takes {megabytes:,.0f} MB more{note}; raise the limit{remedy}"
         ) from None
 
 

@@ -8,7 +8,7 @@ import sys
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
@@ -77,7 +77,29 @@ def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") ->
 def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDetails) -> str:
     location = problem["loc"]
     kind = problem["type"]
-    parents, parent = _walk(model, data, location[:-1] if kind in ("extra_forbidden", "missing") else location)
+    # The keys of a location as the file has them (pydantic adds tags of unions), and the annotation they lead to.
+    parent: Any = model
+    value: Any = data
+    parents: list[str] = []
+    for step in location[:-1] if kind in ("extra_forbidden", "missing") else location:
+        if isinstance(value, Mapping) and step in value:
+            value = value[step]
+            parents.append(str(step))
+        elif isinstance(value, (list, tuple)) and isinstance(step, int) and step < len(value):
+            value = value[step]
+            if parents:
+                parents[-1] += f"[{step}]"
+        else:
+            continue
+        found: Any = None
+        for member in _members(parent):
+            if isinstance(member, type) and issubclass(member, BaseModel):
+                found = _fields(member).get(str(step), found)
+            elif get_origin(member) in (dict, Mapping):
+                found = get_args(member)[-1]
+            elif get_origin(member) in (list, tuple):
+                found = get_args(member)[0]
+        parent = found
     if kind == "extra_forbidden":
         key = str(location[-1])
         path = ".".join([*parents, key])
@@ -92,26 +114,9 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
     else:
         words = f"{message}, got {quote_value(given)}"
         if kind in ("literal_error", "enum"):
-            words += _guess(given, parent)
+            options = [str(x) for m in _members(parent) if get_origin(m) is Literal for x in get_args(m)]
+            words += f"; {nearest(str(given), options)}" if options else ""
     return f"{path}: {words}" if path else words
-
-
-def _walk(model: type[BaseModel], data: Any, location: tuple[int | str, ...]) -> tuple[list[str], Any]:
-    """The keys of a location as the file has them (pydantic adds tags of unions), and the annotation they lead to."""
-    annotation: Any = model
-    keys: list[str] = []
-    for step in location:
-        if isinstance(data, Mapping) and step in data:
-            data = data[step]
-            keys.append(str(step))
-        elif isinstance(data, (list, tuple)) and isinstance(step, int) and step < len(data):
-            data = data[step]
-            if keys:
-                keys[-1] += f"[{step}]"
-        else:
-            continue
-        annotation = _below(annotation, step)
-    return keys, annotation
 
 
 def _members(annotation: Any) -> Iterator[Any]:
@@ -123,16 +128,6 @@ def _members(annotation: Any) -> Iterator[Any]:
         yield from _members(get_args(annotation)[0])
     else:
         yield annotation
-
-
-def _below(annotation: Any, step: int | str) -> Any:
-    found: Any = None
-    for member in _members(annotation):
-        if isinstance(member, type) and issubclass(member, BaseModel):
-            found = _fields(member).get(str(step), found)
-        elif get_origin(member) in (dict, Mapping) or get_origin(member) in (list, tuple):
-            found = get_args(member)[-1] if get_origin(member) in (dict, Mapping) else get_args(member)[0]
-    return found
 
 
 def _keys(annotation: Any) -> list[str]:
@@ -147,13 +142,6 @@ def _keys(annotation: Any) -> list[str]:
 def _fields(model: type[BaseModel]) -> dict[str, Any]:
     """Annotations by the keys that a file has for them."""
     return {field.alias or name: field.annotation for name, field in model.model_fields.items()}
-
-
-def _guess(given: Any, annotation: Any) -> str:
-    from typing import Literal
-
-    options = [str(x) for m in _members(annotation) if get_origin(m) is Literal for x in get_args(m)]
-    return f"; {nearest(str(given), options)}" if options else ""
 
 
 def tables_as_toml(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
@@ -185,7 +173,9 @@ def _document_lines(table: Mapping[str, Any], place: tuple[str, ...]) -> Iterato
     """Yield the lines of a table: its plain values, its tables, its arrays of tables."""
     below: list[tuple[str, Any]] = []
     for key, value in table.items():
-        if isinstance(value, Mapping) or (value and _is_array_of_tables(value)):
+        if isinstance(value, Mapping) or (
+            value and isinstance(value, list) and all(isinstance(each, Mapping) for each in value)
+        ):
             below.append((key, value))
         else:
             yield f"{_key(key)} = {_exact(value)}"
@@ -196,10 +186,6 @@ def _document_lines(table: Mapping[str, Any], place: tuple[str, ...]) -> Iterato
             yield ""
             yield head
             yield from _document_lines(one, inner)
-
-
-def _is_array_of_tables(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(each, Mapping) for each in value)
 
 
 def _key(key: str) -> str:

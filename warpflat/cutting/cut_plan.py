@@ -20,8 +20,7 @@ from warpflat.flattening.applied_cut import AppliedCut
 from warpflat.surface.cut.cut_mesh import Cut, Seam, cut_along_many
 from warpflat.surface.cut.pieces import apply_cut
 from warpflat.surface.cut.split_faces import split_faces_along
-from warpflat.surface.grid import cut_lattice, find_lattice
-from warpflat.surface.mesh import Surface, face_results
+from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import path_length
 from warpflat.surface.paths.trace import SurfacePath
 
@@ -127,9 +126,6 @@ def make_cuts(surface: Surface, plans: Sequence[CutPlan]) -> CutSurface:
     ]
     # The relaxation uses what the cut has found out of the new faces.
     cut_surface = replace(apply_cut(surface, topology), of_faces=topology.of_faces)
-    if topology.component_count == 1:
-        lattice = cut_lattice(cut_surface, surface, topology.vertex_origin)
-        topology.of_faces.update(face_results(topology.faces, {find_lattice: lattice}))
     return CutSurface(surface=cut_surface, cuts=tuple(applied), cut=topology)
 
 

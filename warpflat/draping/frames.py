@@ -17,7 +17,15 @@ from warpflat.draping.result import Drape
 from warpflat.export.colours import energy_colours, linear_rgb
 from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.export.raster import Lighting, rasterise, shade
-from warpflat.export.usd_prims import bounding_box, define_group, export_stage, usd_errors
+from warpflat.export.usd_prims import (
+    begin_stage,
+    define_group,
+    define_mesh,
+    export_stage,
+    last_values_as_defaults,
+    set_points,
+    usd_errors,
+)
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["choose_frames", "write_drape_film", "write_drape_frames"]
@@ -47,10 +55,10 @@ def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) ->
     moving = sorted({*moving[: max(len(moving) - 1, 1)], len(frames) - 1})
     if len(moving) <= count:
         return moving
-    ways = [0.0, *(float(np.linalg.norm(frames[b] - frames[a], axis=1).mean()) for a, b in pairwise(moving))]
+    moves = [0.0, *(float(np.linalg.norm(frames[b] - frames[a], axis=1).mean()) for a, b in pairwise(moving))]
     # Half by the way and half by time, for what creeps is worth a look too.
-    way = np.cumsum(ways) / max(sum(ways), 1e-12) + np.linspace(0.0, 1.0, len(moving))
-    return sorted({moving[int(np.abs(way - share).argmin())] for share in np.linspace(0.0, 2.0, count)})
+    progress = np.cumsum(moves) / max(sum(moves), 1e-12) + np.linspace(0.0, 1.0, len(moving))
+    return sorted({moving[int(np.abs(progress - share).argmin())] for share in np.linspace(0.0, 2.0, count)})
 
 
 def write_drape_frames(path: Path, drape: Drape) -> None:
@@ -62,25 +70,20 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    from pxr import Gf, Kind, Sdf, Usd, UsdGeom
+    from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
 
     with usd_errors(path):
         layer = Sdf.Layer.CreateAnonymous(".usda")
-        own = latest_file(path)
-        if own.is_file():
-            layer.TransferContent(Sdf.Layer.FindOrOpen(str(own)))
+        written = latest_file(path)
+        if written.is_file():
+            layer.TransferContent(Sdf.Layer.FindOrOpen(str(written)))
         # The rest may refer to files that lie beside the finished file, not yet beside this one.
         stage = Usd.Stage.OpenMasked(layer, Usd.StagePopulationMask(["/World/drape"]))
         begin = 1
-        if own.is_file():
+        if written.is_file():
             begin = int(stage.GetEndTimeCode()) + 1
         else:
-            UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-            UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-            stage.SetStartTimeCode(1)
-            stage.SetTimeCodesPerSecond(24.0)
-            stage.SetFramesPerSecond(24.0)
-            stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
+            begin_stage(stage, rate=24.0)
         group = define_group(stage, "/World/drape", kind=Kind.Tokens.component)
         chosen = choose_frames(drape.frames)
         stage.SetEndTimeCode(begin + len(chosen) - 1)
@@ -89,48 +92,20 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
             UsdGeom.Xformable(group).AddTranslateOp().Set(Gf.Vec3d(-width - _BESIDE, 0.0, 0.0))
         tag = group.CreateAttribute("warpflat:stage", Sdf.ValueTypeNames.String, custom=True)
         tag.Set("drape", begin)
-        body = _define(
-            stage, "/World/drape/body", np.column_stack([drape.body.triangles, np.full(len(drape.body.triangles), -1)])
-        )
-        _points(body, drape.body.vertices, Usd.TimeCode.Default())
+        body = define_mesh(stage, "/World/drape/body", drape.body.triangles)
+        set_points(body, drape.body.vertices)
         body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(_SKIN).tolist())])
-        cloth = _define(stage, "/World/drape/cloth", drape.cloth.faces)
+        cloth = define_mesh(stage, "/World/drape/cloth", drape.cloth.faces)
         colours = cloth.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
         widest = _widest(drape)
         colours.GetAttr().SetCustomData({"quantity": "gap", "unit": "m", "rangeMin": 0.0, "rangeMax": widest})
         for time, number in enumerate(chosen, start=begin):
             points = drape.frames[number].astype(np.float64)
-            _points(cloth, points, Usd.TimeCode(time))
+            set_points(cloth, points, Usd.TimeCode(time))
             found = linear_rgb(energy_colours(drape.body.gaps(points), widest)).astype(np.float32)
-            colours.GetAttr().Set(_vectors(found), Usd.TimeCode(time))
-        for attribute in cloth.GetPrim().GetAuthoredAttributes():
-            if attribute.GetNumTimeSamples():
-                attribute.Set(attribute.Get(stage.GetEndTimeCode()))
+            colours.GetAttr().Set(Vt.Vec3fArray.FromNumpy(found), Usd.TimeCode(time))
+        last_values_as_defaults(stage, [cloth.GetPrim()])
     export_stage(stage, path)
-
-
-def _define(stage: Any, path: str, faces: IntArray) -> Any:
-    from pxr import UsdGeom, Vt
-
-    mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
-    mesh.CreateDoubleSidedAttr(True)
-    used = faces >= 0
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces[used], dtype=np.int32)))
-    return mesh
-
-
-def _points(mesh: Any, points: FloatArray, time: Any) -> None:
-    mesh.CreatePointsAttr().Set(_vectors(points), time)
-    mesh.CreateExtentAttr().Set(_vectors(bounding_box(points.astype(np.float32))), time)
-
-
-def _vectors(rows: Any) -> Any:
-    from pxr import Vt
-
-    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(rows, dtype=np.float32))
 
 
 def _widest(drape: Drape) -> float:

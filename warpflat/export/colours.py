@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import weighted_percentile
 
-__all__ = ["SMALLEST_SCALE", "energy_colours", "energy_scale", "linear_rgb", "on_cloth"]
+__all__ = ["SMALLEST_SCALE", "VertexColours", "energy_colours", "energy_scale", "linear_rgb", "on_cloth"]
+
 
 # Cloth of 1 kN/m stores this much per area at a strain of 4e-5. Below it a map would show rounding errors.
 SMALLEST_SCALE = 1e-6  # [J/m2]
@@ -73,3 +74,41 @@ def energy_scale(density: ArrayLike, areas: ArrayLike) -> float:
     steps = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
     power = 10.0 ** np.floor(np.log10(robust))
     return float(power * steps[min(np.searchsorted(steps, robust / power * (1.0 - 1e-12)), len(steps) - 1)])
+
+
+# Steps between the lowest energy and the highest.
+_COLOURS = 1024
+
+
+class VertexColours:
+    """Colours of the vertices of one topology: a vertex has the mean energy of its faces by area."""
+
+    def __init__(self, faces: IntArray, areas: FloatArray, count: int) -> None:
+        """
+        Args:
+            faces: #F by 4, -1 as the fourth corner of a triangle.
+            areas: #F, that count [m2].
+            count: the number of vertices.
+        """
+        from scipy.sparse import csr_array
+
+        used = faces >= 0
+        face, vertex = np.nonzero(used)[0], faces[used]
+        # A sliver without area still counts a little, so that a vertex among slivers only has a colour.
+        weights = areas + (1e-9 * float(areas.max(initial=0.0)) or 1.0)
+        whole = np.bincount(vertex, weights=weights[face], minlength=count)
+        self._shares = csr_array(
+            ((weights[face] / whole[vertex]).astype(np.float32), (vertex, face)), shape=(count, len(faces))
+        )
+
+    def levels(self, density: NDArray[np.floating], scale: float, count: int) -> NDArray[np.int32]:
+        """Return the level of each vertex (#V), from 0 to `count` - 1 at `scale`, for the energies of the faces (#F) [J/m2]."""
+        share = self._shares @ density.astype(np.float32)
+        share *= np.float32((count - 1) / scale)
+        share += np.float32(0.5)
+        return np.asarray(np.clip(share, 0, count - 1, out=share).astype(np.int32))
+
+    def shades(self, density: NDArray[np.floating], scale: float) -> NDArray[np.float32]:
+        """Return the colour of each vertex (#V by 3, linear Rec. 709) for the energies of the faces (#F) [J/m2]."""
+        table = linear_rgb(energy_colours(np.arange(_COLOURS) / (_COLOURS - 1), 1.0)).astype(np.float32)
+        return np.asarray(table[self.levels(density, scale, _COLOURS)])

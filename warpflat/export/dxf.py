@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 
 import numpy as np
@@ -18,15 +19,14 @@ from warpflat._version import __version__
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.output import atomic_path
-from warpflat.core.polyline import turning_angles
+from warpflat.core.polyline import arc_lengths, points_at_lengths, turning_angles
 from warpflat.core.source_date import source_date
 from warpflat.core.text import control_in, plain_letters
-from warpflat.export.grade_rules import grade_rules, write_rul
 from warpflat.export.letters import titles
 from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.label import text_width
 from warpflat.pattern.layout import lay_out, nests
-from warpflat.pattern.lettering import text_width
 from warpflat.pattern.seam_words import seam_words
 
 __all__ = ["block_name", "write_dxf"]
@@ -87,20 +87,110 @@ def write_dxf(
             title = written[names[piece.name]]
             name = block_name(piece, taken, title)
             block = list[str]()
-            _write_piece(block, piece, title, scale, seams, validation=dialect == "astm")
+            corners = np.flatnonzero(_is_corner(piece.cut_line))
+            boundary = np.roll(piece.cut_line, -int(corners[0]), axis=0) if len(corners) else piece.cut_line
+            _polyline(block, boundary, scale, "1", closed=True)
+            for point, turns in zip(boundary, _is_corner(boundary), strict=True):
+                _point(block, point, scale, "2" if turns else "3")
+            # Slit notches are points with their depth for height.
+            for notch in piece.notches:
+                angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
+                for base in notch.base:
+                    location = (base[0] * scale, base[1] * scale, notch.depth * scale)
+                    block.append(_tags((0, "POINT"), (8, "4"), *_place(location), *([(50, angle)] if angle else [])))
+            # The sewing line edge by edge, each with its name and, in rows below, what is sewn to it.
+            for edge in piece.edges:
+                if edge.kind == "fold":
+                    _line(block, edge.line[[0, -1]], scale, "6")
+                else:
+                    # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
+                    line = piece.drawn_line(edge)
+                    _polyline(block, line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
+                texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
+                middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
+                for row, text in enumerate(texts):
+                    _text(block, text, middle - [0.0, 0.003 * ROW * row], scale, "15", 0.003)
+            _line(block, piece.grain, scale, "7")
+            for line in piece.internal_lines.values():
+                _polyline(block, line, scale, "8")
+            for dart in piece.darts:
+                if dart.fold is not None:
+                    _polyline(block, dart.fold, scale, "8")
+                word = "DART" if dart.dart.pleat is None else "PLEAT"
+                _text(block, f"{word}: {dart.dart.name}", dart.tip, scale, "15", 0.003)
+            for dart_name, line in piece.fisheyes.items():
+                _polyline(block, line, scale, "8", closed=True)
+                _text(block, f"DART: {dart_name}", line.mean(axis=0), scale, "15", 0.003)
+            for cutout in piece.cutouts.values():
+                _polyline(block, cutout.cut_line, scale, "11", closed=True)
+                if cutout.width > 0:
+                    _polyline(block, cutout.sew_line, scale, "14", closed=True)
+            for hole in piece.drill_holes:
+                _point(block, hole.at, scale, "13")
+            if dialect == "astm":
+                _polyline(block, boundary, scale, "84", closed=True)
+                for edge in piece.edges:
+                    if edge.kind not in ("fold", "dart"):
+                        _polyline(block, edge.curve.sample(5e-6), scale, "87")
+            # The system texts stand where the label has its room; notes may run on to the right.
+            texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
+            texts += [
+                f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}",
+                f"FABRIC: {' / '.join(cloths_of(piece))}",
+            ]
+            texts += ["ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]]
+            low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
+            widest = max(text_width(text, 1.0) for text in texts)
+            texts += [f"ANNOTATION: {note}" for note in piece.notes]
+            height = min(TEXT, (high[0] - low[0]) / widest, (high[1] - low[1]) / len(texts) / ROW)
+            for row, text in enumerate(texts):
+                _text(block, text, np.array([low[0], high[1] - ROW * height * (row + 0.8)]), scale, "1", height)
             for point in rules.points.get(piece.name, ()) if rules is not None and piece.size == rules.sample else ():
                 _text(block, f"# {point.rule}", point.at, scale, point.layer, 0.003)
             begin = _tags((0, "BLOCK"), (8, "0"), (2, name), (70, 0), *_place((0.0, 0.0)), (3, name), (1, ""))
             blocks += [begin, *block, _tags((0, "ENDBLK"), (8, "0"))]
             space.append(_tags((0, "INSERT"), (8, "1"), (2, name), *_place(placed.offset * scale)))
     table = _ascii(garment.name)[:20]
-    _write_style(space, garment, units, scale, created, table="" if rules is None else table)
+    style = [
+        f"STYLE NAME: {garment.name}",
+        f"CREATION DATE: {created:%d-%m-%Y}",
+        f"CREATION TIME: {created:%H:%M}",
+        "AUTHOR: warpflat",
+        f"SAMPLE SIZE: {garment.garment.sample}",
+        *([f"GRADE RULE TABLE: {table}"] if rules is not None and table else []),
+        f"UNITS: {units.upper()}",
+        "PRODUCT: warpflat",
+        f"VERSION: {__version__}",
+    ]
+    for row, text in enumerate(style):
+        _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
     with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii") as stream:
         for section, content in (("HEADER", []), ("BLOCKS", blocks), ("ENTITIES", space)):
             stream.write(_tags((0, "SECTION"), (2, section)) + "".join(content) + _tags((0, "ENDSEC")))
         stream.write(_tags((0, "EOF")))
     if rules is not None and rul is not None:
-        write_rul(rules, rul, name=table, dialect=dialect, units=units, scale=scale, created=created)
+        # The table of grade rules.
+        lines = [
+            "ANSI/AAMA VERSION: 1.0.0" if dialect == "aama" else "ASTM/D13 Proposal 1 Version: D6673-10",
+            "AUTHOR: warpflat",
+            "PRODUCT: warpflat",
+            f"VERSION: {__version__}",
+            f"CREATION DATE: {created:%d-%m-%Y}",
+            f"CREATION TIME: {created:%H:%M}",
+            f"UNITS: {units.upper()}",
+            f"GRADE RULE TABLE: {table}",
+            f"NUMBER OF SIZES: {len(rules.sizes)}",
+            f"SIZE LIST: {' '.join(size.replace(' ', '_') for size in rules.sizes)}",
+            f"SAMPLE SIZE: {rules.sample.replace(' ', '_')}",
+        ]
+        for number, moves in enumerate(rules.moves, 1):
+            lines.append(f"RULE: DELTA {number}")
+            pairs = [f"{x:>10.3f},{y:>9.3f}" for x, y in (moves * scale + 0.0).tolist()]
+            lines += ["".join(pairs[k : k + _IN_LINE]) for k in range(0, len(pairs), _IN_LINE)]
+        lines.append("END")
+        text = "\r\n".join(lines) + "\r\n"
+        with atomic_path(rul) as temporary:
+            temporary.write_bytes(text.encode("ascii", "replace"))
 
 
 def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
@@ -128,110 +218,6 @@ def _ascii(text: str) -> str:
 def _is_written(name: str) -> bool:
     """Return whether 7 bits leave anything of a name."""
     return any(letter.isalnum() for letter in _ascii(name))
-
-
-def _write_piece(
-    block: list[str],
-    piece: DraftedPiece,
-    title: str,
-    scale: float,
-    seams: Mapping[tuple[str, str], Sequence[str]],
-    *,
-    validation: bool,
-) -> None:
-    """Write all layers of one piece in one size."""
-    boundary = _from_a_corner(piece.cut_line)
-    _polyline(block, boundary, scale, "1", closed=True)
-    for point, turns in zip(boundary, _is_corner(boundary), strict=True):
-        _point(block, point, scale, "2" if turns else "3")
-    _write_notches(block, piece, scale)
-    _write_edges(block, piece, scale, seams)
-    _line(block, piece.grain, scale, "7")
-    for line in piece.internal_lines.values():
-        _polyline(block, line, scale, "8")
-    _write_darts(block, piece, scale)
-    for cutout in piece.cutouts.values():
-        _polyline(block, cutout.cut_line, scale, "11", closed=True)
-        if cutout.width > 0:
-            _polyline(block, cutout.sew_line, scale, "14", closed=True)
-    for hole in piece.drill_holes:
-        _point(block, hole.at, scale, "13")
-    if validation:
-        _polyline(block, boundary, scale, "84", closed=True)
-        for edge in piece.edges:
-            if edge.kind not in ("fold", "dart"):
-                _polyline(block, edge.curve.sample(5e-6), scale, "87")
-    _write_texts(block, piece, title, scale)
-
-
-def _write_notches(block: list[str], piece: DraftedPiece, scale: float) -> None:
-    """Write slit notches as points with their depth for height."""
-    for notch in piece.notches:
-        angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
-        for base in notch.base:
-            location = (base[0] * scale, base[1] * scale, notch.depth * scale)
-            block.append(_tags((0, "POINT"), (8, "4"), *_place(location), *([(50, angle)] if angle else [])))
-
-
-def _write_edges(
-    block: list[str], piece: DraftedPiece, scale: float, seams: Mapping[tuple[str, str], Sequence[str]]
-) -> None:
-    """Write the sewing line edge by edge, each with its name and, in rows below, what is sewn to it."""
-    for edge in piece.edges:
-        if edge.kind == "fold":
-            _line(block, edge.line[[0, -1]], scale, "6")
-        else:
-            # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
-            line = piece.drawn_line(edge)
-            _polyline(block, line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
-        texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
-        middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
-        for row, text in enumerate(texts):
-            _text(block, text, middle - [0.0, 0.003 * ROW * row], scale, "15", 0.003)
-
-
-def _write_darts(block: list[str], piece: DraftedPiece, scale: float) -> None:
-    """Write the folds of darts, fish-eye darts and their names."""
-    for dart in piece.darts:
-        if dart.fold is not None:
-            _polyline(block, dart.fold, scale, "8")
-        word = "DART" if dart.dart.pleat is None else "PLEAT"
-        _text(block, f"{word}: {dart.dart.name}", dart.tip, scale, "15", 0.003)
-    for name, line in piece.fisheyes.items():
-        _polyline(block, line, scale, "8", closed=True)
-        _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)
-
-
-def _write_texts(block: list[str], piece: DraftedPiece, title: str, scale: float) -> None:
-    """Write the system texts where the label has its room; notes may run on to the right."""
-    texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
-    texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {' / '.join(cloths_of(piece))}"]
-    texts += ["ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]]
-    low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
-    widest = max(text_width(text, 1.0) for text in texts)
-    texts += [f"ANNOTATION: {note}" for note in piece.notes]
-    height = min(TEXT, (high[0] - low[0]) / widest, (high[1] - low[1]) / len(texts) / ROW)
-    for row, text in enumerate(texts):
-        _text(block, text, np.array([low[0], high[1] - ROW * height * (row + 0.8)]), scale, "1", height)
-
-
-def _write_style(
-    space: list[str], garment: DraftedGarment, units: str, scale: float, created: datetime, *, table: str
-) -> None:
-    """Write the texts that describe the whole file."""
-    texts = [
-        f"STYLE NAME: {garment.name}",
-        f"CREATION DATE: {created:%d-%m-%Y}",
-        f"CREATION TIME: {created:%H:%M}",
-        "AUTHOR: warpflat",
-        f"SAMPLE SIZE: {garment.garment.sample}",
-        *([f"GRADE RULE TABLE: {table}"] if table else []),
-        f"UNITS: {units.upper()}",
-        "PRODUCT: warpflat",
-        f"VERSION: {__version__}",
-    ]
-    for row, text in enumerate(texts):
-        _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
 
 
 def _polyline(block: list[str], points: FloatArray, scale: float, layer: str, *, closed: bool = False) -> None:
@@ -273,7 +259,117 @@ def _is_corner(ring: FloatArray) -> BoolArray:
     return np.asarray(np.abs(turning_angles(around)) > TURN)
 
 
-def _from_a_corner(ring: FloatArray) -> FloatArray:
-    """Return a closed line that begins in a turn point, as CAD systems expect of a boundary."""
-    corners = np.flatnonzero(_is_corner(ring))
-    return np.roll(ring, -int(corners[0]), axis=0) if len(corners) else ring
+#: Grade points between the corners of a curved edge, by their shares of its length.
+_BETWEEN = (0.25, 0.5, 0.75)
+#: An edge whose chord is shorter than it by less than this share is straight.
+_STRAIGHT = 1e-4
+#: Moves that differ by less than this [m] are one rule.
+_SAME = 5e-6
+#: Pairs in a line of a table.
+_IN_LINE = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class GradePoint:
+    """A graded point of the sample size.
+
+    Attributes:
+        at: its place [m] in the drafted piece.
+        rule: number of its rule.
+        layer: "2" on the boundary, "4" at a notch, "13" at a drill hole.
+    """
+
+    at: FloatArray
+    rule: int
+    layer: str
+
+
+@dataclass(kw_only=True)
+class GradeRules:
+    """The rules of a garment, and its graded points.
+
+    Attributes:
+        sizes: in their order.
+        sample: the size that is graded.
+        moves: by rule, from 1 on: #sizes by 2 [m], from the sample size's point to each size's; x and y as drawn.
+        points: by piece.
+    """
+
+    sizes: tuple[str, ...]
+    sample: str
+    moves: list[FloatArray] = field(default_factory=list)
+    points: dict[str, list[GradePoint]] = field(default_factory=dict)
+
+    def rule(self, moves: FloatArray) -> int:
+        """Return the number of a rule, a new one if there is none alike."""
+        for number, known in enumerate(self.moves, 1):
+            if np.abs(known - moves).max() < _SAME:
+                return number
+        self.moves.append(moves)
+        return len(self.moves)
+
+
+def grade_rules(garment: DraftedGarment, sizes: Sequence[str]) -> GradeRules:
+    """Return the grade rules of a nest: rule 1 moves nothing.
+
+    Graded are the corners of the cutting line, places between them on curved edges, notches and drill holes; each is the same
+    place in every size. A place that some size does not have is not graded.
+    """
+    sample = garment.garment.sample if garment.garment.sample in sizes else sizes[0]
+    rules = GradeRules(sizes=tuple(sizes), sample=sample)
+    rules.rule(np.zeros((len(sizes), 2)))
+    for piece in garment.pieces[sample]:
+        all_sizes = {each.size: each for each in garment.all_sizes(piece.name)}
+        rows = [_places(all_sizes[size]) for size in sizes]
+        graded = rows[list(sizes).index(sample)]
+        for key, at in graded.items():
+            if all(key in row for row in rows):
+                moves = np.array([row[key] - at for row in rows])
+                number = rules.rule(moves)
+                rules.points.setdefault(piece.name, []).append(GradePoint(at=at, rule=number, layer=key[0]))
+    return rules
+
+
+def _places(piece: DraftedPiece) -> dict[tuple[str, str, float], FloatArray]:
+    """Return the places of one piece that are graded, by layer, name and number."""
+    import shapely
+
+    found: dict[tuple[str, str, float], FloatArray] = {}
+    ring = piece.cut_line
+    line = shapely.LinearRing(ring)
+    for edge in piece.edges:
+        if edge.kind == "dart" and edge.width == 0:
+            continue
+        points = edge.line
+        length = float(arc_lengths(points)[-1])
+        chord = float(np.linalg.norm(points[-1] - points[0]))
+        for share in (0.0, *(_BETWEEN if chord < length * (1.0 - _STRAIGHT) else ())):
+            found["2", edge.name, share] = _on_cut_line(points, share, edge.width, ring, line)
+    counts: dict[str, int] = {}
+    for notch in piece.notches:
+        for base in notch.base:
+            number = counts[notch.seam] = counts.get(notch.seam, 0) + 1
+            found["4", notch.seam, float(number)] = base
+    for number, hole in enumerate(piece.drill_holes):
+        found["13", hole.name, float(number)] = hole.at
+    return found
+
+
+def _on_cut_line(points: FloatArray, share: float, width: float, ring: FloatArray, line: object) -> FloatArray:
+    """Return the place on the cutting line beside a place of the sewing line; at a corner its nearest corner."""
+    import shapely
+
+    assert isinstance(line, shapely.LinearRing)
+    length = float(arc_lengths(points)[-1])
+    at = points_at_lengths(points, [share * length])[0]
+    if share == 0.0:
+        around = np.vstack([ring[-1:], ring, ring[:1]])
+        before, after = around[1:-1] - around[:-2], around[2:] - around[1:-1]
+        turns = np.abs(
+            np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
+        )
+        corners = ring[turns > np.radians(12.0)]
+        near = corners[np.linalg.norm(corners - at, axis=1) < 4.0 * max(width, 0.012)] if len(corners) else corners
+        if len(near):
+            return np.asarray(near[np.linalg.norm(near - at, axis=1).argmin()])
+    return np.asarray(line.interpolate(line.project(shapely.Point(at))).coords[0])

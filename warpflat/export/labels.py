@@ -10,11 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice, pairwise
+from itertools import islice
 
 import numpy as np
+import shapely
+from shapely import Geometry
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import points_at_lengths, polyline_length, resample
 from warpflat.core.text import name_without_number
 from warpflat.export.figure import GRAIN, INK, LABEL_SIZE, Pen
@@ -25,7 +27,6 @@ __all__ = [
     "Spot",
     "draw_lines",
     "leader_line",
-    "points_on",
     "space_out",
     "spots_along",
     "spots_beside",
@@ -44,6 +45,9 @@ _LINE_SPACING = 1.45
 _SHARES = (0.5, 0.42, 0.58, 0.35, 0.65, 0.28, 0.72, 0.2, 0.8, 0.12, 0.88, 0.05, 0.95)
 # Nearer to another line than this [in] a name might seem to be that one's.
 _LEAST_DISTANCE = 0.15
+# So much of a leader [in], from the line where it begins, may lie on what is taken.
+_AT_LINE = 0.09
+_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,26 +64,16 @@ class LabelRoom:
     """The free room on one page [in]: keeps what is occupied, and finds places for labels."""
 
     def __init__(self) -> None:
-        self._discs = np.empty((0, 3))
-        self._passable = np.empty((0, 3))
+        self._taken, self._passable = list[Geometry](), list[Geometry]()
 
     def take_box(self, left: float, bottom: float, right: float, top: float) -> None:
         """Keep labels out of a box."""
-        width, height = max(right - left, 1e-6), max(top - bottom, 1e-6)
-        flat = width >= height
-        middle = Spot(x=0.5 * (left + right), y=0.5 * (bottom + top), angle=0.0 if flat else 0.5 * math.pi)
-        self._add(_discs([middle], max(width, height), min(width, height))[0])
+        self._taken.append(shapely.box(left, bottom, right, top))
 
     def take_line(self, points: FloatArray, thickness: float, *, passable: bool = False) -> None:
         """Keep labels off a polyline (#N by 2) [in], and leaders too unless it is passable."""
-        for a, b in pairwise(points):
-            length = float(np.linalg.norm(b - a))
-            spot = Spot(x=float(a[0] + b[0]) / 2, y=float(a[1] + b[1]) / 2, angle=float(np.arctan2(*(b - a)[::-1])))
-            discs = _discs([spot], length + thickness, thickness)[0]
-            if passable:
-                self._passable = np.concatenate([self._passable, discs])
-            else:
-                self._add(discs)
+        line = shapely.LineString(points).buffer(0.5 * thickness, cap_style="square")
+        (self._passable if passable else self._taken).append(line)
 
     def place(
         self,
@@ -87,50 +81,42 @@ class LabelRoom:
         width: float,
         height: float,
         page: tuple[float, float, float, float],
-        avoid: FloatArray | None = None,
+        avoid: Iterable[FloatArray] = (),
         *,
         may_cross: bool = True,
     ) -> Spot | None:
         """Take the first spot at which a text and its leader lie free within `page`; None if there is none.
 
-        The lines whose points (`points_on`) are in `avoid` are crossed only where every other spot is worse, and if
-        they may be.
+        The lines in `avoid` are crossed only where every other spot is worse, and if they may be.
 
         Args:
             spots: in order of preference.
             width, height: of the text [in].
             page: left, bottom, right, top [in].
-            avoid: #N by 2 [in], points of lines.
+            avoid: polylines, #N by 2 [in] each.
             may_cross: whether those lines may be crossed.
         """
-        lines = np.empty((0, 2)) if avoid is None else avoid
-        left, bottom, right, top = page
-        taken = np.concatenate([self._discs, self._passable])
-        off_lines = np.concatenate([taken, np.column_stack([lines, np.zeros(len(lines))])])
+        taken = [*self._taken, *self._passable]
+        whole = shapely.box(*page)
         # In batches where one pass is enough: making a spot may take longer than testing it.
         spots = list(spots) if may_cross else spots
-        for obstacles in (off_lines, taken)[: 1 + may_cross]:
+        for obstacles in ([*taken, *map(shapely.LineString, avoid)], taken)[: 1 + may_cross]:
+            tree = shapely.STRtree(obstacles)
             for batch in _in_batches(spots):
-                discs = _discs(batch, width, height)
-                low = (discs[..., :2] - discs[..., 2:]).min(axis=1)
-                high = (discs[..., :2] + discs[..., 2:]).max(axis=1)
-                fits = np.flatnonzero((low >= (left, bottom)).all(axis=1) & (high <= (right, top)).all(axis=1))
-                for k in fits[_are_clear(discs[fits], obstacles)].tolist():
-                    if self._leader_is_free(batch[k], width):
-                        self._add(discs[k])
-                        return batch[k]
+                corners = _placed_points(batch, 0.5 * width * _CORNERS[:, 0], 0.5 * height * _CORNERS[:, 1])
+                boxes = shapely.polygons(np.stack(corners, axis=-1))
+                fits = np.asarray(shapely.covers(whole, boxes))
+                fits[tree.query(boxes, predicate="intersects")[0]] = False
+                for k in np.flatnonzero(fits).tolist():
+                    leader = leader_line(batch[k], width)
+                    if leader is not None:
+                        # Where a leader begins, its line may have a leader or a name already.
+                        leader[0] += _AT_LINE * (leader[1] - leader[0]) / max(polyline_length(leader), _AT_LINE)
+                        if shapely.intersects(shapely.LineString(leader), self._taken).any():
+                            continue
+                    self._taken.append(boxes[k])
+                    return batch[k]
         return None
-
-    def _leader_is_free(self, spot: Spot, width: float) -> bool:
-        """Return whether a spot's leader runs over nothing; where it begins a line may have its own."""
-        leader = leader_line(spot, width)
-        if leader is None:
-            return True
-        ink = points_on(leader, 0.03)[3:]
-        return bool(_are_clear(np.column_stack([ink, np.full(len(ink), 0.01)])[None], self._discs).all())
-
-    def _add(self, discs: FloatArray) -> None:
-        self._discs = np.concatenate([self._discs, discs])
 
 
 def leader_line(spot: Spot, width: float) -> FloatArray | None:
@@ -182,30 +168,6 @@ def _in_batches(spots: Iterable[Spot]) -> Iterator[list[Spot]]:
         count = min(2 * count, 64)
 
 
-def _are_clear(discs: FloatArray, others: FloatArray) -> BoolArray:
-    """Return for each set of discs (#S by #N by 3) whether none overlaps one of the others (#M by 3)."""
-    x, y, reach = (
-        discs[..., None, 0] - others[:, 0],
-        discs[..., None, 1] - others[:, 1],
-        discs[..., None, 2] + others[:, 2],
-    )
-    return np.asarray((x * x + y * y >= reach * reach).all(axis=(1, 2)))
-
-
-def _discs(spots: Sequence[Spot], width: float, height: float) -> FloatArray:
-    """Return discs (#S by #N by 3: middle, radius) that cover a turned rectangle along its length, at each spot."""
-    count = max(1, math.ceil(width / height))
-    places = ((np.arange(count) + 0.5) / count - 0.5) * width
-    radius = 0.5 * math.hypot(height, width / count) * 0.95
-    x, y = _placed_points(spots, places, np.zeros(count))
-    return np.stack([x, y, np.full_like(x, radius)], axis=-1)
-
-
-def points_on(line: FloatArray, step: float) -> FloatArray:
-    """Return points on a polyline (#M by 2) [in], no farther apart along it than a step, with both ends (#N by 2)."""
-    return resample(line, np.linspace(0.0, 1.0, max(2, math.ceil(polyline_length(line) / max(step, 1e-3)) + 1)))
-
-
 def spots_along(line: FloatArray, width: float, clearance: float) -> Iterator[Spot]:
     """Yield spots beside a polyline (#N by 2) [in] and parallel to it, from its middle outwards, on either side."""
     total = polyline_length(line)
@@ -243,7 +205,7 @@ _AROUND = sorted(
         for step in range(24)
         for rise in (0.0, 0.07, -0.07, 0.15, -0.15, 0.25, -0.25, 0.36, -0.36)
     ),
-    key=lambda way: math.hypot(*way) + 0.5 * abs(way[1]),
+    key=lambda offset: math.hypot(*offset) + 0.5 * abs(offset[1]),
 )
 
 
@@ -315,8 +277,6 @@ class _Names:
         # The legs of darts need no names: everybody sees what they are.
         named = (name for name in stretches if not name.endswith((".left", ".right")))
         self._lines = {name: stretches[name] for name in named if len(stretches[name]) > 1}
-        _, height = pen.measure("x", LABEL_SIZE)
-        self._ink = {name: points_on(line, 0.5 * height) for name, line in self._lines.items()}
         # The stretches of a line between darts need one name together.
         self.unplaced = [name for name in self._lines if name_without_number(name, self._lines) == name]
 
@@ -335,8 +295,8 @@ class _Names:
         """Return the names that are not placed yet and whose lines run across."""
         found = []
         for name in self._unplaced(names):
-            way = np.subtract(*reversed(self._ends(name)))
-            if abs(way[1]) <= _STEEP * way[0]:
+            along = np.subtract(*reversed(self._ends(name)))
+            if abs(along[1]) <= _STEEP * along[0]:
                 found.append(name)
         return found
 
@@ -384,16 +344,13 @@ class _Names:
         """Place names off the cloth beside their lines, level, as near as there is room."""
         for name in self._unplaced(names):
             width, height = self._size(name)
-            spots = spots_beside(self._points_clear_of_others(name), width, (1.0, -1.0))
+            # A leader begins at a point of the line that is not near to other lines, if there is one.
+            points = resample(self._lines[name], _SHARES)
+            others = np.concatenate([np.empty((0, 2)), *(line for other, line in self._lines.items() if other != name)])
+            away = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1, initial=np.inf)
+            clear = away > _LEAST_DISTANCE if (away > _LEAST_DISTANCE).any() else np.ones(len(points), dtype=bool)
+            spots = spots_beside([(x, y) for x, y in points[clear].tolist()], width, (1.0, -1.0))
             self._place(name, self._spots_on_cloth(spots, width, height, covered=False), may_cross=False)
-
-    def _points_clear_of_others(self, name: str) -> list[tuple[float, float]]:
-        """Return points of a line that are not near to others, if there are such."""
-        points = resample(self._lines[name], _SHARES)
-        others = np.concatenate([np.empty((0, 2)), *(line for other, line in self._lines.items() if other != name)])
-        away = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1, initial=np.inf)
-        clear = away > _LEAST_DISTANCE if (away > _LEAST_DISTANCE).any() else np.ones(len(points), dtype=bool)
-        return [(x, y) for x, y in points[clear].tolist()]
 
     def place_anywhere(self) -> None:
         """Place names wherever there is room."""
@@ -429,7 +386,7 @@ class _Names:
     def _place(self, name: str, spots: Iterable[Spot], *, may_cross: bool = True) -> bool:
         """Write a name at the first spot where there is room for it, and return whether there is one."""
         pen, (width, height) = self._pen, self._size(name)
-        others = np.concatenate([np.empty((0, 2)), *(ink for other, ink in self._ink.items() if other != name)])
+        others = [line for other, line in self._lines.items() if other != name]
         spots = self._spots_off_others(spots, width, height)
         spot = self._room.place(spots, width, height, self._page, others, may_cross=may_cross)
         if spot is None:

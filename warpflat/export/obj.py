@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic_core import to_json
 
 from warpflat.core.arrays import FloatArray
@@ -46,18 +46,6 @@ def write_obj(
     flat = np.asarray(positions, dtype=np.float64)
     corners = np.asarray(surface.faces if faces is None else faces, dtype=np.int64)
     origin = np.arange(len(flat)) if pattern_to_surface is None else np.asarray(pattern_to_surface, dtype=np.int64)
-    _check(surface, flat, corners, origin)
-    in_input = np.asarray(surface.input_index, dtype=np.int64)[origin]
-    with atomic_path(path, sources=surface.sources) as temporary, temporary.open("wb") as file:
-        name = " ".join(surface.name.split())
-        file.write(f"# warpflat: v = surface [m], vt = pattern [m], not normalised\no {name}\n".encode())
-        _write_rows(file, b"v", np.asarray(surface.input_vertices, dtype=np.float64))
-        _write_rows(file, b"vt", flat)
-        _write_faces(file, corners, in_input)
-
-
-def _check(surface: Surface, flat: FloatArray, corners: NDArray[np.int64], origin: NDArray[np.int64]) -> None:
-    """Check that the arrays fit together."""
     if flat.ndim != 2 or flat.shape[1] != 2:
         raise ValueError(f"positions must be #P by 2, not {flat.shape}")
     if corners.ndim != 2 or corners.shape[1] != 4:
@@ -68,6 +56,19 @@ def _check(surface: Surface, flat: FloatArray, corners: NDArray[np.int64], origi
         raise ValueError(f"faces refer to vertices beyond the {len(flat)} positions")
     if origin.size and (origin.max() >= len(surface.vertices) or origin.min() < 0):
         raise ValueError(f"pattern_to_surface refers to vertices beyond the {len(surface.vertices)} of the surface")
+    in_input = np.asarray(surface.input_index, dtype=np.int64)[origin]
+    with atomic_path(path, sources=surface.sources) as temporary, temporary.open("wb") as file:
+        name = " ".join(surface.name.split())
+        file.write(f"# warpflat: v = surface [m], vt = pattern [m], not normalised\no {name}\n".encode())
+        _write_rows(file, b"v", np.asarray(surface.input_vertices, dtype=np.float64))
+        _write_rows(file, b"vt", flat)
+        # Faces are pairs of vertex and texture coordinate.
+        for part in _chunks(len(corners)):
+            block = corners[part]
+            used = block >= 0
+            pairs = np.stack([in_input[np.where(used, block, 0)] + 1, block + 1], axis=-1)
+            rows = np.where(used[:, 3], "f %d/%d %d/%d %d/%d %d/%d\n", "f %d/%d %d/%d %d/%d\n")
+            file.write(("".join(rows.tolist()) % tuple(pairs[used].ravel().tolist())).encode())
 
 
 def _chunks(count: int) -> Iterator[slice]:
@@ -81,13 +82,3 @@ def _write_rows(file: BinaryIO, key: bytes, values: FloatArray) -> None:
         # Pydantic's JSON has the shortest digits that read back as the same number, three times as fast as Python's.
         rows = to_json(values[part].tolist(), inf_nan_mode="constants")[2:-2]
         file.write(key + b" " + rows.replace(b"],[", b"\n" + key + b" ").replace(b",", b" ") + b"\n")
-
-
-def _write_faces(file: BinaryIO, corners: NDArray[np.int64], in_input: NDArray[np.int64]) -> None:
-    """Write faces as pairs of vertex and texture coordinate."""
-    for part in _chunks(len(corners)):
-        block = corners[part]
-        used = block >= 0
-        pairs = np.stack([in_input[np.where(used, block, 0)] + 1, block + 1], axis=-1)
-        rows = np.where(used[:, 3], "f %d/%d %d/%d %d/%d %d/%d\n", "f %d/%d %d/%d %d/%d\n")
-        file.write(("".join(rows.tolist()) % tuple(pairs[used].ravel().tolist())).encode())

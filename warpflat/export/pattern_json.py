@@ -1,22 +1,256 @@
-"""Patterns as JSON with everything: edges, cut lines, notches, darts, seams as stitches, the map to the mesh."""
+"""`pattern.json`: a drafted pattern with everything, written and read back: edges, cut lines, notches, darts, stitches, the mesh.
+
+The models say what is read, with types, bounds and lengths. Lengths are metres, angles radians. Keys that follow from others,
+such as `matches`, are written for other programs and not read.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from pydantic_core import to_json
 
 from warpflat._version import __version__
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import check_label
+from warpflat.core.input_files import guarded, read_json
 from warpflat.core.output import atomic_path
+from warpflat.core.text import control_in, quote_value
+from warpflat.core.toml_file import Table, check_table
+from warpflat.pattern.curves import Curve
 from warpflat.pattern.cut_list import cut_list
-from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
-from warpflat.pattern.pieces import SeamSide
+from warpflat.pattern.drafted import (
+    DraftedCutout,
+    DraftedDart,
+    DraftedEdge,
+    DraftedGarment,
+    DraftedPiece,
+    DrillHole,
+    Notch,
+    SeamReport,
+)
+from warpflat.pattern.label import Label
+from warpflat.pattern.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
-__all__ = ["SCHEMA", "pattern_json", "write_pattern_json"]
+__all__ = [
+    "SCHEMA",
+    "DartEntry",
+    "PatternEntry",
+    "PieceEntry",
+    "SideEntry",
+    "pattern_from_json",
+    "pattern_json",
+    "read_pattern_json",
+    "write_pattern_json",
+]
+
+
+#: No closed line of a pattern encloses less [m2].
+SMALLEST_AREA = 1e-10
+
+
+def _text(text: str) -> str:
+    if letter := control_in(text, "\n"):
+        raise ValueError(f"{quote_value(text)} has the control character {letter!r} in it")
+    return text
+
+
+def _ascending(shares: list[float]) -> list[float]:
+    if shares[0] >= shares[1]:
+        raise ValueError("the first share must be less than the second")
+    return shares
+
+
+def _ring(points: list[list[float]]) -> list[list[float]]:
+    x, y = np.transpose(points)
+    if abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 < SMALLEST_AREA:
+        raise ValueError("encloses no area")
+    return points
+
+
+# A larger coordinate is an error of units, and its powers may overflow.
+Coordinate = Annotated[float, Field(ge=-10_000, le=10_000)]
+Length = Annotated[float, Field(ge=0, le=10_000)]
+Name = Annotated[str, AfterValidator(lambda name: check_label(name, "name"))]
+Text = Annotated[str, AfterValidator(_text)]
+Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+Shares = Annotated[
+    list[Annotated[float, Field(ge=0.0, le=1.0)]], Field(min_length=2, max_length=2), AfterValidator(_ascending)
+]
+Ends = Annotated[list[Point], Field(min_length=2, max_length=2)]
+Line = Annotated[list[Point], Field(min_length=2)]
+Ring = Annotated[list[Point], Field(min_length=3), AfterValidator(_ring)]
+Segment = Annotated[list[Point], Field(min_length=4, max_length=4)]
+Row = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+
+
+class Entry(Table):
+    """A part of the file; unknown keys are ignored."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
+class EdgeEntry(Entry):
+    """An edge of the sewing line (see `warpflat.pattern.drafted.DraftedEdge`)."""
+
+    name: Name
+    kind: Literal["seam", "hem", "fold", "cut", "dart"]
+    allowance: Annotated[float, Field(ge=0, le=0.5)]
+    bezier: Annotated[list[Segment], Field(min_length=1)]
+    straight: list[bool]
+    line: Line
+    fit_error: Length
+    tolerance: Length
+    point_lengths: list[Length]
+    mesh_vertices: list[Annotated[int, Field(ge=0, lt=2**31)]] | None
+
+    @model_validator(mode="after")
+    def _lengths_agree(self) -> EdgeEntry:
+        if len(self.straight) != len(self.bezier):
+            raise ValueError(
+                f"straight has {len(self.straight)} entries, bezier {len(self.bezier)}; there is one for each curve"
+            )
+        if self.mesh_vertices is not None and len(self.mesh_vertices) != len(self.point_lengths):
+            raise ValueError(
+                f"mesh_vertices has {len(self.mesh_vertices)} entries, point_lengths {len(self.point_lengths)}; "
+                "there is one for each point"
+            )
+        return self
+
+
+class DartEntry(Entry):
+    """A dart; its legs are edges."""
+
+    name: Name
+    left: Name
+    right: Name
+    tip: Point
+    fold: Line | None
+    fold_to: Literal["", "left", "right"]
+    opening: float
+    pleat: float | None = None
+
+
+class NotchEntry(Entry):
+    """A notch; a double one has two bases."""
+
+    seam: Name
+    edge: Name
+    length: Length
+    at: Point
+    base: Annotated[list[Point], Field(min_length=1, max_length=2)]
+    direction: Point
+    depth: Length
+
+
+class HoleEntry(Entry):
+    """A drill hole."""
+
+    name: Name
+    at: Point
+
+
+class LabelEntry(Entry):
+    """The label of a piece: each text with the height of its capitals."""
+
+    at: Point
+    lines: Annotated[list[Text], Field(min_length=1)]
+    heights: list[Annotated[float, Field(gt=0, le=10)]]
+    angle: float = 0.0
+    leader: Ends | None = None
+
+    @model_validator(mode="after")
+    def _lengths_agree(self) -> LabelEntry:
+        if len(self.lines) != len(self.heights):
+            raise ValueError(
+                f"heights has {len(self.heights)} entries, lines {len(self.lines)}; there is one for each line"
+            )
+        return self
+
+
+class PieceEntry(Entry):
+    """A piece in one size (see `warpflat.pattern.drafted.DraftedPiece`).
+
+    In files without `cutout_sew_lines` and `cutout_allowances` holes have no allowance: they are cut on the sewing
+    line.
+    """
+
+    fabric: Text
+    quantity: Annotated[int, Field(ge=1, le=1_000_000)]
+    role: Literal["shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket"] = "shell"
+    also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
+    enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
+        default=[1.0, 1.0]
+    )
+    marks: list[Name] = Field(default_factory=list)
+    paired: bool
+    title: Text = ""
+    printed_units: Literal["mm", "cm", "in"] = "cm"
+    frame: Annotated[list[Row], Field(min_length=2, max_length=2)]
+    edges: Annotated[list[EdgeEntry], Field(min_length=1)]
+    cut_line: Ring
+    darts: list[DartEntry]
+    notches: list[NotchEntry]
+    drill_holes: list[HoleEntry]
+    internal_lines: dict[Name, Line]
+    cutouts: dict[Name, Ring]
+    cutout_sew_lines: dict[Name, Ring] = Field(default_factory=dict)
+    cutout_allowances: dict[Name, Annotated[float, Field(ge=0, le=0.5)]] = Field(default_factory=dict)
+    fisheye_darts: dict[Name, Ring]
+    grain: Ends
+    label: LabelEntry
+    notes: list[Text]
+
+
+class SideEntry(Entry):
+    """One edge of a seam's side."""
+
+    piece: Name
+    edge: Name
+    reversed: bool
+    mirrored: bool = False
+
+
+class StitchEntry(Entry):
+    """A seam, or a dart that is sewn shut."""
+
+    name: Name
+    kind: Literal["seam", "dart"]
+    ease: float
+    eased: Shares = Field(default=[0.0, 1.0])
+    sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
+
+
+class SeamEntry(Entry):
+    """The lengths of the two sides of a seam in one size (see `warpflat.pattern.drafted.SeamReport`)."""
+
+    name: Name
+    size: Text
+    sides: Annotated[list[Text], Field(min_length=2, max_length=2)]
+    length_mm: Annotated[list[float], Field(min_length=2, max_length=2)]
+    ease: float
+    difference_mm: float
+    difference_per_50mm_mm: float | None
+
+
+class PatternEntry(Entry):
+    """The whole file: pieces by size and name, stitches, and the lengths of seams."""
+
+    name: Name
+    sample_size: Text
+    words: dict[Text, Text] = Field(default_factory=dict)
+    sizes: dict[Text, Annotated[dict[Name, PieceEntry], Field(min_length=1)]] = Field(min_length=1)
+    stitches: list[StitchEntry]
+    seams: list[SeamEntry]
+
 
 #: Increased when a reader of the old form would misread the new one.
 SCHEMA = 1
@@ -107,7 +341,22 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
         "printed_units": piece.piece.units,
         "on_fold": piece.piece.on_fold,
         "frame": piece.frame.tolist(),
-        "edges": [_edge(edge) for edge in piece.edges],
+        "edges": [
+            {
+                "name": edge.name,
+                "kind": edge.kind,
+                "allowance": edge.width,
+                "length": edge.length,
+                "bezier": edge.curve.bezier.tolist(),
+                "straight": edge.curve.straight.tolist(),
+                "line": edge.line.tolist(),
+                "fit_error": edge.fit_error,
+                "tolerance": edge.tolerance,
+                "point_lengths": edge.places.tolist(),
+                "mesh_vertices": None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
+            }
+            for edge in piece.edges
+        ],
         "cut_line": piece.cut_line.tolist(),
         "darts": [
             {
@@ -154,21 +403,183 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
     }
 
 
-def _edge(edge: DraftedEdge) -> dict[str, Any]:
-    return {
-        "name": edge.name,
-        "kind": edge.kind,
-        "allowance": edge.width,
-        "length": edge.length,
-        "bezier": edge.curve.bezier.tolist(),
-        "straight": edge.curve.straight.tolist(),
-        "line": edge.line.tolist(),
-        "fit_error": edge.fit_error,
-        "tolerance": edge.tolerance,
-        "point_lengths": edge.places.tolist(),
-        "mesh_vertices": None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
-    }
-
-
 def _lists(lines: Mapping[str, Sequence[Any] | np.ndarray[Any, Any]]) -> dict[str, Any]:
     return {name: np.asarray(line).tolist() for name, line in lines.items()}
+
+
+def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
+    """Read the pattern of a file that :func:`warpflat.export.pattern_json.write_pattern_json` wrote.
+
+    Raises:
+        InputError: the file is missing, no JSON, of another schema, or does not hold together.
+    """
+    path = Path(path)
+    if path.parent.is_file():
+        raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies")
+    data = read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
+    with guarded(path, "JSON"):
+        return pattern_from_json(data)
+
+
+def pattern_from_json(data: Any) -> DraftedGarment:
+    """Return the pattern of the data that :func:`warpflat.export.pattern_json.pattern_json` gave.
+
+    Raises:
+        InputError: another schema, a missing key, a value of the wrong kind, or lines that are no pattern.
+    """
+    if not isinstance(data, Mapping) or "sizes" not in data:
+        raise InputError('is no pattern of warpflat: it has no "sizes"')
+    if data.get("schema") != SCHEMA:
+        raise InputError(
+            f"has schema {quote_value(data.get('schema'))}; this version reads {SCHEMA}: run the scene again"
+        )
+    try:
+        data = check_table(PatternEntry, data)
+        drafted = {
+            size: tuple(_read_piece(name, size, piece) for name, piece in pieces.items())
+            for size, pieces in data.sizes.items()
+        }
+        garment = Garment(
+            name=data.name,
+            pieces={size: tuple(piece.piece for piece in pieces) for size, pieces in drafted.items()},
+            seams=[
+                Seam(
+                    name=stitch.name,
+                    sides=(_read_side(stitch.sides[0]), _read_side(stitch.sides[1])),
+                    ease=stitch.ease,
+                    eased=(stitch.eased[0], stitch.eased[1]),
+                )
+                for stitch in data.stitches
+                if stitch.kind == "seam"
+            ],
+            sample_size=data.sample_size,
+            words=data.words,
+        )
+        reports = tuple(
+            SeamReport(
+                name=seam.name,
+                size=seam.size,
+                sides=(seam.sides[0], seam.sides[1]),
+                length_mm=(seam.length_mm[0], seam.length_mm[1]),
+                ease=seam.ease,
+                difference_mm=seam.difference_mm,
+                local_mm=seam.difference_per_50mm_mm,
+            )
+            for seam in data.seams
+        )
+        return DraftedGarment(garment=garment, pieces=drafted, seams=reports)
+    except InputError as error:
+        raise InputError(f"{error}; run the scene again") from None
+
+
+def _read_side(parts: Sequence[SideEntry]) -> tuple[SeamSide, ...]:
+    return tuple(SeamSide(piece=p.piece, edge=p.edge, reversed=p.reversed, mirrored=p.mirrored) for p in parts)
+
+
+def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
+    frame = np.array(data.frame)
+    darts = [
+        Dart(name=d.name, left=d.left, right=d.right, fold_to=d.fold_to or None, pleat=d.pleat) for d in data.darts
+    ]
+    cutouts = {
+        key: DraftedCutout(
+            sew_line=np.array(data.cutout_sew_lines.get(key, line)),
+            cut_line=np.array(line),
+            width=data.cutout_allowances.get(key, 0.0),
+        )
+        for key, line in data.cutouts.items()
+    }
+    fisheyes = {key: np.array(line) for key, line in data.fisheye_darts.items()}
+    internal_lines = {key: np.array(line) for key, line in data.internal_lines.items()}
+    grain = np.array(data.grain)
+    holes = [
+        Hole(name=key, points=_to_mesh(cutout.sew_line, frame), allowance=cutout.width)
+        for key, cutout in cutouts.items()
+    ]
+    holes += [Hole(name=key, points=_to_mesh(line, frame), kind="dart") for key, line in fisheyes.items()]
+    piece = Piece(
+        name=name,
+        size=size,
+        fabric=data.fabric,
+        quantity=data.quantity,
+        role=data.role,
+        also=data.also,
+        marks={
+            hole.name: _to_mesh(np.array([hole.at]), frame)[0] for hole in data.drill_holes if hole.name in data.marks
+        },
+        paired=data.paired,
+        title=data.title,
+        units=data.printed_units,
+        edges=[
+            Edge(
+                name=edge.name,
+                points=_to_mesh(np.array(edge.line), frame),
+                kind=edge.kind,
+                allowance=None if edge.kind == "fold" else edge.allowance,
+                vertices=None if edge.mesh_vertices is None else np.array(edge.mesh_vertices, dtype=np.int32),
+            )
+            for edge in data.edges
+        ],
+        darts=darts,
+        internal_lines={key: _to_mesh(line, frame) for key, line in internal_lines.items()},
+        grain=_to_mesh(grain, frame),
+        holes=holes,
+    )
+    return DraftedPiece(
+        piece=piece,
+        frame=frame,
+        edges=tuple(
+            DraftedEdge(
+                edge=edge,
+                curve=Curve(bezier=np.array(d.bezier), straight=np.array(d.straight)),
+                line=np.array(d.line),
+                width=d.allowance,
+                places=np.array(d.point_lengths),
+                fit_error=d.fit_error,
+                tolerance=d.tolerance,
+            )
+            for edge, d in zip(piece.edges, data.edges, strict=True)
+        ),
+        cut_line=np.array(data.cut_line),
+        darts=tuple(
+            DraftedDart(
+                dart=dart,
+                tip=np.array(d.tip),
+                fold=None if d.fold is None else np.array(d.fold),
+                fold_to=d.fold_to,
+                opening=d.opening,
+            )
+            for dart, d in zip(darts, data.darts, strict=True)
+        ),
+        drill_holes=tuple(DrillHole(name=hole.name, at=np.array(hole.at)) for hole in data.drill_holes),
+        notches=tuple(
+            Notch(
+                seam=notch.seam,
+                edge=notch.edge,
+                length=notch.length,
+                at=np.array(notch.at),
+                base=tuple(np.array(base) for base in notch.base),
+                direction=np.array(notch.direction),
+                depth=notch.depth,
+            )
+            for notch in data.notches
+        ),
+        internal_lines=internal_lines,
+        cutouts=cutouts,
+        fisheyes=fisheyes,
+        grain=grain,
+        label=Label(
+            at=np.array(data.label.at),
+            lines=tuple(zip(data.label.lines, data.label.heights, strict=True)),
+            angle=data.label.angle,
+            leader=None if data.label.leader is None else np.array(data.label.leader),
+        ),
+        notes=tuple(data.notes),
+        enlarged=(data.enlarged[0], data.enlarged[1]),
+    )
+
+
+def _to_mesh(points: FloatArray, frame: FloatArray) -> FloatArray:
+    """Map points from the drafted piece's coordinates to those of the flat mesh."""
+    turn = frame[:, :2]
+    return (points - frame[:, 2]) @ turn

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,14 +27,11 @@ from warpflat.pattern.draft import nest_label, relabelled
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drawing import OnPaper, Stroke, draw_nest
 from warpflat.pattern.half_pieces import halved
+from warpflat.pattern.label import BOLD, CAPITALS, FONT, Words, embedded_font
 from warpflat.pattern.layout import Placed, Sheet, lay_out, nests, occupied_points
-from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, embedded_font
 from warpflat.pattern.sewing_order import seam_letters
 from warpflat.pattern.tile_nesting import nest_on_tiles
 from warpflat.pattern.words import printed_in, translate
-
-if TYPE_CHECKING:
-    from reportlab.pdfgen.canvas import Canvas
 
 __all__ = ["PAPERS", "write_pdf"]
 
@@ -95,7 +92,15 @@ def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, si
     printed = halved(whole)
     kind = PAPERS[paper]
     sheet, tiling = _arranged(nests(printed), kind)
-    kind, sheet = tiling.paper, _with_labels_off_joints(sheet, garment.name, tiling)
+    # Labels move to where no joint of two sheets crosses them, where there is room for that.
+    placed = []
+    for place in sheet.placed:
+        joints = [place.on_piece(joint) for joint in tiling.joints]
+        pieces = tuple(relabelled(piece, garment.name, joints) for piece in place.pieces) if joints else place.pieces
+        if any(piece.label.leader is not None for piece in pieces):
+            pieces = place.pieces
+        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
+    kind, sheet = tiling.paper, replace(sheet, placed=tuple(placed))
     tiling = replace(tiling, sheet=sheet)
     content, guided = b"", list[str]()
     if kind.tiled:
@@ -119,30 +124,97 @@ def _pages(
         chosen: sizes.
         guide: whether the legend and the guide come first.
     """
+    from reportlab.pdfbase import pdfmetrics
+    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
     kind, stream = tiling.paper, BytesIO()
     canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
-    _register_fonts()
+    for name in (FONT, BOLD):
+        pdfmetrics.registerFont(embedded_font(name))
     canvas.setTitle(f"{whole.name}, {' / '.join(chosen)}")
     canvas.setCreator("warpflat")
     canvas.setViewerPreference("PrintScaling", "None")
-    _sheet_form(canvas, tiling, printed, chosen)
+    # The whole sheet is drawn once, as a form; every page shows its part of it.
+    border, sheet = 0.05, tiling.sheet
+    low, high = np.array([-border, -3.0]), sheet.size + 3.0
+    letters = seam_letters(printed)
+    widen = tiling.paper.line_width
+    canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
+    for placed in sheet.placed:
+        nested = len(placed.pieces) > 1
+        on_paper = OnPaper(joints=[placed.on_piece(joint) for joint in tiling.joints], letters=letters)
+        for index, drawing in enumerate(draw_nest(placed.pieces, on_paper)):
+            of_size: list[Stroke] = []
+            shared: list[Stroke] = []
+            for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
+                (of_size if nested and stroke.role in OF_LAYER else shared).append(stroke)
+            for stroke in shared:
+                _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
+            for words in (words for words in drawing.words if not words.tag):
+                _words(canvas, words, placed.matrix, "#000000")
+            if nested:
+                canvas._code.append(f"/OC /size{chosen.index(drawing.piece.size)} BDC")
+            for stroke in of_size:
+                _stroke(canvas, stroke, placed.matrix, index, widen)
+            for words in (words for words in drawing.words if words.tag):
+                _words(canvas, words, placed.matrix, SIZE_COLOURS[index % len(SIZE_COLOURS)])
+            if nested:
+                canvas._code.append("EMC")
+    if sheet.reserved is not None:
+        draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
+    canvas.endForm()
     if guide:
         legend_page(canvas, printed, chosen, tiling.sheet, tiling)
         guide_pages(canvas, whole, printed, kind)
     for row, column in tiling.tiles:
         _tile(canvas, tiling, row, column, whole.name.replace("_", " "))
     if len(chosen) > 1:
-        _name_layers(canvas, chosen)
+        # The layers of the sheet, one a size, are optional content that readers list and can hide.
+        document = canvas._doc
+        groups = {
+            f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
+            for k, size in enumerate(chosen)
+        }
+        form = document.idToObject[xObjectName("sheet")]
+        form.Resources = PDFResourceDictionary(Properties=groups)
+        form.Resources.basicFonts()
+        order = PDFArray(list(groups.values()))
+        catalog = document.Catalog
+        catalog.OCProperties = PDFDictionary(
+            {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
+        )
+        catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
     canvas.save()
     return stream.getvalue()
 
 
 def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
     """Return a layout that needs few pages."""
+    import shapely
+
     if paper.tiled:
-        sheet = _nested(groups, paper)
+        # Pieces, turned where that helps, on the tiles of a grid, of which they take few.
+        shapes = []
+        for group in groups:
+            label = nest_label(group)
+            parts = [shapely.Polygon(piece.cut_line) for piece in group]
+            # A label beside its piece belongs to it, with all between.
+            shape = shapely.union_all(parts)
+            if label.leader is not None:
+                shape = shapely.union_all([*parts, shapely.Polygon(label.box)]).convex_hull
+            shapes.append(shape)
+        places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
+        placed = []
+        for group, shape, place in zip(groups, shapes, places, strict=True):
+            quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+            turn = np.linalg.matrix_power(quarter, place.quarters)
+            corners = np.asarray(shapely.get_coordinates(shape)) @ turn.T
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            matrix = np.column_stack([turn, place.corner - low])
+            box = np.stack([place.corner, place.corner + high - low])
+            placed.append(Placed(pieces=group, matrix=matrix, box=box))
+        sheet = Sheet(placed=tuple(placed), size=size)
         return sheet, make_tiling(sheet, paper)
     if paper.endless:
         widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
@@ -155,113 +227,12 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
     return sheet, make_tiling(sheet, paper)
 
 
-def _nested(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet:
-    """Return pieces, turned where that helps, on the tiles of a grid, of which they take few."""
-    import shapely
-
-    shapes = []
-    for group in groups:
-        label = nest_label(group)
-        parts = [shapely.Polygon(piece.cut_line) for piece in group]
-        # A label beside its piece belongs to it, with all between.
-        shape = shapely.union_all(parts)
-        if label.leader is not None:
-            shape = shapely.union_all([*parts, shapely.Polygon(label.box)]).convex_hull
-        shapes.append(shape)
-    places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
-    placed = []
-    for group, shape, place in zip(groups, shapes, places, strict=True):
-        quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
-        turn = np.linalg.matrix_power(quarter, place.quarters)
-        corners = np.asarray(shapely.get_coordinates(shape)) @ turn.T
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        matrix = np.column_stack([turn, place.corner - low])
-        box = np.stack([place.corner, place.corner + high - low])
-        placed.append(Placed(pieces=group, matrix=matrix, box=box))
-    return Sheet(placed=tuple(placed), size=size)
-
-
-def _with_labels_off_joints(sheet: Sheet, garment: str, tiling: Tiling) -> Sheet:
-    """Move the labels of pieces to where no joint of two sheets crosses them, where there is room for that."""
-    placed = []
-    for place in sheet.placed:
-        joints = [place.on_piece(joint) for joint in tiling.joints]
-        pieces = tuple(relabelled(piece, garment, joints) for piece in place.pieces) if joints else place.pieces
-        if any(piece.label.leader is not None for piece in pieces):
-            pieces = place.pieces
-        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
-    return replace(sheet, placed=tuple(placed))
-
-
 def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
     """Return a piece whose label is turned round where it would stand on its head on the sheet."""
     turn = float(np.degrees(piece.label.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
     if -89.5 < (turn + 180.0) % 360.0 - 180.0 < 90.5:
         return piece
     return replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
-
-
-def _register_fonts() -> None:
-    """Register the fonts, which are embedded."""
-    from reportlab.pdfbase import pdfmetrics
-
-    for name in (FONT, BOLD):
-        pdfmetrics.registerFont(embedded_font(name))
-
-
-def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: Sequence[str]) -> None:
-    """Draw the whole sheet once, as a form; every page shows its part of it."""
-    border, sheet = 0.05, tiling.sheet
-    low, high = np.array([-border, -3.0]), sheet.size + 3.0
-    letters = seam_letters(garment)
-    widen = tiling.paper.line_width
-    canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
-    for placed in sheet.placed:
-        nested = len(placed.pieces) > 1
-        on_paper = OnPaper(joints=[placed.on_piece(joint) for joint in tiling.joints], letters=letters)
-        for index, drawing in enumerate(draw_nest(placed.pieces, on_paper)):
-            own: list[Stroke] = []
-            shared: list[Stroke] = []
-            for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
-                (own if nested and stroke.role in OF_LAYER else shared).append(stroke)
-            for stroke in shared:
-                _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
-            for words in (words for words in drawing.words if not words.tag):
-                _words(canvas, words, placed.matrix, "#000000")
-            if nested:
-                canvas._code.append(f"/OC /size{sizes.index(drawing.piece.size)} BDC")
-            for stroke in own:
-                _stroke(canvas, stroke, placed.matrix, index, widen)
-            for words in (words for words in drawing.words if words.tag):
-                _words(canvas, words, placed.matrix, SIZE_COLOURS[index % len(SIZE_COLOURS)])
-            if nested:
-                canvas._code.append("EMC")
-    if sheet.reserved is not None:
-        draw_legend(canvas, sheet.reserved, garment, sizes, tiling.paper.name)
-    canvas.endForm()
-
-
-def _name_layers(canvas: Any, sizes: Sequence[str]) -> None:
-    """Declare the layers of the sheet, one a size, as optional content that readers list and can hide.
-
-    reportlab has no call for this; the entries are those of ISO 32000-1, 8.11.
-    """
-    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
-
-    document = canvas._doc
-    groups = {
-        f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
-        for k, size in enumerate(sizes)
-    }
-    form = document.idToObject[xObjectName("sheet")]
-    form.Resources = PDFResourceDictionary(Properties=groups)
-    form.Resources.basicFonts()
-    order = PDFArray(list(groups.values()))
-    catalog = document.Catalog
-    catalog.OCProperties = PDFDictionary(
-        {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
-    )
-    catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
 
 
 def _stroke(canvas: Any, stroke: Stroke, matrix: FloatArray, size_index: int | None, widen: float = 1.0) -> None:
@@ -360,7 +331,21 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
         canvas.line(*(np.array(start) * POINT), *(np.array(end) * POINT))
         r, c = neighbours[side]
         if 0 <= r < tiling.rows and 0 <= c < tiling.columns and (r, c) in tiling.tiles:
-            _diamond(canvas, np.array(middle), tiling, (row, column), (r, c))
+            # The diamond in which two sheets meet, with their names.
+            at = np.array(middle)
+            first, second = sorted([(row, column), (r, c)])
+            size = 0.004
+            path = canvas.beginPath()
+            path.moveTo(*((at + np.array([size, 0])) * POINT))
+            for dx, dy in ((0, size), (-size, 0), (0, -size)):
+                path.lineTo(*((at + np.array([dx, dy])) * POINT))
+            path.close()
+            canvas.drawPath(path)
+            canvas.setFillColor("#888888")
+            canvas.setFont(FONT, 6)
+            text = f"{tiling.name(*first)} | {tiling.name(*second)}"
+            shift = np.array([0.006, 0.001]) if first[0] != second[0] else np.array([-0.004, 0.006])
+            canvas.drawString(*((at + shift) * POINT), text)
     for x in (low[0], high[0]):
         for y in (bottom, top):
             for dx, dy in ((0.004, 0.0), (0.0, 0.004)):
@@ -368,20 +353,3 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
     canvas.setFillColor("#bbbbbb")
     canvas.setFont(BOLD, 26)
     canvas.drawString((low[0] + 0.006) * POINT, (top - 0.014) * POINT, tiling.name(row, column))
-
-
-def _diamond(canvas: Any, at: FloatArray, tiling: Tiling, here: tuple[int, int], there: tuple[int, int]) -> None:
-    """Draw the diamond in which two sheets meet, with their names."""
-    first, second = sorted((here, there))
-    size = 0.004
-    path = canvas.beginPath()
-    path.moveTo(*((at + np.array([size, 0])) * POINT))
-    for dx, dy in ((0, size), (-size, 0), (0, -size)):
-        path.lineTo(*((at + np.array([dx, dy])) * POINT))
-    path.close()
-    canvas.drawPath(path)
-    canvas.setFillColor("#888888")
-    canvas.setFont(FONT, 6)
-    text = f"{tiling.name(*first)} | {tiling.name(*second)}"
-    shift = np.array([0.006, 0.001]) if first[0] != second[0] else np.array([-0.004, 0.006])
-    canvas.drawString(*((at + shift) * POINT), text)

@@ -9,11 +9,10 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.export.pdf_legend import page_footer
-from warpflat.pattern.cloth_needed import WIDTHS, cloth_needed
 from warpflat.pattern.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
-from warpflat.pattern.label import cutting_words, printed_size
-from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width, wrap_text
+from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
+from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
 from warpflat.pattern.sewing_order import piece_titles, sewing_steps, sewn_seams
 from warpflat.pattern.words import translate
@@ -96,23 +95,8 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     page = _Page(canvas, whole, paper)
     size, units = whole.garment.sample, whole.garment.units
     size = size if size in printed.pieces else next(iter(printed.pieces))
-    _pieces(page, printed.pieces[size], units)
-    _cut_list(page, printed.pieces[size])
-    _cloth(page, whole, units)
-    _steps(page, whole, size)
-    _seams(page, whole, size, units)
-    notes = dict.fromkeys(
-        f"{piece.piece.printed_name}: {note}." for piece in printed.pieces[size] for note in piece.notes
-    )
-    if notes:
-        page.heading(translate("Notes"), 3 * LINE)
-    for note in notes:
-        page.paragraph(note)
-    page.end()
-
-
-def _pieces(page: _Page, pieces: Sequence[DraftedPiece], units: str) -> None:
-    """Draw the pieces, small, with what to cut of each."""
+    # The pieces, small, with what to cut of each.
+    pieces = printed.pieces[size]
     titles = piece_titles([piece.piece for piece in pieces])
     page.heading(translate("Cut"), THUMBNAIL[1] + 0.02)
     highest = max(float(np.ptp(piece.cut_line, axis=0).max()) for piece in pieces)
@@ -138,40 +122,62 @@ def _pieces(page: _Page, pieces: Sequence[DraftedPiece], units: str) -> None:
                 page.y -= 0.0038
             page.y = y
         page.y -= 3 * 0.0038
+    allowances = {
+        (edge.kind == "hem", edge.kind, round(edge.width, 4))
+        for piece in pieces
+        for edge in piece.edges
+        if edge.kind in ("seam", "hem") and edge.width > 0
+    }
     page.paragraph(
         translate(
             "Allowances are included: {allowances}. Lay every grain arrow along the selvedge.",
-            allowances=_allowances(pieces, units),
+            allowances=", ".join(
+                translate(f"{kind}s {{width}}", width=length_words(width, units))
+                for _, kind, width in sorted(allowances)
+            ),
         )
     )
-
-
-def _cut_list(page: _Page, pieces: Sequence[DraftedPiece]) -> None:
-    """Write what is cut from each cloth, where there are several."""
     cloths = cut_list(pieces)
-    if len(cloths) < 2:
-        return
-    page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
-    for cloth, entries in cloths.items():
-        words = [
-            translate(
-                f"{{title}} {{count}}{' on fold' if entry.on_fold else ''}", title=entry.title, count=entry.quantity
-            )
-            for entry in entries
-        ]
-        page.paragraph(", ".join(words), indent=0.030, lead=cloth)
-
-
-def _allowances(pieces: Sequence[DraftedPiece], units: str) -> str:
-    found: dict[tuple[str, float], list[str]] = {}
-    for piece in pieces:
-        for edge in piece.edges:
-            if edge.kind in ("seam", "hem") and edge.width > 0:
-                found.setdefault((edge.kind, round(edge.width, 4)), [])
-    return ", ".join(
-        translate(f"{kind}s {{width}}", width=length_words(width, units))
-        for kind, width in sorted(found, key=lambda k: (k[0] == "hem", k))
+    if len(cloths) > 1:
+        page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
+        for cloth, entries in cloths.items():
+            cut = [
+                translate(
+                    f"{{title}} {{count}}{' on fold' if entry.on_fold else ''}", title=entry.title, count=entry.quantity
+                )
+                for entry in entries
+            ]
+            page.paragraph(", ".join(cut), indent=0.030, lead=cloth)
+    _cloth(page, whole, units)
+    steps = sewing_steps(whole, size)
+    page.heading(translate("Sewing order"), 3 * LINE)
+    page.paragraph(
+        translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
     )
+    for number, words in enumerate(steps, 1):
+        page.paragraph(words, indent=0.006, lead=str(number))
+    seams = sewn_seams(whole, size)
+    if seams:
+        page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
+        rows = [
+            [
+                seam.letter,
+                seam.name + (f" ({seam.count} x)" if seam.count > 1 else ""),
+                seam.sides[0],
+                length_words(seam.length_mm[0] / 1000, units),
+                seam.sides[1],
+                length_words(seam.length_mm[1] / 1000, units),
+            ]
+            for seam in seams
+        ]
+        head = ["", *(translate(word) for word in ("seam", "piece", "length", "sewn to", "length"))]
+        page.table(head, rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
+    notes = dict.fromkeys(f"{piece.piece.printed_name}: {note}." for piece in pieces for note in piece.notes)
+    if notes:
+        page.heading(translate("Notes"), 3 * LINE)
+    for note in notes:
+        page.paragraph(note)
+    page.end()
 
 
 def _thumbnail(canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: float) -> None:
@@ -216,35 +222,3 @@ def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     page.paragraph(
         translate("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")
     )
-
-
-def _seams(page: _Page, whole: DraftedGarment, size: str, units: str) -> None:
-    """Write the table of seams: letter, sides, lengths."""
-    seams = sewn_seams(whole, size)
-    if not seams:
-        return
-    page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
-    rows = [
-        [
-            seam.letter,
-            seam.name + (f" ({seam.count} x)" if seam.count > 1 else ""),
-            seam.sides[0],
-            length_words(seam.length_mm[0] / 1000, units),
-            seam.sides[1],
-            length_words(seam.length_mm[1] / 1000, units),
-        ]
-        for seam in seams
-    ]
-    head = ["", *(translate(word) for word in ("seam", "piece", "length", "sewn to", "length"))]
-    page.table(head, rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
-
-
-def _steps(page: _Page, whole: DraftedGarment, size: str) -> None:
-    """Write the order of sewing."""
-    steps = sewing_steps(whole, size)
-    page.heading(translate("Sewing order"), 3 * LINE)
-    page.paragraph(
-        translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
-    )
-    for number, step in enumerate(steps, 1):
-        page.paragraph(step, indent=0.006, lead=str(number))

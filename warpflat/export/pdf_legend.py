@@ -11,9 +11,8 @@ from warpflat.core.arrays import FloatArray
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.export.svg import STYLE
 from warpflat.pattern.drafted import DraftedGarment
-from warpflat.pattern.label import fit_label, printed_size
+from warpflat.pattern.label import BOLD, CAPITALS, FONT, fit_label, printed_size, text_width
 from warpflat.pattern.layout import Sheet
-from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width
 from warpflat.pattern.sewing_order import piece_titles
 from warpflat.pattern.words import translate
 
@@ -51,7 +50,8 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
     x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
     _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)
     if any(sizes):
-        _text(canvas, x, top - 0.016, _sizes_words(sizes), 11)
+        words = printed_size(sizes[0]) if len(sizes) == 1 else translate("sizes {sizes}", sizes=", ".join(sizes))
+        _text(canvas, x, top - 0.016, words[0].upper() + words[1:], 11)
     _text(canvas, x, top - 0.025, translate("Print at 100 % (actual size). Do not fit to the page."), 10, bold=True)
     _text(
         canvas,
@@ -83,15 +83,6 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
             _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, translate("size {size}", size=size), 8)
 
 
-def _sizes_words(sizes: Sequence[str]) -> str:
-    """Return the words for the sizes of a pattern."""
-    if len(sizes) == 1:
-        words = printed_size(sizes[0])
-    else:
-        words = translate("sizes {sizes}", sizes=", ".join(sizes))
-    return words[0].upper() + words[1:]
-
-
 def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
     """Draw the first page of a tiled pattern, and end the page."""
     paper = tiling.paper
@@ -107,21 +98,16 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
             "the half diamonds meet, and glue. {sheets} sheets; empty ones are left out.", sheets=len(tiling.tiles)
         ),
     ]
-    for line in lines:
-        _text(canvas, float(low[0]), y, line, 7.5)
+    for words in lines:
+        _text(canvas, float(low[0]), y, words, 7.5)
         y -= 0.0042
-    _overview(canvas, sheet, tiling, float(low[0]), paper.margin + 0.004, LEGEND_SIZE[0], y - paper.margin - 0.010)
-    page_footer(canvas, garment.name, paper, translate("print this page first and measure both squares"))
-    canvas.showPage()
-
-
-def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, width: float, height: float) -> None:
-    """Draw all sheets and pieces, small, in a box whose lower left is (x, y) [m]."""
+    # All sheets and pieces, small.
+    width = LEGEND_SIZE[0]
     step, overlap = tiling.paper.step, tiling.paper.overlap
     total = np.array([tiling.columns * step[0] + overlap, tiling.rows * step[1] + overlap])
-    scale = float(min(width / total[0], height / total[1]))
-    left = x + (width - scale * total[0]) / 2
-    origin = np.array([left, y + scale * (total[1] - float(sheet.size[1]))])
+    scale = float(min(width / total[0], (y - paper.margin - 0.010) / total[1]))
+    left = float(low[0]) + (width - scale * total[0]) / 2
+    origin = np.array([left, (paper.margin + 0.004) + scale * (total[1] - float(sheet.size[1]))])
     canvas.setDash([])
     for row, column in tiling.tiles:
         corner = tiling.corner(row, column) + np.array([0.0, overlap])
@@ -145,6 +131,8 @@ def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, wid
                 path.close()
                 canvas.drawPath(path)
         _name(canvas, sheet, number, origin, scale)
+    page_footer(canvas, garment.name, paper, translate("print this page first and measure both squares"))
+    canvas.showPage()
 
 
 def _name(canvas: Any, sheet: Sheet, number: int, origin: FloatArray, scale: float) -> None:

@@ -116,25 +116,25 @@ LINE = 0.00025
 
 def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
     """Choose the tiles of a sheet on which something is drawn."""
+    import shapely
+
     step = paper.step
     columns = max(1, int(np.ceil((sheet.size[0] - paper.overlap) / step[0] - 1e-9)))
     rows = max(1, int(np.ceil((sheet.size[1] - paper.overlap) / step[1] - 1e-9)))
     tiling = Tiling(paper=paper, rows=rows, columns=columns, tiles=(), sheet=sheet)
-    shapes = _drawn_shapes(sheet)
-    tiles = _drawn_tiles(tiling, shapes)
-    return replace(tiling, tiles=tiles, joined=_is_joined(tiling, tiles, shapes))
-
-
-def _drawn_shapes(sheet: Sheet) -> list[Polygon]:
-    """Return the areas of a sheet that are drawn on: pieces, labels beside them, the reserved block."""
-    import shapely
-
+    # What is drawn: pieces, labels beside them, the reserved block.
     shapes = [shapely.Polygon(placed.on_sheet(piece.cut_line)) for placed in sheet.placed for piece in placed.pieces]
     labels = [(nest_label(placed.pieces), placed) for placed in sheet.placed]
     shapes += [shapely.Polygon(placed.on_sheet(label.box)) for label, placed in labels if label.leader is not None]
     if sheet.reserved is not None:
         shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
-    return shapes
+    tiles = _drawn_tiles(tiling, shapes)
+    # Sheets are joined if a shape spreads over two of them.
+    lower_left = [tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) for tile in tiles]
+    cells = [shapely.box(*corner, *(corner + tiling.paper.step)) for corner in lower_left]
+    return replace(
+        tiling, tiles=tiles, joined=any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
+    )
 
 
 def _drawn_tiles(tiling: Tiling, shapes: Sequence[Polygon]) -> tuple[tuple[int, int], ...]:
@@ -162,12 +162,3 @@ def _window(tiling: Tiling, tile: tuple[int, int]) -> Polygon:
 
     corner = tiling.corner(*tile)
     return shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap))
-
-
-def _is_joined(tiling: Tiling, tiles: Sequence[tuple[int, int]], shapes: Sequence[Polygon]) -> bool:
-    """Return whether a shape spreads over two tiles."""
-    import shapely
-
-    lower_left = [tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) for tile in tiles]
-    cells = [shapely.box(*corner, *(corner + tiling.paper.step)) for corner in lower_left]
-    return any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)

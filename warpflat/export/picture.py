@@ -117,7 +117,10 @@ def draw_figure(
     if body is not None:
         worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
     left = MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR)
-    narrowest = left + _colour_bar_room(pen, scale, density, quantity)
+    words = pen.measure(_bar_words(scale, density, quantity), _WORDS_SIZE)[0]
+    narrowest = left + (
+        words + (MARGIN if _is_flat(scale, density) else 0.15 + _SHORTEST_BAR + _right_of_bar(scale, density))
+    )
     width, height, page_scale = lay_out(pen, cells, worn, narrowest=narrowest)
     height += STRIP
     figure.set_size_inches(width, height)
@@ -165,12 +168,6 @@ def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool)
     )
     cell.stack_if_wide()
     return cell
-
-
-def _colour_bar_room(pen: Pen, scale: float, density: FloatArray, quantity: str) -> float:
-    """Return how much room the colour bar needs at least, from its words to the right edge of the page [in]; arguments as it takes them."""
-    words = pen.measure(_bar_words(scale, density, quantity), _WORDS_SIZE)[0]
-    return words + (MARGIN if _is_flat(scale, density) else 0.15 + _SHORTEST_BAR + _right_of_bar(scale, density))
 
 
 def _is_flat(scale: float, density: FloatArray) -> bool:

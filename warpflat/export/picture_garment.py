@@ -115,24 +115,20 @@ def crop_body(body: Body, worn: FloatArray) -> tuple[IntArray, FloatArray]:
         limit = float((sign * worn[:, axis]).max()) + _AROUND
         triangles, vertices, edges = _cut(triangles, vertices, sign * vertices[:, axis] - limit)
         ends += [edges] if axis == 0 else []
-    triangles = _without_scraps(triangles, len(vertices))
+    # Small parts of hands and arms would hang in the air.
+    label = join_labels(len(vertices), triangles[:, :2].ravel(), triangles[:, 1:].ravel())[triangles[:, 0]]
+    size = np.bincount(label)
+    triangles = triangles[size[label] >= _SCRAP * size.max(initial=0)]
     for end in ends:
         edges = end[np.isin(end, triangles).all(axis=1)]
         if len(edges):
             # With vertices of its own: light does not bend around its edge.
             rim = vertices[edges.ravel()]
-            own = len(vertices) + np.arange(len(rim)).reshape(-1, 2)
-            cap = np.column_stack([own, np.full(len(own), len(vertices) + len(rim))])
+            copies = len(vertices) + np.arange(len(rim)).reshape(-1, 2)
+            cap = np.column_stack([copies, np.full(len(copies), len(vertices) + len(rim))])
             vertices = np.concatenate([vertices, rim, rim.mean(axis=0)[None]])
             triangles = np.concatenate([triangles, cap])
     return triangles.astype(np.int32), vertices
-
-
-def _without_scraps(triangles: IntArray, count: int) -> IntArray:
-    """Return the triangles of a mesh of `count` vertices without small parts of hands and arms, which would hang in the air."""
-    label = join_labels(count, triangles[:, :2].ravel(), triangles[:, 1:].ravel())[triangles[:, 0]]
-    size = np.bincount(label)
-    return triangles[size[label] >= _SCRAP * size.max(initial=0)]
 
 
 def _cut(triangles: IntArray, vertices: FloatArray, beyond: FloatArray) -> tuple[IntArray, FloatArray, IntArray]:

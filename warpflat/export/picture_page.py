@@ -15,10 +15,21 @@ from warpflat.export.colours import energy_colours
 from warpflat.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen
 from warpflat.export.labels import LabelRoom, Spot, draw_lines
 from warpflat.export.picture_garment import GarmentViews
-from warpflat.export.picture_packing import pack_boxes, pack_rows
 from warpflat.export.picture_views import DrawnView, Silhouette, View
 
-__all__ = ["BETWEEN", "CAPTIONS_ALONE", "STRIP", "Cell", "draw_cell", "draw_scale_bar", "lay_out", "place_views"]
+__all__ = [
+    "BETWEEN",
+    "CAPTIONS_ALONE",
+    "STRIP",
+    "Cell",
+    "draw_cell",
+    "draw_scale_bar",
+    "lay_out",
+    "pack_boxes",
+    "pack_rows",
+    "place_views",
+]
+
 
 # All lengths in inches. Above all cells there is a strip with the scales of length and colour.
 STRIP, _STRIP_WORDS = 0.66, 0.52  # its height, and where its words end
@@ -134,11 +145,25 @@ class Cell:
         self.width = max(self.inches_per_metre * float(self.extent[0]) + beside, _NARROWEST, named)
         if self.alone:
             self.width = max(self.width, narrowest - 2 * MARGIN)
-        self.caption_lines = _wrapped(pen, self)
-        self._place_views(pen, named)
-
-    def _place_views(self, pen: Pen, named: float) -> None:
-        """Place the views in the cell below its words, whose name is so wide [in]."""
+        # The captions are lines that end within the cell.
+        width, height = self.pattern.size[:2]
+        factor, word = (100, "cm") if max(width, height) >= 0.00999 else (1000, "mm")
+        captions = {"pattern": f"{factor * width:.1f} × {factor * height:.1f} {word}"} | dict(self.captions)
+        all_room = CAPTIONS_ALONE if self.alone else self.width - 0.1
+        gap = pen.measure(_BETWEEN, _CAPTION_SIZE)[0]
+        lines: list[str] = []
+        room = 0.0
+        for key, value in captions.items():
+            entry = pen.shorten(f"{key} {value}", _CAPTION_SIZE, all_room)
+            taken = pen.measure(entry, _CAPTION_SIZE)[0]
+            if lines and gap + taken < room:
+                lines[-1] += _BETWEEN + entry
+                room -= gap + taken
+            else:
+                lines.append(entry)
+                room = all_room - taken
+        self.caption_lines = lines
+        # The views stand below the words.
         words = max(named, *(pen.measure(line, _CAPTION_SIZE)[0] for line in self.caption_lines), 0.0)
         above = STRIP - 0.08 if self.alone else 0.0
         self.words = [_Words(left=0.0, right=words, bottom=0.25 + 0.15 * len(self.caption_lines) - above)]
@@ -190,26 +215,23 @@ def place_views(
     for shape, (wide, _) in zip(silhouettes, sizes, strict=True):
         x = 0.5 * (width - wide) if stacked else left + 0.5 * spare
         left += wide + spare
-        low = top
+        heading_left, heading_right = x + 0.5 * wide - _HALF_HEADING, x + 0.5 * wide + _HALF_HEADING
+        heading = _HEADING - _heading_room(shape, scale)
+        # The view's upper edge is no higher than any of these.
+        limits = [top]
         for box in words:
-            low = max(
-                low, box.bottom + _ABOVE - scale * shape.room_above((box.left - x) / scale, (box.right - x) / scale)
-            )
-            if (
-                has_headings
-                and box.left < x + 0.5 * wide + _HALF_HEADING
-                and box.right > x + 0.5 * wide - _HALF_HEADING
-            ):
-                low = max(low, box.bottom + _HEADING - _heading_room(shape, scale))
+            room = shape.room_above((box.left - x) / scale, (box.right - x) / scale)
+            limits.append(box.bottom + _ABOVE - scale * room)
+            if has_headings and box.left < heading_right and box.right > heading_left:
+                limits.append(box.bottom + heading)
         if stacked and places:
-            before, (x_before, low_before) = silhouettes[len(places) - 1], places[-1]
-            bottom = low_before + scale * before.height
-            low = max(low, bottom + BETWEEN - scale * before.overlap_below(shape, (x - x_before) / scale))
+            above, (x_above, low_above) = silhouettes[len(places) - 1], places[-1]
+            bottom = low_above + scale * above.height + BETWEEN
+            limits.append(bottom - scale * above.overlap_below(shape, (x - x_above) / scale))
             if has_headings:
-                middle = (x + 0.5 * wide - x_before) / scale
-                above = before.room_below(middle - _HALF_HEADING / scale, middle + _HALF_HEADING / scale)
-                low = max(low, bottom + BETWEEN + _HEADING - _heading_room(shape, scale) - scale * above)
-        places.append((x, low))
+                room = above.room_below((heading_left - x_above) / scale, (heading_right - x_above) / scale)
+                limits.append(bottom + heading - scale * room)
+        places.append((x, max(limits)))
     if not stacked:
         # The lower ones are as low as they must be; others stand in the middle of their room.
         floor = max(low + high for (_, low), (_, high) in zip(places, sizes, strict=True))
@@ -236,7 +258,19 @@ def lay_out(
     narrowest = max(narrowest, _NARROWEST_PAGE)
     room, tallest = PAGE_WIDTH - 2 * MARGIN, _TALLEST if worn is None else _TALLEST_WORN
     if worn is None and len(cells) == 1:
-        return _lay_out_one(pen, cells[0], room, narrowest)
+        # One piece has its views side by side or one below the other.
+        cell = cells[0]
+        tried = []
+        for stacked in (False, True) if cell.alone and len(cell.views) > 1 else (cell.stacked,):
+            cell.stacked = stacked
+            scale = _largest_scale(cell, room)
+            cell.fit(pen, scale, narrowest)
+            empty = 1.0 - cell.covered / ((cell.width + 2 * MARGIN) * (cell.height + STRIP))
+            tried.append((max(0.0, cell.height - _TALLEST), empty, stacked, scale))
+        _, _, cell.stacked, scale = min(tried)
+        cell.fit(pen, scale, narrowest)
+        cell.left, cell.top = MARGIN, 0.0
+        return cell.width + 2 * MARGIN, cell.height, scale
     own_order = list(range(len(cells)))
     by_height = sorted(range(len(cells)), key=lambda k: -float(cells[k].extent[1]))
     found = []
@@ -269,41 +303,6 @@ def _largest_scale(cell: Cell, room: float) -> float:
     return min((room - beside) / max(float(cell.extent[0]), 1e-9), tallest / max(float(cell.extent[1]), 1e-9))
 
 
-def _lay_out_one(pen: Pen, cell: Cell, room: float, narrowest: float) -> tuple[float, float, float]:
-    """Lay out one piece, its views side by side or one below the other; as :func:`lay_out`."""
-    found = []
-    for stacked in (False, True) if cell.alone and len(cell.views) > 1 else (cell.stacked,):
-        cell.stacked = stacked
-        scale = _largest_scale(cell, room)
-        cell.fit(pen, scale, narrowest)
-        empty = 1.0 - cell.covered / ((cell.width + 2 * MARGIN) * (cell.height + STRIP))
-        found.append((max(0.0, cell.height - _TALLEST), empty, stacked, scale))
-    _, _, cell.stacked, scale = min(found)
-    cell.fit(pen, scale, narrowest)
-    cell.left, cell.top = MARGIN, 0.0
-    return cell.width + 2 * MARGIN, cell.height, scale
-
-
-def _wrapped(pen: Pen, cell: Cell) -> list[str]:
-    """Return the captions as lines that end within the cell."""
-    width, height = cell.pattern.size[:2]
-    captions = {"pattern": _size(width, height)} | dict(cell.captions)
-    all_room = CAPTIONS_ALONE if cell.alone else cell.width - 0.1
-    gap = pen.measure(_BETWEEN, _CAPTION_SIZE)[0]
-    lines: list[str] = []
-    room = 0.0
-    for key, value in captions.items():
-        entry = pen.shorten(f"{key} {value}", _CAPTION_SIZE, all_room)
-        taken = pen.measure(entry, _CAPTION_SIZE)[0]
-        if lines and gap + taken < room:
-            lines[-1] += _BETWEEN + entry
-            room -= gap + taken
-        else:
-            lines.append(entry)
-            room = all_room - taken
-    return lines
-
-
 def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float) -> None:
     """Draw a piece.
 
@@ -329,7 +328,11 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
         room.take_box(cell.left + box.left, top - box.bottom, cell.left + box.right, top - box.bottom + 0.5)
     if cell.shows_body:
         for drawn, shape, words in zip(shown, cell.silhouettes, ("on the body", "pattern"), strict=True):
-            _heading(pen, room, drawn, words, drawn.box[3] - _heading_room(shape, size) + 0.24)
+            y = drawn.box[3] - _heading_room(shape, size) + 0.24
+            x = 0.5 * (drawn.box[0] + drawn.box[2])
+            width, height = pen.measure(words, 8.5)
+            pen.write(x, y, words, 8.5, color=GREY, ha="center", fontstyle="italic")
+            room.take_box(x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
     floor, start = top - cell.height + 0.02, cell.left
     if cell.alone or size != page_scale:
         end = draw_scale_bar(pen, cell.left, floor, size)
@@ -397,13 +400,6 @@ def _pages(cell: Cell, shown: Sequence[DrawnView], top: float) -> list[tuple[flo
     return [(start, floor, end, box[3] + 0.2) for (start, end), box in zip(sides, edges, strict=True)]
 
 
-def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) -> None:
-    x = 0.5 * (drawn.box[0] + drawn.box[2])
-    width, height = pen.measure(words, 8.5)
-    pen.write(x, y, words, 8.5, color=GREY, ha="center", fontstyle="italic")
-    room.take_box(x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
-
-
 def _grain(
     pen: Pen,
     room: LabelRoom,
@@ -429,7 +425,15 @@ def _grain(
     if page is None:
         place = _grain_inside(drawn, 0.5 * (line[0] + line[-1]), along, across, length, text_height)
     else:
-        place = _grain_outside(room, drawn, float(np.arctan2(along[1], along[0])), page)
+        angle = float(np.arctan2(along[1], along[0]))
+        left, bottom, right, top = drawn.box
+        spots = [
+            Spot(x=x, y=bottom + share * (top - bottom), angle=angle)
+            for x in (right + 0.25, left - 0.2, right + 0.45, right + 0.9)
+            for share in (0.5, 0.25, 0.75, 0.1, 0.9)
+        ]
+        free = room.place(spots, 0.8, 0.35, page)
+        place = None if free is None else (np.array([free.x - 0.05, free.y]), 0.35)
     if place is None:
         return False
     centre, half = place
@@ -467,21 +471,44 @@ def _grain_inside(
     return None
 
 
-def _grain_outside(
-    room: LabelRoom, drawn: DrawnView, angle: float, page: tuple[float, float, float, float]
-) -> tuple[FloatArray, float] | None:
-    """Return the middle of the arrow and half its length [in] beside the cloth; None if there is no room."""
-    left, bottom, right, top = drawn.box
-    spots = [
-        Spot(x=x, y=bottom + share * (top - bottom), angle=angle)
-        for x in (right + 0.25, left - 0.2, right + 0.45, right + 0.9)
-        for share in (0.5, 0.25, 0.75, 0.1, 0.9)
-    ]
-    free = room.place(spots, 0.8, 0.35, page)
-    return None if free is None else (np.array([free.x - 0.05, free.y]), 0.35)
+def pack_rows(sizes: Sequence[tuple[float, float]], width: float) -> tuple[list[tuple[float, float]], float, float]:
+    """Place boxes in turn from left to right, in rows one below the other; arguments and results as of :func:`pack_boxes`."""
+    places, right, top, foot, widest = list[tuple[float, float]](), 0.0, 0.0, 0.0, 0.0
+    for wide, high in sizes:
+        if right + wide > width * (1.0 + 1e-9):
+            right, top = 0.0, foot
+        places.append((right, top))
+        right, foot = right + wide, max(foot, top + high)
+        widest = max(widest, right)
+    return places, widest, foot
 
 
-def _size(width: float, height: float) -> str:
-    """Return width and height in the unit of the larger one."""
-    factor, word = (100, "cm") if max(width, height) >= 0.00999 else (1000, "mm")
-    return f"{factor * width:.1f} × {factor * height:.1f} {word}"
+def pack_boxes(sizes: Sequence[tuple[float, float]], width: float) -> tuple[list[tuple[float, float]], float, float]:
+    """Place boxes in turn, each as high as it goes and then as far to the left (bottom-left rule on a skyline).
+
+    Burke, Kendall and Whitwell, "A new placement heuristic for the orthogonal stock-cutting problem", 2004, describe such skylines.
+
+    Args:
+        sizes: width and height of each box, no wider than the page.
+        width: of the page.
+
+    Returns:
+        The left and upper edge of each box, measured from the page's upper left corner; the width and the height that they take.
+    """
+    # Where the free room begins: from each place to the right, up to the next place.
+    skyline, places = [(0.0, 0.0)], []
+    for wide, high in sizes:
+        spots = [(_depth(skyline, left, wide), left) for left, _ in skyline if left + wide <= width * (1.0 + 1e-9)]
+        top, left = min(spots)
+        places.append((left, top))
+        right, after = left + wide, _depth(skyline, left + wide, 0.0)
+        skyline = [spot for spot in skyline if not left <= spot[0] <= right]
+        skyline = sorted([*skyline, (left, top + high), (right, after)])
+    taken = [(left + wide, top + high) for (left, top), (wide, high) in zip(places, sizes, strict=True)]
+    return places, max(right for right, _ in taken), max(foot for _, foot in taken)
+
+
+def _depth(skyline: Sequence[tuple[float, float]], left: float, wide: float) -> float:
+    """Return how far down the boxes reach between `left` and `left + wide`."""
+    before = [depth for start, depth in skyline if start <= left + 1e-9]
+    return max([before[-1], *(depth for start, depth in skyline if left < start < left + wide - 1e-9)])

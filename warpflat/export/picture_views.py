@@ -110,26 +110,6 @@ def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntA
     A surface that faces all directions (a skirt) is seen from +Z, one that lies flat on the ground from above.
     """
     vectors = area_vectors(surface.vertices, facets.triangles)
-    directions = _view_directions(vectors)
-    centred = surface.vertices - surface.vertices.mean(axis=0)
-    return View(points=centred @ directions.T, facets=facets, lines=lines, vectors=vectors @ directions.T)
-
-
-def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
-    """Return the view of a pattern (#P by 2) in its plane."""
-    points = np.column_stack([positions, np.zeros(len(positions))])
-    return View(points=points, facets=facets, lines=lines, vectors=None)
-
-
-def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
-    """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    seen = points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]).T
-    return View(points=seen, facets=facets, lines={}, vectors=area_vectors(seen, facets.triangles))
-
-
-def _view_directions(vectors: FloatArray) -> FloatArray:
-    """Return the directions right, up and towards the viewer (3 by 3, in rows), by the area vectors (#T by 3)."""
     total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
     length = float(np.linalg.norm(mean))
     front = mean / length if length > 0.12 * total and length > 0.0 else np.array([0.0, 0.0, 1.0])
@@ -146,7 +126,22 @@ def _view_directions(vectors: FloatArray) -> FloatArray:
     towards = towards / np.linalg.norm(towards)
     right = np.cross(upwards, towards)
     right /= np.linalg.norm(right)
-    return np.array([right, np.cross(towards, right), towards])
+    directions = np.array([right, np.cross(towards, right), towards])
+    centred = surface.vertices - surface.vertices.mean(axis=0)
+    return View(points=centred @ directions.T, facets=facets, lines=lines, vectors=vectors @ directions.T)
+
+
+def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
+    """Return the view of a pattern (#P by 2) in its plane."""
+    points = np.column_stack([positions, np.zeros(len(positions))])
+    return View(points=points, facets=facets, lines=lines, vectors=None)
+
+
+def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
+    """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    seen = points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]).T
+    return View(points=seen, facets=facets, lines={}, vectors=area_vectors(seen, facets.triangles))
 
 
 class DrawnView:
@@ -191,8 +186,34 @@ class DrawnView:
     def draw(self, axes: Any, face_colours: FloatArray) -> None:
         """Draw the coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
         left, bottom = (round(place * DPI) - _MARGIN for place in (self.left, self.bottom))
-        axes.add_artist(Pixels(self._image(face_colours), left=left, bottom=bottom, zorder=1))
-        self._draw_mesh(axes)
+        # Of a fine mesh each triangle has a normal, else each vertex.
+        facets, normals = self.view.facets, self.view.vectors
+        if normals is not None and not self._fine:
+            normals = vertex_normals(normals, facets.triangles, len(self.view.points))
+        axes.add_artist(
+            Pixels(
+                shade(
+                    self._samples,
+                    self._per_pixel,
+                    self._grid,
+                    facets.triangles,
+                    face_colours,
+                    face=facets.face_of_triangle,
+                    lighting=Lighting(normals=normals, at_vertices=not self._fine, direction=_LIGHT, back=_BACK),
+                ),
+                left=left,
+                bottom=bottom,
+                zorder=1,
+            )
+        )
+        faces = self.view.facets.faces
+        is_quad = faces[:, 3] >= 0
+        covered = float((self._samples.triangle >= 0).sum()) / self._per_pixel**2
+        if covered >= 50.0 * max(len(faces), 1):
+            closed = np.where(is_quad[:, None], faces, faces[:, [0, 1, 2, 0]])
+            sides = np.stack([closed, np.roll(closed, -1, axis=1)], axis=-1).reshape(-1, 2)
+            edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
+            self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
         self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
 
     def draw_segments(
@@ -200,7 +221,21 @@ class DrawnView:
     ) -> None:
         """Draw the visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
         if len(edges):
-            segments = self._visible_parts(edges)
+            # Segments are the visible parts of edges (#S by 2 by 2 [in]).
+            a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
+            if self.view.vectors is None:
+                segments = np.stack([self.to_page(a), self.to_page(b)], axis=1)
+            else:
+                pixels = np.linalg.norm((b - a)[:, :2], axis=1) * self._scale * DPI
+                count = np.clip(np.ceil(pixels / 3.0), 1, 400).astype(int)
+                edge = np.repeat(np.arange(len(edges)), count)
+                step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+                begin, end = ((step + shift) / count[edge] for shift in (0.0, 1.0))
+                start, stop = (a[edge] + (b - a)[edge] * share[:, None] for share in (begin, end))
+                seen = self._is_visible(self._to_samples(0.5 * (start + stop)))
+                goes_on = (edge[1:] == edge[:-1]) & seen[1:] & seen[:-1]
+                first, last = seen & ~np.insert(goes_on, 0, False), seen & ~np.append(goes_on, False)
+                segments = np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
             # Many to a path: a path each takes longer to set up than all of them to draw.
             parts = [segments[i : i + _SEGMENTS_TO_A_PATH] for i in range(0, len(segments), _SEGMENTS_TO_A_PATH)]
             paths = [Path(part.reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(part))) for part in parts]
@@ -233,57 +268,6 @@ class DrawnView:
         result[:, 1] = (self._rows - ((points[:, 1] - self._low[1]) * per_metre + _MARGIN)) * self._per_pixel
         result[:, 2] = points[:, 2]
         return result
-
-    def _image(self, face_colours: FloatArray) -> NDArray[np.uint8]:
-        """Return the pixels, #R by #C by 4, RGBA."""
-        facets = self.view.facets
-        return shade(
-            self._samples,
-            self._per_pixel,
-            self._grid,
-            facets.triangles,
-            face_colours,
-            face=facets.face_of_triangle,
-            lighting=Lighting(normals=self._normals(), at_vertices=not self._fine, direction=_LIGHT, back=_BACK),
-        )
-
-    def _normals(self) -> FloatArray | None:
-        """Return normals of any length at the vertices; of a fine mesh each triangle's own."""
-        vectors, facets = self.view.vectors, self.view.facets
-        if vectors is None or self._fine:
-            return vectors
-        return vertex_normals(vectors, facets.triangles, len(self.view.points))
-
-    def _draw_mesh(self, axes: Any) -> None:
-        faces = self.view.facets.faces
-        is_quad = faces[:, 3] >= 0
-        covered = float((self._samples.triangle >= 0).sum()) / self._per_pixel**2
-        # Thin lines at less than every seventh pixel would only darken the colours.
-        if covered / max(len(faces), 1) < 50.0:
-            return
-        closed = np.where(is_quad[:, None], faces, faces[:, [0, 1, 2, 0]])
-        sides = np.stack([closed, np.roll(closed, -1, axis=1)], axis=-1).reshape(-1, 2)
-        edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
-        self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
-
-    def _visible_parts(self, edges: IntArray) -> FloatArray:
-        """Return the visible parts of edges (#S by 2 by 2 [in]).
-
-        Hidden parts of a surface's edges are found in short pieces.
-        """
-        a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
-        if self.view.vectors is None:
-            return np.stack([self.to_page(a), self.to_page(b)], axis=1)
-        pixels = np.linalg.norm((b - a)[:, :2], axis=1) * self._scale * DPI
-        count = np.clip(np.ceil(pixels / 3.0), 1, 400).astype(int)
-        edge = np.repeat(np.arange(len(edges)), count)
-        step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
-        begin, end = ((step + shift) / count[edge] for shift in (0.0, 1.0))
-        start, stop = (a[edge] + (b - a)[edge] * share[:, None] for share in (begin, end))
-        seen = self._is_visible(self._to_samples(0.5 * (start + stop)))
-        goes_on = (edge[1:] == edge[:-1]) & seen[1:] & seen[:-1]
-        first, last = seen & ~np.insert(goes_on, 0, False), seen & ~np.append(goes_on, False)
-        return np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
 
     def _is_visible(self, spots: FloatArray) -> BoolArray:
         """Return whether points on the mesh (#N by 3, in samples) are in front, within the mesh's own slope."""

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
@@ -16,7 +15,7 @@ from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
 from warpflat.export.figure import new_figure, write_figure
 from warpflat.export.letters import all_letters
-from warpflat.export.picture_packing import pack_boxes
+from warpflat.export.picture_page import pack_boxes
 from warpflat.pattern.walked import WalkedSeam
 
 __all__ = ["write_walked_picture"]
@@ -55,7 +54,25 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     axis = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(0.0, height))
     axis.set_axis_off()
     for seam, lines, (left, top) in zip(seams, fitted, places, strict=True):
-        _draw_seam(axis, seam, lines, left + 0.5 * CELL, height - HEAD - top)
+        middle = left + 0.5 * CELL
+        upper = (height - HEAD - top) - MARGIN
+        seam_height = float(np.ptp(lines[0], axis=0)[1])
+        centre = np.array([middle, upper - CLOTH - 0.5 * seam_height])
+        half = 0.5 * CELL - MARGIN
+        room = shapely.box(middle - half, upper - CLOTH - seam_height - MARGIN, middle + half, upper)
+        for line, notches, colour in zip(lines[1:3], lines[3:], COLOURS, strict=True):
+            on_page = line + centre
+            # The pieces lie to the left of their seam: above it, where it runs to the right.
+            cloth = shapely.LineString(on_page).buffer(CLOTH + MARGIN, single_sided=True, join_style="round")
+            for part in shapely.get_parts(shapely.intersection(cloth, room)):
+                axis.add_patch(
+                    Polygon(shapely.get_coordinates(part.exterior), facecolor=colour, alpha=_CLOTH_ALPHA, linewidth=0)
+                )
+            axis.add_artist(Line2D(*on_page.T, color=colour, linewidth=1.6, alpha=0.85))
+            axis.add_artist(Line2D(*(notches + centre).T, color=colour, marker="|", markersize=9, linestyle=""))
+        notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"
+        words = f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip()
+        axis.text(middle, upper - 0.4 * CLOTH, words, fontsize=9, ha="center", va="center")
     words = f"{title}: the two sides of each seam laid upon each other, right sides together, darts closed [mm]"
     axis.text(
         MARGIN,
@@ -77,27 +94,3 @@ def _fitted(seam: WalkedSeam) -> list[FloatArray]:
     scale = float((np.array([CELL - 2 * MARGIN, TALLEST]) / np.maximum(high - low, 1e-9)).min())
     middle = 0.5 * (low + high)
     return [scale * (both - middle), *(scale * (rows @ along - middle) for rows in (*seam.sides, *seam.notches))]
-
-
-def _draw_seam(axis: Axes, seam: WalkedSeam, lines: Sequence[FloatArray], middle: float, top: float) -> None:
-    """Draw a seam, fitted, in a cell, whose middle and upper edge are given [in]."""
-    upper = top - MARGIN
-    seam_height = float(np.ptp(lines[0], axis=0)[1])
-    centre = np.array([middle, upper - CLOTH - 0.5 * seam_height])
-    half = 0.5 * CELL - MARGIN
-    room = shapely.box(middle - half, upper - CLOTH - seam_height - MARGIN, middle + half, upper)
-    for line, notches, colour in zip(lines[1:3], lines[3:], COLOURS, strict=True):
-        on_page = line + centre
-        # The pieces lie to the left of their seam: above it, where it runs to the right.
-        cloth = shapely.LineString(on_page).buffer(CLOTH + MARGIN, single_sided=True, join_style="round")
-        for part in shapely.get_parts(shapely.intersection(cloth, room)):
-            axis.add_patch(
-                Polygon(shapely.get_coordinates(part.exterior), facecolor=colour, alpha=_CLOTH_ALPHA, linewidth=0)
-            )
-        axis.add_artist(Line2D(*on_page.T, color=colour, linewidth=1.6, alpha=0.85))
-        axis.add_artist(Line2D(*(notches + centre).T, color=colour, marker="|", markersize=9, linestyle=""))
-    notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"
-    words = (
-        f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip()
-    )
-    axis.text(middle, upper - 0.4 * CLOTH, words, fontsize=9, ha="center", va="center")

@@ -86,52 +86,50 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
     """
     path = Path(path)
     with reading(path, "DXF") as place:
-        return _garment(path, allowance, place)
+        from ezdxf import recover
 
-
-def _garment(path: Path, allowance: float | None, place: Place) -> Garment:
-    from ezdxf import recover
-
-    # Its log goes nowhere, but to the handlers of a program that has its own.
-    logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    document: Any = recover.readfile(str(path))[0]
-    space = document.modelspace()
-    layouts = [("", space), *((block.name, block) for block in document.blocks if not block.name.startswith("*"))]
-    found = {name: _texts(entities, place) for name, entities in layouts}
-    units = next((text for text in (each.value("UNITS") for each in found.values()) if text), "")
-    metres = _METRES.get(units.upper(), _METRES_OF_HEADER.get(document.header.get("$INSUNITS", 0), 1e-3))
-    for name, entities in layouts:
-        _add_lines(found[name], entities, metres, MOST_POINTS - sum(each.count for each in found.values()), place)
-    place.at = ""
-    style, blocks = found[""], [(name, found[name]) for name, _ in layouts[1:]]
-    pieces, words = list[Piece](), dict[tuple[str, str], list[tuple[str, str, str]]]()
-    # Other programs draw on layers of their own; a block that is not in the drawing, such as an arrow, is no piece then.
-    inserted = {entity.dxf.name for entity in space if entity.dxftype() == "INSERT"}
-    named = [row for row in blocks if row[1].loops("1") or row[1].closed("14")]
-    for name, block in named or [row for row in blocks if row[0] in inserted and row[1].all_loops()]:
-        pieces.append(_piece(name, block, metres, allowance, words, f"{path}: {name}"))
-    if not pieces:
-        pieces = [
-            Piece(name=f"piece_{n}", edges=split_outline(inset(ring * metres, allowance or 0.0, f"{path}: piece_{n}")))
-            for n, ring in enumerate(outermost(style.all_loops()), start=1)
-        ]
-    if not named:
-        for each in [style, *(block for name, block in blocks if name in inserted)]:
-            check_closed(
-                [line for layer in each.lines for line in each.open(layer)], each.all_loops(), metres, str(path)
-            )
-    if not pieces:
-        raise InputError(f"{path}: has no closed line; a piece is a closed line on layer 1 of a block")
-    sizes: dict[str, list[Piece]] = {}
-    for piece in pieces:
-        sizes.setdefault(piece.size, []).append(piece)
-    first = next(iter(sizes))
-    seams = seams_of_words(entry for (size, _), rows in words.items() if size == first for entry in rows)
-    sample = style.value("SAMPLE SIZE")
-    return Garment(
-        name=style.value("STYLE NAME") or path.stem, pieces=sizes, seams=seams,
-        sample_size=sample if sample in sizes else None,
-    )  # fmt: skip
+        # Its log goes nowhere, but to the handlers of a program that has its own.
+        logging.getLogger("ezdxf").addHandler(logging.NullHandler())
+        document: Any = recover.readfile(str(path))[0]
+        space = document.modelspace()
+        layouts = [("", space), *((block.name, block) for block in document.blocks if not block.name.startswith("*"))]
+        found = {name: _texts(entities, place) for name, entities in layouts}
+        units = next((text for text in (each.value("UNITS") for each in found.values()) if text), "")
+        metres = _METRES.get(units.upper(), _METRES_OF_HEADER.get(document.header.get("$INSUNITS", 0), 1e-3))
+        for name, entities in layouts:
+            _add_lines(found[name], entities, metres, MOST_POINTS - sum(each.count for each in found.values()), place)
+        place.at = ""
+        style, blocks = found[""], [(name, found[name]) for name, _ in layouts[1:]]
+        pieces, words = list[Piece](), dict[tuple[str, str], list[tuple[str, str, str]]]()
+        # Other programs draw on layers of their own; a block that is not in the drawing, such as an arrow, is no piece then.
+        inserted = {entity.dxf.name for entity in space if entity.dxftype() == "INSERT"}
+        named = [row for row in blocks if row[1].loops("1") or row[1].closed("14")]
+        for name, block in named or [row for row in blocks if row[0] in inserted and row[1].all_loops()]:
+            pieces.append(_piece(name, block, metres, allowance, words, f"{path}: {name}"))
+        if not pieces:
+            pieces = [
+                Piece(
+                    name=f"piece_{n}", edges=split_outline(inset(ring * metres, allowance or 0.0, f"{path}: piece_{n}"))
+                )
+                for n, ring in enumerate(outermost(style.all_loops()), start=1)
+            ]
+        if not named:
+            for each in [style, *(block for name, block in blocks if name in inserted)]:
+                check_closed(
+                    [line for layer in each.lines for line in each.open(layer)], each.all_loops(), metres, str(path)
+                )
+        if not pieces:
+            raise InputError(f"{path}: has no closed line; a piece is a closed line on layer 1 of a block")
+        sizes: dict[str, list[Piece]] = {}
+        for piece in pieces:
+            sizes.setdefault(piece.size, []).append(piece)
+        first = next(iter(sizes))
+        seams = seams_of_words(entry for (size, _), rows in words.items() if size == first for entry in rows)
+        sample = style.value("SAMPLE SIZE")
+        return Garment(
+            name=style.value("STYLE NAME") or path.stem, pieces=sizes, seams=seams,
+            sample_size=sample if sample in sizes else None,
+        )  # fmt: skip
 
 
 def outermost(loops: Iterable[FloatArray]) -> list[FloatArray]:
@@ -173,7 +171,7 @@ def check_closed(lines: Sequence[FloatArray], loops: Iterable[FloatArray], metre
         round_something = len(points) > 2 and area > max(least, _LEAST_SHARE * (0.25 * chain.length) ** 2)
         if not round_something or gap >= _NEARLY_CLOSED * chain.length:
             continue
-        # An outline may cross itself: of a point alone it is told whether it lies within.
+        # An outline may cross itself, so one point decides whether it lies within another.
         if not shapely.intersects(closed[pieces.query(chain.centroid)], chain.centroid).any():
             at = ", ".join(f"{1e3 * metres * x:.0f}" for x in points[0])
             raise InputError(
@@ -208,7 +206,9 @@ def _texts(entities: Iterable[Any], place: Place) -> _Block:
         kind, layer = entity.dxftype(), str(entity.dxf.layer)
         if kind in ("TEXT", "MTEXT", "POINT"):
             place.at = f"{kind} on layer {quote_value(layer)}"
-            at = _finite(np.array(tuple(entity.dxf.location if kind == "POINT" else entity.dxf.insert)[:2]))
+            at = np.array(tuple(entity.dxf.location if kind == "POINT" else entity.dxf.insert)[:2])
+            if not np.isfinite(at).all():
+                raise InputError("its place is no number")
             if kind == "POINT":
                 found.points.setdefault(layer, []).append(at)
             else:
@@ -250,12 +250,6 @@ def _add_lines(found: _Block, entities: Iterable[Any], metres: float, most: int,
             found.lines.setdefault(layer, []).append((points[:-1] if closed else points, closed))
 
 
-def _finite(at: FloatArray) -> FloatArray:
-    if not np.isfinite(at).all():
-        raise InputError("its place is no number")
-    return at
-
-
 def _piece(
     block_name: str,
     block: _Block,
@@ -267,34 +261,15 @@ def _piece(
     """Return the piece of a block; add what is sewn to its edges to `words`, by size and piece."""
     name, size = block.value("PIECE NAME") or block_name, block.value("SIZE")
     quantity = read_quantity(block.value("QUANTITY").split(",")[0])
-    parts, sewn = _named_parts(block, metres)
-    darts = []
-    if parts:
-        edges = chain_edges(parts, where)
-        tips = {t.removeprefix("DART: "): at * metres for _, t, at in block.texts if t.startswith("DART: ")}
-        darts = find_darts(edges, tips, where)
-        words[size, name] = [(name, edge, text) for edge, text in sewn]
-    else:
-        edges = _edges_without_names(block, metres, allowance, where)
-    grain = [points * metres for points, _ in block.lines.get("7", []) if len(points) > 1]
-    return Piece(
-        name=name, size=size, edges=edges, darts=darts, quantity=quantity,
-        grain=_upwards(grain[0][[0, -1]]) if grain else None, fabric=block.value("FABRIC"),
-    )  # fmt: skip
-
-
-def _upwards(grain: FloatArray) -> FloatArray:
-    return grain if grain[1, 1] >= grain[0, 1] else grain[::-1]
-
-
-def _named_parts(block: _Block, metres: float) -> tuple[list[tuple[str, str, FloatArray]], list[tuple[str, str]]]:
-    """Return name, kind and points of the lines beside which a name stands, and what is sewn to them."""
+    # The lines beside which a name stands, with their kind, and what is sewn to them.
     lines = [
         (layer, points) for layer in ("14", "8", "6") for points, closed in block.lines.get(layer, []) if not closed
     ]
     parts, sewn, last = list[tuple[str, str, FloatArray]](), list[tuple[str, str]](), ""
     # The name stands on the middle point of its line, and on no other line's.
-    middles = np.array([_middle(points) for _, points in lines]).reshape(-1, 2)
+    middles = np.array(
+        [(points[len(points) // 2] if len(points) > 2 else points.mean(axis=0)) for _, points in lines]
+    ).reshape(-1, 2)
     for _, text, at in block.texts:
         if text.startswith("EDGE: ") and len(parts) < len(lines):
             last = text.removeprefix("EDGE: ")
@@ -304,20 +279,26 @@ def _named_parts(block: _Block, metres: float) -> tuple[list[tuple[str, str, Flo
             parts.append((last, {"6": "fold", "8": "dart"}.get(layer, "seam"), points * metres))
         elif text.startswith("SEAM: ") and last:
             sewn.append((last, text.removeprefix("SEAM: ")))
-    tips = [at * metres for _, text, at in block.texts if text.startswith("DART: ")]
+    tips = {text.removeprefix("DART: "): at * metres for _, text, at in block.texts if text.startswith("DART: ")}
     # The legs of a dart that is cut away are on the layer of seams.
-    parts = [
-        (name, "dart" if kind == "seam" and _is_leg(points, tips) else kind, points) for name, kind, points in parts
-    ]
-    return parts, sewn
-
-
-def _is_leg(points: FloatArray, tips: Sequence[FloatArray]) -> bool:
-    return any(np.linalg.norm(points[end] - tip) < 1e-6 for tip in tips for end in (0, -1))
-
-
-def _middle(points: FloatArray) -> FloatArray:
-    return points[len(points) // 2] if len(points) > 2 else points.mean(axis=0)
+    for number, (edge, kind, points) in enumerate(parts):
+        ends_at_tip = any(np.linalg.norm(points[end] - tip) < 1e-6 for tip in tips.values() for end in (0, -1))
+        if kind == "seam" and ends_at_tip:
+            parts[number] = edge, "dart", points
+    darts = []
+    if parts:
+        edges = chain_edges(parts, where)
+        darts = find_darts(edges, tips, where)
+        words[size, name] = [(name, edge, text) for edge, text in sewn]
+    else:
+        edges = _edges_without_names(block, metres, allowance, where)
+    grain = next((points[[0, -1]] * metres for points, _ in block.lines.get("7", []) if len(points) > 1), None)
+    if grain is not None and grain[1, 1] < grain[0, 1]:
+        grain = grain[::-1]
+    return Piece(
+        name=name, size=size, edges=edges, darts=darts, quantity=quantity,
+        grain=grain, fabric=block.value("FABRIC"),
+    )  # fmt: skip
 
 
 def _edges_without_names(block: _Block, metres: float, allowance: float | None, where: str) -> list[Any]:

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import FARTHEST, Place, reading
+from warpflat.core.input_files import FARTHEST, reading
 from warpflat.core.text import quote_value
 from warpflat.export.read_dxf import MOST_POINTS, check_closed, outermost, read_quantity
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
@@ -51,25 +51,87 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
     """
     path = Path(path)
     with reading(path, "SVG") as place:
-        return _garment(path, allowance or 0.0, place)
-
-
-def _garment(path: Path, allowance: float, place: Place) -> Garment:
-    root = _parse(path)
-    page = _page_matrix(root)
-    groups = [(element, matrix) for element, matrix in _walk(root, page) if "data-piece" in element.attrib]
-    pieces, words = list[Piece](), dict[str, list[tuple[str, str, str]]]()
-    for group, matrix in groups:
-        place.at = f"piece {quote_value(group.get('data-piece'))}"
-        pieces.append(_own_piece(group, matrix, words, str(path)))
-    if not pieces:
-        pieces = _other_pieces(root, page, allowance, str(path), place)
-    if not pieces:
-        raise InputError(f"{path}: has no closed path; a piece is a closed path")
-    sizes: dict[str, list[Piece]] = {}
-    for piece in pieces:
-        sizes.setdefault(piece.size, []).append(piece)
-    return Garment(name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])))
+        root = _parse(path)
+        # From the units of the drawing to metres, y upwards.
+        scale = _MILLIMETRES["px"]
+        width, box = _LENGTH.fullmatch(root.get("width", "")), root.get("viewBox", "").replace(",", " ").split()
+        if width and width[2] in _MILLIMETRES:
+            scale = _MILLIMETRES[width[2]]
+            if len(box) == 4:
+                wide, view = float(width[1]) * scale, float(box[2])
+                if not (0.0 < wide < np.inf and 0.0 < view < np.inf):
+                    raise InputError(
+                        f"width {quote_value(width[0])} and viewBox {quote_value(' '.join(box))} must be numbers above 0"
+                    )
+                scale = wide / view
+        page = np.array([[scale, 0.0, 0.0], [0.0, -scale, 0.0]]) * 1e-3
+        groups = [(element, matrix) for element, matrix in _walk(root, page) if "data-piece" in element.attrib]
+        pieces, words = list[Piece](), dict[str, list[tuple[str, str, str]]]()
+        for group, matrix in groups:
+            place.at = f"piece {quote_value(group.get('data-piece'))}"
+            name, size = group.get("data-piece", ""), group.get("data-size", "")
+            parts, grain, legs = list[tuple[str, str, FloatArray]](), None, list[FloatArray]()
+            for element in group:
+                role, edge = element.get("class", ""), element.get("data-edge", "")
+                if element.tag.rpartition("}")[2] != "path" or not edge:
+                    continue
+                lines = list(_lines(element, _times(matrix, _transform(element.get("transform", "")))))
+                if role == "grain":
+                    grain = lines[0][0]
+                elif role in _KINDS and not lines[0][1]:
+                    parts.append((edge, _KINDS[role], lines[0][0]))
+                    for text in element.get("data-seam", "").split("\n"):
+                        if text.strip():
+                            words.setdefault(size, []).append((name, edge, text.strip()))
+                    if role == "dart":
+                        legs.append(lines[0][0])
+            where = f"{path}: {name}"
+            if not parts:
+                raise InputError(f"{where}: has no sewing line; a group of a piece has paths with data-edge")
+            edges = chain_edges(parts, where)
+            ends = np.array([points[k] for points in legs for k in (0, -1)]).reshape(-1, 2)
+            close = cKDTree(ends).query(ends, k=2)[0][:, 1] < 1e-6 if len(ends) else []
+            tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n]}
+            darts = find_darts(edges, tips, where)
+            pieces.append(
+                Piece(
+                    name=name,
+                    size=size,
+                    edges=edges,
+                    darts=darts,
+                    grain=None if grain is None else grain[[0, -1]],
+                    quantity=read_quantity(group.get("data-quantity", "1")),
+                )
+            )
+        if not pieces:
+            # A drawing of another program: every closed path that lies in no other one is a piece.
+            found: dict[int, tuple[FloatArray, str]] = {}
+            unclosed = list[FloatArray]()
+            total = 0
+            for element, matrix in _walk(root, page):
+                place.at = f"{element.tag.rpartition('}')[2]} {quote_value(element.get('id', ''))}"
+                for points, closed in _lines(element, matrix):
+                    total += len(points)
+                    if total > MOST_POINTS:
+                        raise InputError(_TOO_MANY)
+                    if closed:
+                        found[id(points)] = points, element.get(_LABEL) or element.get("id") or ""
+                    else:
+                        unclosed.append(points)
+            place.at = ""
+            check_closed(unclosed, [points for points, _ in found.values()], 1.0, str(path))
+            taken = set[str]()
+            for number, ring in enumerate(outermost([points for points, _ in found.values()]), start=1):
+                name = found[id(ring)][1] or f"piece_{number}"
+                name = name if name not in taken else f"{name}_{number}"
+                taken.add(name)
+                pieces.append(Piece(name=name, edges=split_outline(inset(ring, allowance or 0.0, f"{path}: {name}"))))
+        if not pieces:
+            raise InputError(f"{path}: has no closed path; a piece is a closed path")
+        sizes: dict[str, list[Piece]] = {}
+        for piece in pieces:
+            sizes.setdefault(piece.size, []).append(piece)
+        return Garment(name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])))
 
 
 def _parse(path: Path) -> ET.Element:
@@ -111,30 +173,14 @@ def _qualified(name: str) -> str:
     return "{" + name if "}" in name else name
 
 
-def _page_matrix(root: ET.Element) -> FloatArray:
-    """Return the 2 by 3 matrix from the units of the drawing to metres, y upwards."""
-    scale = _MILLIMETRES["px"]
-    width, box = _LENGTH.fullmatch(root.get("width", "")), root.get("viewBox", "").replace(",", " ").split()
-    if width and width[2] in _MILLIMETRES:
-        scale = _MILLIMETRES[width[2]]
-        if len(box) == 4:
-            wide, view = float(width[1]) * scale, float(box[2])
-            if not (0.0 < wide < np.inf and 0.0 < view < np.inf):
-                raise InputError(
-                    f"width {quote_value(width[0])} and viewBox {quote_value(' '.join(box))} must be numbers above 0"
-                )
-            scale = wide / view
-    return np.array([[scale, 0.0, 0.0], [0.0, -scale, 0.0]]) * 1e-3
-
-
 def _walk(element: ET.Element, matrix: FloatArray) -> Iterator[tuple[ET.Element, FloatArray]]:
     """Yield an element and all below it with their matrices to the page; what is only defined is left out."""
     if element.tag.rpartition("}")[2] in ("defs", "symbol", "clipPath", "marker", "pattern"):
         return
-    own = _times(matrix, _transform(element.get("transform", "")))
-    yield element, own
+    placed = _times(matrix, _transform(element.get("transform", "")))
+    yield element, placed
     for child in element:
-        yield from _walk(child, own)
+        yield from _walk(child, placed)
 
 
 def _transform(text: str) -> FloatArray:
@@ -159,62 +205,6 @@ def _transform(text: str) -> FloatArray:
 
 def _times(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.column_stack([a[:, :2] @ b[:, :2], a[:, :2] @ b[:, 2] + a[:, 2]])
-
-
-def _own_piece(group: ET.Element, matrix: FloatArray, words: dict[str, list[tuple[str, str, str]]], file: str) -> Piece:
-    name, size = group.get("data-piece", ""), group.get("data-size", "")
-    parts, grain, legs = list[tuple[str, str, FloatArray]](), None, list[FloatArray]()
-    for element in group:
-        role, edge = element.get("class", ""), element.get("data-edge", "")
-        if element.tag.rpartition("}")[2] != "path" or not edge:
-            continue
-        lines = list(_lines(element, _times(matrix, _transform(element.get("transform", "")))))
-        if role == "grain":
-            grain = lines[0][0]
-        elif role in _KINDS and not lines[0][1]:
-            parts.append((edge, _KINDS[role], lines[0][0]))
-            for text in element.get("data-seam", "").split("\n"):
-                if text.strip():
-                    words.setdefault(size, []).append((name, edge, text.strip()))
-            if role == "dart":
-                legs.append(lines[0][0])
-    where = f"{file}: {name}"
-    if not parts:
-        raise InputError(f"{where}: has no sewing line; a group of a piece has paths with data-edge")
-    edges = chain_edges(parts, where)
-    ends = np.array([points[k] for points in legs for k in (0, -1)]).reshape(-1, 2)
-    close = cKDTree(ends).query(ends, k=2)[0][:, 1] < 1e-6 if len(ends) else []
-    tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n]}
-    darts = find_darts(edges, tips, where)
-    return Piece(
-        name=name, size=size, edges=edges, darts=darts, grain=None if grain is None else grain[[0, -1]],
-        quantity=read_quantity(group.get("data-quantity", "1")),
-    )  # fmt: skip
-
-
-def _other_pieces(root: ET.Element, page: FloatArray, allowance: float, file: str, place: Place) -> list[Piece]:
-    found: dict[int, tuple[FloatArray, str]] = {}
-    unclosed = list[FloatArray]()
-    total = 0
-    for element, matrix in _walk(root, page):
-        place.at = f"{element.tag.rpartition('}')[2]} {quote_value(element.get('id', ''))}"
-        for points, closed in _lines(element, matrix):
-            total += len(points)
-            if total > MOST_POINTS:
-                raise InputError(_TOO_MANY)
-            if closed:
-                found[id(points)] = points, element.get(_LABEL) or element.get("id") or ""
-            else:
-                unclosed.append(points)
-    place.at = ""
-    check_closed(unclosed, [points for points, _ in found.values()], 1.0, file)
-    pieces, taken = [], set[str]()
-    for number, ring in enumerate(outermost([points for points, _ in found.values()]), start=1):
-        name = found[id(ring)][1] or f"piece_{number}"
-        name = name if name not in taken else f"{name}_{number}"
-        taken.add(name)
-        pieces.append(Piece(name=name, edges=split_outline(inset(ring, allowance, f"{file}: {name}"))))
-    return pieces
 
 
 def _lines(element: ET.Element, matrix: FloatArray) -> Iterator[tuple[FloatArray, bool]]:

@@ -12,12 +12,10 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.output import atomic_path
 from warpflat.core.text import control_in, format_count, size_words
-from warpflat.pattern.curves import Curve
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.drawing import Drawing, Stroke, draw_nest, grain_strokes
-from warpflat.pattern.label import LEADING
+from warpflat.pattern.label import CAPITALS, LEADING, Words, text_width
 from warpflat.pattern.layout import lay_out, nests
-from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
 from warpflat.pattern.seam_words import seam_words
 from warpflat.pattern.words import printed_in
@@ -68,7 +66,9 @@ def write_svg(
             displayed.
         width: of the sheet [m].
     """
-    chosen = _chosen(garment, sizes)
+    for size in sizes or ():
+        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+    chosen = tuple(size for size in garment.pieces if sizes is None or size in sizes)
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     if not nested:
         groups = [(piece,) for size in chosen for nest in groups for piece in nest if piece.size == size]
@@ -106,15 +106,6 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     for index, copy in enumerate(marker.placements):
         page.marker_copy(copy, index)
     page.write(path)
-
-
-def _chosen(garment: DraftedGarment, sizes: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the sizes to draw, in their order."""
-    if sizes is None:
-        return tuple(garment.pieces)
-    for size in sizes:
-        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
-    return tuple(size for size in garment.pieces if size in sizes)
 
 
 class SvgPage:
@@ -183,7 +174,15 @@ class SvgPage:
         if stroke.hidden:
             attributes["display"] = "none"
         if stroke.curve is not None:
-            attributes["d"] = self._bezier(stroke.curve.transformed(matrix))
+            curve = stroke.curve.transformed(matrix)
+            control = self._page(curve.bezier.reshape(-1, 2)).reshape(-1, 4, 2)
+            text = ["M" + _pair(control[0, 0])]
+            for segment, straight in zip(control, curve.straight, strict=True):
+                if straight:
+                    text.append("L" + _pair(segment[3]))
+                else:
+                    text.append("C" + " ".join(_pair(p) for p in segment[1:]))
+            attributes["d"] = " ".join(text)
         else:
             points = self._page(stroke.points @ matrix[:, :2].T + matrix[:, 2])
             attributes["d"] = "M" + " L".join(_pair(p) for p in points) + (" Z" if stroke.closed else "")
@@ -243,17 +242,6 @@ class SvgPage:
     def _page(self, points: FloatArray) -> FloatArray:
         """Return points [m] in the millimetres of the page, y downwards."""
         return np.column_stack([points[:, 0] * 1000, self.height - points[:, 1] * 1000])
-
-    def _bezier(self, curve: Curve) -> str:
-        """Return a curve as path data."""
-        control = self._page(curve.bezier.reshape(-1, 2)).reshape(-1, 4, 2)
-        text = ["M" + _pair(control[0, 0])]
-        for segment, straight in zip(control, curve.straight, strict=True):
-            if straight:
-                text.append("L" + _pair(segment[3]))
-            else:
-                text.append("C" + " ".join(_pair(p) for p in segment[1:]))
-        return " ".join(text)
 
     def _id(self, name: str) -> str:
         """Return a valid id that no other element has."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -18,27 +19,111 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.output import atomic_path, hidden_file, require_writable
-from warpflat.export.colours import energy_scale
-from warpflat.export.geometry import area_vectors, face_areas, polylines_of, vertex_normals
-from warpflat.export.usd_colours import VertexColours
-from warpflat.export.usd_piece import FIRST_FRAME, FramePiece, check_frame
+from warpflat.export.colours import VertexColours, energy_scale
+from warpflat.export.geometry import Polylines, area_vectors, face_areas, polylines_of, vertex_normals
 from warpflat.export.usd_prims import (
+    FIRST_FRAME,
     MeshSamples,
     SampledLines,
+    add_cameras,
+    add_light,
+    add_material,
+    add_texture_coordinates,
+    begin_stage,
     bounding_box,
+    define_energy_mesh,
     define_group,
-    define_mesh,
+    last_values_as_defaults,
     require_usd,
+    rows_on_table,
+    set_points,
     usd_errors,
     valid_name,
 )
-from warpflat.export.usd_scene import add_cameras, add_light, add_material, add_texture_coordinates, rows_on_table
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["FrameWriter", "film_scale"]
+
+
+@dataclass(kw_only=True)
+class FramePiece:
+    """State of a piece: a few arrays of its size, whatever the number of frames."""
+
+    name: str
+    surface: Surface
+    path: str
+    colours: tuple[VertexColours, VertexColours]  # of surface and pattern; one and the same until a cut
+    on_surface: MeshSamples
+    on_pattern: MeshSamples
+    surface_cuts: SampledLines
+    pattern_lines: SampledLines
+    pattern_cuts: SampledLines
+    faces: IntArray
+    to_surface: IntArray
+    lines: dict[str, Polylines]
+    cuts: dict[str, Polylines] = field(default_factory=dict)
+    measures: dict[str, Any] = field(default_factory=dict)
+    frames: int = 0
+    last_positions: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 2), dtype=np.float32))
+    low: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
+    high: FloatArray = field(default_factory=lambda: np.full(2, -np.inf))
+
+    def change_faces(self, faces: ArrayLike | None, count: int, what: str) -> bool:
+        """Take over new faces of a pattern with `count` vertices, and return whether they differ from those before.
+
+        Raises:
+            ValueError: they are not the faces of the surface in the pattern's numbering.
+        """
+        if faces is None:
+            return False
+        new, original = np.ascontiguousarray(faces, dtype=np.int32), self.surface.faces
+        if new is self.faces or np.array_equal(new, self.faces):
+            return False
+        used = original >= 0
+        if new.shape != original.shape or not np.array_equal(new >= 0, used) or new.max() >= count:
+            raise ValueError(f"{what}: the faces are not those of the surface in the pattern's numbering")
+        to_surface = np.zeros(count, dtype=np.int32)
+        to_surface[new[used]] = original[used]
+        if not np.array_equal(to_surface[new[used]], original[used]):
+            raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
+        self.faces, self.to_surface = new, to_surface
+        areas = face_areas(self.surface.vertices, original)
+        self.colours = self.colours[0], VertexColours(new, areas, count)
+        return True
+
+    def change_lines(
+        self, lines: Mapping[str, Any] | None, cuts: Mapping[str, Any] | None, count: int, *, new_faces: bool
+    ) -> bool:
+        """Take over new lines and cuts of a pattern with `count` vertices, and return whether they or the faces are new.
+
+        Raises:
+            ValueError: a line refers to other vertices.
+        """
+        if not new_faces and lines is None and cuts is None:
+            return False
+        self.lines = self.lines if lines is None else polylines_of(lines)
+        self.cuts = self.cuts if cuts is None else polylines_of(cuts)
+        for line, parts in (*self.lines.items(), *self.cuts.items()):
+            if any(part.max() >= count or part.min() < 0 for part in parts):
+                raise ValueError(
+                    f"line {line!r} of piece {self.name!r} refers to vertices beyond the {count} positions"
+                )
+        return True
+
+    def cuts_on_surface(self) -> dict[str, Polylines]:
+        """Return the cuts in the surface's numbering, where both sides of a crack are one line."""
+        return {
+            key: [
+                np.array(line, dtype=np.int32)
+                for line in dict.fromkeys(tuple(self.to_surface[part].tolist()) for part in parts)
+            ]
+            for key, parts in self.cuts.items()
+        }
+
 
 _LINE_COLOUR = (0.03, 0.05, 0.10)
 _CUT_COLOUR = (0.02, 0.20, 0.75)
@@ -118,24 +203,12 @@ class FrameWriter:
             self._working = self._hidden.enter_context(hidden_file(self._final))
             with usd_errors(self._final):
                 self._stage = Usd.Stage.CreateNew(str(self._working))
-            self._begin(self._stage)
+            begin_stage(self._stage, rate=self._rate)
+            self._stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
         except BaseException:
             self._hidden.close()
             raise
         return self
-
-    def _begin(self, stage: Any) -> None:
-        """Author the settings of the whole file."""
-        from pxr import Kind, UsdGeom
-
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-        stage.SetTimeCodesPerSecond(self._rate)
-        stage.SetFramesPerSecond(self._rate)
-        stage.SetStartTimeCode(FIRST_FRAME)
-        stage.SetEndTimeCode(FIRST_FRAME)
-        stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
-        stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -145,8 +218,16 @@ class FrameWriter:
             if kind is None:
                 with usd_errors(self._final):
                     self._place()
-                    self._dress()
-                    self._author_defaults()
+                    add_light(self._stage)
+                    shown = [piece for piece in self._pieces.values() if piece.frames]
+                    add_material(
+                        self._stage,
+                        [samples.mesh for piece in shown for samples in (piece.on_surface, piece.on_pattern)],
+                    )
+                    for piece in shown:
+                        for samples in (piece.on_surface, piece.on_pattern):
+                            add_texture_coordinates(samples.mesh, piece.surface, piece.faces, piece.last_positions)
+                    last_values_as_defaults(self._stage, self._stage.Traverse())
                     self._save()
             # Nothing may hold the file open when it is moved.
             self._stage = None
@@ -182,11 +263,15 @@ class FrameWriter:
         default = Usd.TimeCode.Default()
         triangles, _ = triangulate(surface.faces)
         normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
-        on_surface = MeshSamples(define_mesh(self._stage, f"{path}/surface", normals, per_face=False), self._scale)
+        on_surface = MeshSamples(
+            define_energy_mesh(self._stage, f"{path}/surface", normals, per_face=False), self._scale
+        )
         on_surface.write(default, points, surface.faces)
         # Cuts change the number of vertices and never that of faces: one normal per face serves all frames.
         upright = np.tile([0.0, 0.0, 1.0], (len(surface.faces), 1))
-        on_pattern = MeshSamples(define_mesh(self._stage, f"{path}/pattern", upright, per_face=True), self._scale)
+        on_pattern = MeshSamples(
+            define_energy_mesh(self._stage, f"{path}/pattern", upright, per_face=True), self._scale
+        )
         lines = polylines_of(surface.lines)
         group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
         colours = VertexColours(surface.faces, face_areas(surface.vertices, surface.faces), len(points))
@@ -212,15 +297,13 @@ class FrameWriter:
             file: name of a file of :func:`warpflat.mannequin.usd.write_mannequin_usd`.
             points: #V by 3, of its body as it is shown [m]: a little smaller, so that cloth that lies on it is seen.
         """
-        from pxr import UsdGeom, Vt
+        from pxr import UsdGeom
 
         path = "/World/mannequin"
         self._used_names.add("mannequin")
         self._stage.DefinePrim(path).GetReferences().AddReference(f"./{file}", path)
         shown = UsdGeom.Mesh(self._stage.OverridePrim(f"{path}/body"))
-        stored = np.asarray(points, dtype=np.float32)
-        shown.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored))
-        shown.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)))
+        set_points(shown, points)
         UsdGeom.Imageable(self._stage.OverridePrim(f"{path}/lines")).CreatePurposeAttr(UsdGeom.Tokens.guide)
 
     def write(
@@ -251,25 +334,48 @@ class FrameWriter:
             ValueError: the arrays do not fit together, or hold NaN.
             InputError: the disk is full or the folder is gone.
         """
-        from pxr import Usd
+        from pxr import Usd, Vt
 
         piece = self._pieces[name]
         flat = np.asarray(positions, dtype=np.float32)
         density = np.asarray(face_energy_density, dtype=np.float32)
         number = FIRST_FRAME + piece.frames
         what = f"frame {number} of piece {piece.surface.name!r}"
-        check_frame(what, flat, density, len(piece.surface.faces))
+        # Check the shapes and values of a frame.
+        face_count = len(piece.surface.faces)
+        if flat.ndim != 2 or flat.shape[1] != 2 or len(flat) == 0:
+            raise ValueError(f"{what}: positions must be #P by 2, not {flat.shape}")
+        if density.shape != (face_count,):
+            raise ValueError(f"{what}: {density.shape} energy densities for {face_count} faces")
+        if not (np.isfinite(flat).all() and np.isfinite(density).all()):
+            raise ValueError(f"{what}: positions or energy densities are not finite")
         new_faces = piece.change_faces(faces, len(flat), what) or piece.frames == 0
         if len(flat) != len(piece.to_surface):
             raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
         new_lines = piece.change_lines(lines, cuts, len(flat), new_faces=new_faces)
 
         time = Usd.TimeCode(number)
-        self._sample(piece, flat, density, time, new_faces=new_faces, new_lines=new_lines)
+        points = np.zeros((len(flat), 3), dtype=np.float32)
+        points[:, :2] = flat
+        piece.on_pattern.write(time, points, piece.faces if new_faces else None)
+        energy, shades = Vt.FloatArray.FromNumpy(density), None
+        for samples, colours in zip((piece.on_surface, piece.on_pattern), piece.colours, strict=True):
+            if shades is None or colours is not piece.colours[0]:
+                shades = colours.shades(density, self._scale)
+            samples.write_energy(time, energy, shades)
+        piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
+        piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
+        if new_lines:
+            space = np.asarray(piece.surface.vertices, dtype=np.float32)
+            piece.surface_cuts.write(time, piece.cuts_on_surface(), space, changed=True)
         piece.last_positions = flat
         low, high = bounding_box(flat)
         piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
-        self._save_every_few_frames(len(flat))
+        self._unsaved += 1
+        self._unsaved_vertices += len(flat)
+        if self._unsaved >= self._save_every and self._unsaved_vertices >= self._save_after:
+            with usd_errors(self._final):
+                self._save()
         return self._count(piece, measures or {}, time)
 
     def write_between(self, name: str, positions: ArrayLike | None, measures: Mapping[str, Measure]) -> int:
@@ -300,40 +406,6 @@ class FrameWriter:
 
     def _count(self, piece: FramePiece, measures: Mapping[str, Measure], time: Any) -> int:
         """Author a frame's measures, count it and return its number."""
-        self._measure(piece, measures, time)
-        piece.frames += 1
-        self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), time.GetValue()))
-        return int(time.GetValue())
-
-    def _sample(
-        self,
-        piece: FramePiece,
-        flat: NDArray[np.float32],
-        density: NDArray[np.float32],
-        time: Any,
-        *,
-        new_faces: bool,
-        new_lines: bool,
-    ) -> None:
-        """Author a frame's points, energies and lines."""
-        from pxr import Vt
-
-        points = np.zeros((len(flat), 3), dtype=np.float32)
-        points[:, :2] = flat
-        piece.on_pattern.write(time, points, piece.faces if new_faces else None)
-        energy, shades = Vt.FloatArray.FromNumpy(density), None
-        for samples, colours in zip((piece.on_surface, piece.on_pattern), piece.colours, strict=True):
-            if shades is None or colours is not piece.colours[0]:
-                shades = colours.shades(density, self._scale)
-            samples.write_energy(time, energy, shades)
-        piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
-        piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
-        if new_lines:
-            space = np.asarray(piece.surface.vertices, dtype=np.float32)
-            piece.surface_cuts.write(time, piece.cuts_on_surface(), space, changed=True)
-
-    def _measure(self, piece: FramePiece, measures: Mapping[str, Measure], time: Any) -> None:
-        """Author a frame's measures."""
         from pxr import Sdf
 
         for key, value in measures.items():
@@ -343,14 +415,9 @@ class FrameWriter:
                     f"warpflat:{key}", getattr(Sdf.ValueTypeNames, kind), custom=True
                 )
             piece.measures[key].Set(value, time)
-
-    def _save_every_few_frames(self, vertices: int) -> None:
-        """Count a frame of so many vertices, and save the working file if it is time."""
-        self._unsaved += 1
-        self._unsaved_vertices += vertices
-        if self._unsaved >= self._save_every and self._unsaved_vertices >= self._save_after:
-            with usd_errors(self._final):
-                self._save()
+        piece.frames += 1
+        self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), time.GetValue()))
+        return int(time.GetValue())
 
     def _save(self) -> None:
         """Save the working file."""
@@ -380,19 +447,3 @@ class FrameWriter:
         patterns = np.array([[*origin, middle[2]], [*(origin + table), middle[2]]])
         boxes = np.stack([low, high, *patterns])
         add_cameras(self._stage, np.stack([boxes.min(axis=0), boxes.max(axis=0)]), patterns)
-
-    def _dress(self) -> None:
-        """Author light, material and texture coordinates."""
-        add_light(self._stage)
-        shown = [piece for piece in self._pieces.values() if piece.frames]
-        add_material(self._stage, [samples.mesh for piece in shown for samples in (piece.on_surface, piece.on_pattern)])
-        for piece in shown:
-            for samples in (piece.on_surface, piece.on_pattern):
-                add_texture_coordinates(samples.mesh, piece.surface, piece.faces, piece.last_positions)
-
-    def _author_defaults(self) -> None:
-        """Author the last value of every sampled attribute as its default."""
-        for prim in self._stage.Traverse():
-            for attribute in prim.GetAuthoredAttributes():
-                if attribute.GetNumTimeSamples():
-                    attribute.Set(attribute.Get(self._stage.GetEndTimeCode()))

@@ -1,4 +1,4 @@
-"""Meshes and lines in a USD stage, sampled over time so that fractional frames are right across a change of topology.
+"""Prims of a USD stage: meshes and lines sampled over time, material, cameras, light.
 
 USD interpolates two samples of a point array linearly where they are equally long, and holds the earlier one where they
 are not; indices are always held. After a change of topology of equal length, the old faces would be drawn through
@@ -8,32 +8,47 @@ before: where the lengths would agree, the last point is stored twice. No face u
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import CannotWriteError
 from warpflat.core.output import atomic_path
 from warpflat.export.geometry import Polylines
+from warpflat.surface.mesh import Surface
 
 __all__ = [
+    "FIRST_FRAME",
     "MeshSamples",
     "SampledLines",
+    "add_cameras",
+    "add_light",
+    "add_material",
+    "add_texture_coordinates",
+    "begin_stage",
     "bounding_box",
+    "define_energy_mesh",
     "define_group",
     "define_mesh",
     "export_stage",
+    "last_values_as_defaults",
     "require_usd",
+    "rows_on_table",
+    "set_points",
     "usd_errors",
     "valid_name",
 ]
 
+
+#: Number of a film's first frame.
+FIRST_FRAME = 1
 _CONSTANT = "constant"
 
 
@@ -103,8 +118,55 @@ def define_group(stage: Any, path: str, *, label: str | None = None, kind: str |
     return prim
 
 
-def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -> Any:
-    """Define a polygon mesh (no subdivision), seen from both sides, with energy density per face and colour per vertex.
+def begin_stage(stage: Any, *, rate: float | None = None) -> None:
+    """Set a stage to metres and Y up, and define `/World`, its default prim; `rate` [1/s] begins a film at frame 1."""
+    from pxr import Kind, UsdGeom
+
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    if rate is not None:
+        stage.SetTimeCodesPerSecond(rate)
+        stage.SetFramesPerSecond(rate)
+        stage.SetStartTimeCode(FIRST_FRAME)
+        stage.SetEndTimeCode(FIRST_FRAME)
+    stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
+
+
+def define_mesh(stage: Any, path: str, faces: IntArray | None = None) -> Any:
+    """Define a polygon mesh (no subdivision), seen from both sides; `faces` (#F by 4, -1 as the fourth of a triangle) hold for all time."""
+    from pxr import UsdGeom, Vt
+
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
+    mesh.CreateDoubleSidedAttr(True)
+    if faces is not None:
+        used = faces >= 0
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)))
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces[used], dtype=np.int32)))
+    return mesh
+
+
+def set_points(mesh: Any, points: ArrayLike, time: Any = None) -> None:
+    """Author the points of a mesh (#P by 3 [m]) and the box around them, at a time or for all of it."""
+    from pxr import Usd, Vt
+
+    stored = np.ascontiguousarray(points, dtype=np.float32)
+    time = Usd.TimeCode.Default() if time is None else time
+    mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
+    mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
+
+
+def last_values_as_defaults(stage: Any, prims: Iterable[Any]) -> None:
+    """Author the last value of every sampled attribute as its default, for readers that do not ask for a time."""
+    for prim in prims:
+        for attribute in prim.GetAuthoredAttributes():
+            if attribute.GetNumTimeSamples():
+                attribute.Set(attribute.Get(stage.GetEndTimeCode()))
+
+
+def define_energy_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -> Any:
+    """Define a mesh with energy density per face and colour per vertex.
 
     Args:
         stage, path: where.
@@ -113,10 +175,7 @@ def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -
     """
     from pxr import Sdf, UsdGeom, Vt
 
-    mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
-    mesh.CreateDoubleSidedAttr(True)
+    mesh = define_mesh(stage, path)
     mesh.CreateNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(normals.astype(np.float32)))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform if per_face else UsdGeom.Tokens.vertex)
     density = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
@@ -140,7 +199,7 @@ class MeshSamples:
     def __init__(self, mesh: Any, scale: float) -> None:
         """
         Args:
-            mesh: of :func:`define_mesh`.
+            mesh: of :func:`define_energy_mesh`.
             scale: energy of the last colour [J/m2].
         """
         from pxr import UsdGeom
@@ -206,27 +265,24 @@ class SampledLines:
             self.prim = define_group(self.stage, self.path)
             UsdGeom.Imageable(self.prim).CreatePurposeAttr(UsdGeom.Tokens.guide)
         if changed:
-            self._change(time, lines)
+            # Show the lines that are there from `time` on, and hide the others.
+            rows = []
+            for name, parts in lines.items():
+                if name not in self._members:
+                    path = f"{self.path}/{valid_name(name, self._used_names)}"
+                    self._members[name] = _Line(self.stage, path, name, self._width, self._colour)
+                rows.append(self._members[name].begin(time, parts, start=self._start))
+            for name, member in self._members.items():
+                if name not in lines:
+                    member.hide(time, start=self._start)
+            self._rows = np.concatenate([*rows, np.empty(0, dtype=np.int32)])
+            self._ends = np.cumsum([0, *map(len, rows)])
         if lines:
             stored, margin = points[self._rows], np.float32(0.5 * self._width)
             low, high = (limit.reduceat(stored, self._ends[:-1], axis=0) for limit in (np.minimum, np.maximum))
             boxes = np.stack([low - margin, high + margin], axis=1)
             for name, first, last, box in zip(lines, self._ends[:-1], self._ends[1:], boxes, strict=True):
                 self._members[name].write(time, stored[first:last], box)
-
-    def _change(self, time: Any, lines: Mapping[str, Polylines]) -> None:
-        """Show the lines that are there from `time` on, and hide the others."""
-        rows = []
-        for name, parts in lines.items():
-            if name not in self._members:
-                path = f"{self.path}/{valid_name(name, self._used_names)}"
-                self._members[name] = _Line(self.stage, path, name, self._width, self._colour)
-            rows.append(self._members[name].begin(time, parts, start=self._start))
-        for name, member in self._members.items():
-            if name not in lines:
-                member.hide(time, start=self._start)
-        self._rows = np.concatenate([*rows, np.empty(0, dtype=np.int32)])
-        self._ends = np.cumsum([0, *map(len, rows)])
 
 
 class _Line:
@@ -294,3 +350,110 @@ def _label(prim: Any, label: str | None) -> None:
     """Set the display name of a prim where it differs from its identifier."""
     if label and label != prim.GetName():
         prim.SetDisplayName(label)
+
+
+# A camera of 35 mm film and a long lens, so that patterns are hardly foreshortened.
+_APERTURE, _FOCAL = (36.0, 24.0), 70.0
+_ROOM = 1.12  # what a camera sees, over what it looks at
+
+
+def add_material(stage: Any, meshes: list[Any]) -> None:
+    """Define `/World/Looks/energy`, a preview material with the vertex colours, and bind meshes to it."""
+    from pxr import Gf, Sdf, UsdGeom, UsdShade
+
+    UsdGeom.Scope.Define(stage, "/World/Looks")
+    material = UsdShade.Material.Define(stage, "/World/Looks/energy")
+    reader = UsdShade.Shader.Define(stage, "/World/Looks/energy/colour")
+    reader.CreateIdAttr("UsdPrimvarReader_float3")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+    reader.CreateInput("fallback", Sdf.ValueTypeNames.Float3).Set(Gf.Vec3f(0.5))
+    surface = UsdShade.Shader.Define(stage, "/World/Looks/energy/surface")
+    surface.CreateIdAttr("UsdPreviewSurface")
+    colour = reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
+    surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(colour)
+    surface.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.9)
+    surface.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(0.0)
+    out = surface.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput().ConnectToSource(out)
+    for mesh in meshes:
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def add_texture_coordinates(mesh: Any, surface: Surface, faces: IntArray, positions: NDArray[np.float32]) -> None:
+    """Author `primvars:st` of a mesh: the place of each corner in the pattern [m].
+
+    Args:
+        mesh: of the surface or of the pattern, whose corners are the same.
+        surface: the piece.
+        faces: its faces in the pattern's numbering.
+        positions: #P by 2, the pattern [m].
+    """
+    from pxr import Sdf, UsdGeom, Vt
+
+    corners = positions[faces[surface.faces >= 0]]
+    st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
+    st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(corners)))
+    st.GetAttr().SetCustomDataByKey("unit", "m")
+
+
+def add_cameras(stage: Any, everything: FloatArray, patterns: FloatArray) -> None:
+    """Define `/World/cameras/all` and `/World/cameras/patterns`, which look along -Z at boxes (2 by 3, low and high) [m]."""
+    from pxr import Gf, UsdGeom
+
+    UsdGeom.Scope.Define(stage, "/World/cameras")
+    for name, box in (("all", everything), ("patterns", patterns)):
+        size, middle = box[1] - box[0], box.mean(axis=0)
+        across = [_ROOM * max(float(size[axis]), 1e-3) * _FOCAL / _APERTURE[axis] for axis in (0, 1)]
+        away = max(across) + 0.5 * float(size[2])
+        camera = UsdGeom.Camera.Define(stage, f"/World/cameras/{name}")
+        place = Gf.Vec3d(float(middle[0]), float(middle[1]), float(middle[2]) + away)
+        UsdGeom.Xformable(camera).AddTranslateOp().Set(place)
+        # Lenses are measured in tenths of the stage's unit.
+        camera.CreateHorizontalApertureAttr(_APERTURE[0] / 100.0)
+        camera.CreateVerticalApertureAttr(_APERTURE[1] / 100.0)
+        camera.CreateFocalLengthAttr(_FOCAL / 100.0)
+        near, far = max(1e-3, 0.01 * away), 10.0 * away
+        camera.CreateClippingRangeAttr(Gf.Vec2f(near, far))
+        camera.CreateFocusDistanceAttr(away)
+
+
+def add_light(stage: Any) -> None:
+    """Define `/World/light/dome` and `/World/light/key`, a sun from the upper left."""
+    from pxr import Gf, UsdGeom, UsdLux
+
+    UsdGeom.Scope.Define(stage, "/World/light")
+    UsdLux.DomeLight.Define(stage, "/World/light/dome").CreateIntensityAttr(0.6)
+    key = UsdLux.DistantLight.Define(stage, "/World/light/key")
+    key.CreateIntensityAttr(1.5)
+    key.CreateAngleAttr(2.0)
+    UsdGeom.Xformable(key).AddRotateXYZOp().Set(Gf.Vec3f(-35.0, -30.0, 0.0))
+
+
+def rows_on_table(sizes: FloatArray, gap: float) -> FloatArray:
+    """Return the lower left corner of each of several boxes, laid out in rows, so many that the whole is near to 16 by 9.
+
+    Args:
+        sizes: #B by 2 [m].
+        gap: between boxes and between rows [m].
+    """
+    whole = float((sizes[:, 0] + gap).sum())
+    layouts = [_rows(sizes, gap, max(1.05 * whole / rows, float(sizes[:, 0].max()))) for rows in range(1, 5)]
+
+    def unlikeness(corners: FloatArray) -> float:
+        wide, high = (corners + sizes).max(axis=0)
+        return abs(math.log(max(wide, 1e-9) / max(high, 1e-9) * 9.0 / 16.0))
+
+    return min(layouts, key=unlikeness)
+
+
+def _rows(sizes: FloatArray, gap: float, width: float) -> FloatArray:
+    """Return the lower left corners of boxes in rows of at most this width [m]."""
+    corners = np.zeros_like(sizes)
+    x = y = deep = 0.0
+    for number, (wide, high) in enumerate(sizes.tolist()):
+        if x > 0.0 and x + wide > width:
+            x, y, deep = 0.0, y - deep - gap, 0.0
+        corners[number] = x, y - high
+        x, deep = x + wide + gap, max(deep, high)
+    corners[:, 1] -= corners[:, 1].min()
+    return corners

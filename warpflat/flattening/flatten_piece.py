@@ -54,7 +54,8 @@ def flatten(
 
     By default the relaxation begins with the paper's approximate implicit steps, eqs. (4) to (10), which end where by eq. (11) they gain
     little (`RelaxOptions.first_steps_gain`); L-BFGS over one factor takes the rest. The stages "steps" and "relax" tell both. With
-    `RelaxOptions(solver="paper")` the steps go on alone. Strain energies are eqs. (1) to (3).
+    `RelaxOptions(solver="paper")` the steps go on alone. A piece of more than 100,000 vertices starts from its minimum on a coarser mesh.
+    Where it would lie over itself, contact parts it, without steps. Strain energies are eqs. (1) to (3).
 
     Args:
         surface: a `Surface`, or the path of a mesh file.

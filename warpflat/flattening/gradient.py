@@ -24,6 +24,8 @@ from warpflat.flattening.progress import CONTACT
 from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import spring_geometry, springs_of
+from warpflat.solver.energy import Energy
+from warpflat.solver.minimise import line_search
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation
 from warpflat.surface.cells import make_cells
@@ -36,7 +38,6 @@ Scalar = Callable[[FloatArray], tuple[float, FloatArray]]
 _MOST_STEPS = 50
 # The largest move of a Newton step that ends them, over the mean length of the springs.
 _NEGLIGIBLE = 1e-9
-_LEAST_FRACTION = 1e-3
 # Displacement of central differences, over the mean length of the springs. A larger one steps over the onset of the guard in too many
 # cells.
 _DIFFERENCE = 1e-7
@@ -293,22 +294,18 @@ def _exact_minimum(pattern: Flattening, around: _Neighbours, chord: tuple[int, i
     """
     network, positions = pattern.network, np.array(pattern.positions)
     positions[chord[1], 0] = positions[chord[0], 0]
-    state = Relaxation(network, RelaxOptions(), start=positions)
+    energy = Energy(Relaxation(network, RelaxOptions(), start=positions))
     enough = _NEGLIGIBLE * float(network.spring_arrays.rest_length.mean())
-
-    def energy(layout: FloatArray) -> float:
-        state.position.assign(layout)
-        return float(state.energies().potential)
-
+    point = energy.at(positions)
     for _ in range(_MOST_STEPS):
-        state.position.assign(positions)
-        step = _solve(_stiffness(network, positions, around), chord, np.array(state.forces()))
+        step = _solve(_stiffness(network, point.positions, around), chord, -point.gradient)
         if abs(step).max() <= enough:
-            return positions + step
-        before, fraction = energy(positions), 1.0
-        while fraction > _LEAST_FRACTION and not energy(positions + fraction * step) <= before * (1.0 + 1e-14):
-            fraction *= 0.5
-        positions = positions + fraction * step
+            return np.asarray(point.positions + step)
+        found, _, _ = line_search(energy.at, point, step)
+        # Close to rest the energy falls by less than its rounding.
+        point = energy.at(point.positions + step) if found is None else found
+        if not np.isfinite(point.energy):
+            break
     raise InputError(
         f"piece {pattern.surface.name!r} is not near enough to a minimum for a gradient ({_MOST_STEPS} Newton steps left a step of "
         f"{1e3 * abs(step).max():.2g} mm): flatten it with a smaller energy_tolerance"

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.text import energy_words, format_count
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import WornStrain, worn_strain
 from warpflat.solver.steps import Relaxation
 from warpflat.solver.stop import Remainder
 from warpflat.surface.mesh import Surface
 
-__all__ = ["CONTACT", "STEPS", "Progress", "Stage"]
+__all__ = ["CONTACT", "STEPS", "Progress", "Stage", "relaxation_words"]
 
 #: Name of the stage in which a piece that would lie over itself is kept from it.
 CONTACT = "contact"
@@ -51,6 +54,32 @@ class Stage:
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `stages` in `metrics.json`."""
         return self.__dict__ | {"left": None if self.left is None else dict(self.left.__dict__)}
+
+
+def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:
+    """Return how many of the paper's steps and how many iterations of L-BFGS relaxed pieces first, and what energy each released.
+
+    Args:
+        pieces: for each the entries of its history, as `Stage.as_dict` has them.
+
+    Returns:
+        Such as "36 steps released 2.3 J, 301 iterations 120 mJ"; empty where nothing was relaxed.
+    """
+    counts, released = {"step": 0, "iteration": 0}, {"step": 0.0, "iteration": 0.0}
+    for stages in pieces:
+        for before, stage in pairwise(stages):
+            if before["name"] not in ("develop", STEPS) or stage["name"] not in (STEPS, "relax"):
+                break
+            # A step is a unit of work, an iteration several.
+            unit = "step" if stage["work_units"] <= stage["steps"] else "iteration"
+            counts[unit] += stage["steps"]
+            released[unit] += before["model_energy_j"] - stage["model_energy_j"]
+    words = [
+        f"{format_count(count, unit)} released {energy_words(released[unit])}"
+        for unit, count in counts.items()
+        if count
+    ]
+    return ", ".join(words)
 
 
 class Progress:

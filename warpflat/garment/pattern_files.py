@@ -176,7 +176,7 @@ def export_patterns(
             cannot be written.
     """
     from warpflat.core.output import file_in, output_folder, record_file
-    from warpflat.export.read_pattern_json import read_pattern_json
+    from warpflat.export.pattern_json import read_pattern_json
 
     for format in formats:
         if format not in FORMATS:

@@ -54,9 +54,7 @@ class SewingNetwork:
         All pieces come to rest together.
         """
         # A copy: a single piece's own network must not stay sewn.
-        network = replace(join_networks([piece.network for piece in self.pieces.values()]))
-        network.parts = ()
-        return network
+        return replace(join_networks([piece.network for piece in self.pieces.values()]))
 
     def overlaps(self, layout: FloatArray) -> dict[str, float]:
         """Return by name the area that each piece that lies over itself in a layout (#V by 2 [m]) covers more than once [m2]."""

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.output import require_writable
-from warpflat.export.usd_prims import bounding_box, export_stage, usd_errors, valid_name
+from warpflat.export.usd_prims import (
+    begin_stage,
+    bounding_box,
+    define_group,
+    define_mesh,
+    export_stage,
+    set_points,
+    usd_errors,
+    valid_name,
+)
 from warpflat.mannequin.normals import vertex_normals
 
 if TYPE_CHECKING:
@@ -29,18 +38,13 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
     Raises:
         InputError: if the file cannot be written.
     """
-    from pxr import Kind, Usd, UsdGeom
+    from pxr import Kind, Usd
 
     require_writable(path)
     with usd_errors(path):
         stage = Usd.Stage.CreateInMemory()
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        world = UsdGeom.Xform.Define(stage, "/World")
-        Usd.ModelAPI(world.GetPrim()).SetKind(Kind.Tokens.assembly)
-        stage.SetDefaultPrim(world.GetPrim())
-        group = UsdGeom.Xform.Define(stage, "/World/mannequin").GetPrim()
-        Usd.ModelAPI(group).SetKind(Kind.Tokens.component)
+        begin_stage(stage)
+        group = define_group(stage, "/World/mannequin", kind=Kind.Tokens.component)
         group.SetDocumentation(mannequin.source)
         _mesh(stage, mannequin, "body", on_body=True)
         _mesh(stage, mannequin, "tube", on_body=False)
@@ -55,20 +59,13 @@ def _mesh(stage: Any, mannequin: Mannequin, part: str, *, on_body: bool) -> None
     layout = mannequin.layout
     chosen = layout.on_body == on_body
     corners, face_brick = layout.faces[chosen], layout.face_brick[chosen]
-    points = mannequin.vertices.astype(np.float32)
-    mesh = UsdGeom.Mesh.Define(stage, f"/World/mannequin/{part}")
+    mesh = define_mesh(stage, f"/World/mannequin/{part}", corners)
     if not on_body:
         mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(corners), 4, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(corners.reshape(-1), np.int32)))
+    set_points(mesh, mannequin.vertices)
     normals = vertex_normals(mannequin.vertices, corners).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
-    mesh.CreateDoubleSidedAttr(True)
-    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(bounding_box(points)))
     mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_CLOTH)]))
     taken: set[str] = set()
     for index, name in enumerate(layout.bricks):

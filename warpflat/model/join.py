@@ -33,7 +33,7 @@ def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
 
 
 def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
-    """Return the networks as one that has them as its parts; nothing is sorted or measured again.
+    """Return the networks as one; nothing is sorted or measured again.
 
     A single network is returned as it is.
 
@@ -59,7 +59,6 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
         stretch=np.concatenate(stretches) if stretches else None,
         held_stiffness=np.concatenate(held) if held else None,
         buckling_stiffness=float(buckling[0]) if (buckling == buckling[0]).all() else buckling,
-        parts=tuple(networks),
     )
 
 

@@ -30,7 +30,6 @@ still the matrix of the approximate implicit step.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
@@ -94,7 +93,6 @@ class SpringNetwork:
         held_stiffness: #C by 3, stiffness of the k_ij at each cell's corners [N/m], for a membrane.
         buckling_stiffness: shear stiffness with which the springs keep threads straight [N/m], one for all or #F; the
             fabric's where that is less.
-        parts: the networks from which this one was joined (see `warpflat.model.join`); empty for any other.
         springs, cells, guard, cloth, seams, bonds: the structs that the kernels take.
     """
 
@@ -108,7 +106,6 @@ class SpringNetwork:
     stretch: FloatArray | None = None
     held_stiffness: FloatArray | None = None
     buckling_stiffness: float | FloatArray = np.inf
-    parts: Sequence[SpringNetwork] = ()
     springs: Springs = field(init=False)
     cells: Cells = field(init=False)
     guard: ThreadGuard = field(init=False)
@@ -254,11 +251,6 @@ class SpringNetwork:
         if self.cloth is None:
             return CellModel(evaluate_guard, compute_guard_energy, evaluate_guard_potential, self.guard)
         return CellModel(evaluate_membrane, compute_membrane_energy, evaluate_membrane_potential, self.cloth)
-
-    @property
-    def pieces(self) -> Sequence[SpringNetwork]:
-        """The network of each piece: the parts of a joined network, otherwise this one."""
-        return self.parts or (self,)
 
     @property
     def vertex_count(self) -> int:

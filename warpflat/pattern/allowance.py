@@ -76,7 +76,15 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     whole = close_slits(union([*parts, *strips]))
     for side in sides:
         if isinstance(side, Side) and side.kind == "fold":
-            whole = _on_fold(whole, side, body)
+            # Keep what lies on the piece's side of its fold.
+            half = half_plane(side.points[0], side.points[-1], body)
+            over = float(shapely.distance(half, shapely.points(shapely.get_coordinates(body))).max())
+            if over > FOLD_STRAIGHT:
+                raise InputError(
+                    f"edge {side.name!r} lies on the fold, but the piece reaches {over * 1e3:.1f} mm beyond it; "
+                    "a half piece lies on one side of its fold"
+                )
+            whole = intersection(whole, half)
     polygon = max(shapely.get_parts(whole), key=lambda part: part.area)
     pockets = [shapely.Polygon(ring) for ring in polygon.interiors]
     if any(pocket.area > 1e-6 for pocket in pockets):
@@ -86,50 +94,27 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     return CutOutline(points=points, notes=tuple(notes), prolonged=prolonged)
 
 
-def _on_fold(whole: Geometry, side: Side, body: Polygon) -> Geometry:
-    """Keep what lies on the piece's side of its fold.
-
-    Raises:
-        InputError: the piece reaches farther across the fold's line than a fold may bend.
-    """
-    import shapely
-
-    half = half_plane(side.points[0], side.points[-1], body)
-    over = float(shapely.distance(half, shapely.points(shapely.get_coordinates(body))).max())
-    if over > FOLD_STRAIGHT:
-        raise InputError(
-            f"edge {side.name!r} lies on the fold, but the piece reaches {over * 1e3:.1f} mm beyond it; "
-            "a half piece lies on one side of its fold"
-        )
-    return intersection(whole, half)
-
-
 def _corner_allowance(
     sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, after: int, body: Polygon
 ) -> list[Geometry]:
     """Return what is added where two edges meet; a folded hem's strips are trimmed in place."""
+    import shapely
+
     side, follows = sides[index], sides[after]
     if not isinstance(side, Side) or not isinstance(follows, Side):
         return []
     end = find_hem_end(sides, index, after)
     if end is not None:
         far = index - 1 if end.hem == index else (after + 1) % len(sides)
-        return fold_hem(end, strips, body, _outside_of(sides, strips, far))
+        far_side = sides[far]
+        if isinstance(far_side, Side):
+            outside = strips[far]
+        else:
+            outside = shapely.Polygon(np.concatenate([far_side.left, far_side.right[1:]])).buffer(0)
+        return fold_hem(end, strips, body, outside)
     a, b = unit_vector(side.points[-1] - side.points[-2]), unit_vector(follows.points[1] - follows.points[0])
     fill = corner_fill(side.points[-1], a, b, side.width, follows.width)
     return [] if fill is None else [fill]
-
-
-def _outside_of(sides: Sequence[Side | Wedge], strips: Sequence[Geometry], index: int) -> Geometry:
-    """Return the cloth outside the outline at a side: an edge's strip, or a dart's wedge."""
-    import shapely
-
-    side = sides[index]
-    return (
-        strips[index]
-        if isinstance(side, Side)
-        else shapely.Polygon(np.concatenate([side.left, side.right[1:]])).buffer(0)
-    )
 
 
 def cut_hole(ring: FloatArray, width: float) -> FloatArray | None:

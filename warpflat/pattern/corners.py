@@ -66,23 +66,9 @@ def find_corners(ring: FloatArray, angle: float) -> set[int]:
     """Return vertices where the border turns by more than `angle` [rad], and most within the window around them."""
     border = _Border(ring)
     turns = np.abs(border.turning_at_vertices())
-    corners = _narrow_end_corners(border, angle)
-    taken = np.zeros(border.count, dtype=bool)
-    taken[corners] = True
-    for i in sorted(np.flatnonzero(turns > angle).tolist(), key=lambda i: (-turns[i], i)):
-        # The window of a corner shows in its neighbours' turns too; the next vertex of a coarse border does not.
-        between = np.abs(border.along[: border.count][taken] - border.along[i])
-        taken[i] |= bool((np.minimum(between, border.length - between) > border.window).all())
-    return set(np.flatnonzero(taken).tolist())
-
-
-def _narrow_end_corners(border: _Border, angle: float) -> list[int]:
-    """Return the corners at the ends of straps, ties and bindings, which lie within one window of each other.
-
-    Between two such corners the border turns back by more than `END`. A tooth of a ragged border turns back too, but
-    the border turns the other way beside it. Each corner turns by more than `angle` [rad] over a quarter of the
-    distance to the other one, as no rounded end does.
-    """
+    # The corners at the ends of straps, ties and bindings lie within one window of each other, and the border turns back
+    # between them by more than `END`. A tooth of a ragged border turns back too, but the border turns the other way beside
+    # it. Each corner turns by more than `angle` over a quarter of the distance to the other one, as no rounded end does.
     found: list[tuple[float, float, int, int]] = []
     for steps in range(1, border.count // 2):
         one, other = border.places, border.places + steps
@@ -95,9 +81,9 @@ def _narrow_end_corners(border: _Border, angle: float) -> list[int]:
         triples += [
             (border.before(at, distance_between / 4), at, border.after(at, distance_between / 4)) for at in (one, other)
         ]
-        turns = np.stack([border.turning(*triple) for triple in triples])
-        total = turns[0] + turns[1]
-        sharp = (np.sign(total) * turns).min(axis=0)
+        turned = np.stack([border.turning(*triple) for triple in triples])
+        total = turned[0] + turned[1]
+        sharp = (np.sign(total) * turned).min(axis=0)
         for k in np.flatnonzero((sharp > angle) & (np.abs(total) > END)).tolist():
             found.append(
                 (-float(sharp[k]), float(distance_between[k]), int(one[k]) % border.count, int(other[k]) % border.count)
@@ -106,7 +92,13 @@ def _narrow_end_corners(border: _Border, angle: float) -> list[int]:
     for _, distance, *pair in sorted(found):
         if all(border.distance(i, j) > distance / 2 for i in pair for j in corners if i != j):
             corners += [i for i in pair if i not in corners]
-    return corners
+    taken = np.zeros(border.count, dtype=bool)
+    taken[corners] = True
+    for i in sorted(np.flatnonzero(turns > angle).tolist(), key=lambda i: (-turns[i], i)):
+        # The window of a corner shows in its neighbours' turns too; the next vertex of a coarse border does not.
+        between = np.abs(border.along[: border.count][taken] - border.along[i])
+        taken[i] |= bool((np.minimum(between, border.length - between) > border.window).all())
+    return set(np.flatnonzero(taken).tolist())
 
 
 def find_cracks(ring: FloatArray, corners: set[int], known: set[int]) -> list[tuple[int, int, int]]:

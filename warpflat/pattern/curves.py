@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray, IndexArray
+from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length, segment_lengths, turning_angles
-from warpflat.pattern.spline_lengths import adjust_lengths
 
-__all__ = ["Curve", "chords", "fit_curve"]
+__all__ = ["Curve", "adjust_lengths", "chords", "fit_curve"]
+
 
 #: A vertex inside an edge that turns by more than this [rad] is a corner, not a sample of a curve.
 CORNER = np.radians(45.0)
@@ -54,7 +55,10 @@ class Curve:
             # A chord over a parameter step h strays at most h^2/8 max|B''|, and |B''| <= 6 max|second difference|.
             bend = float(np.linalg.norm(np.diff(control, n=2, axis=0), axis=1).max())
             count = max(1, int(np.ceil(np.sqrt(0.75 * bend / tolerance))))
-            parts.append(_evaluate(control, np.arange(count) / count))
+            t = np.arange(count) / count
+            s = 1 - t
+            weights = np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=1)
+            parts.append(weights @ control)
         return np.concatenate([*parts, self.bezier[-1:, 3]])
 
     @property
@@ -101,11 +105,13 @@ def fit_curve(
         lengths: #P, the wanted length [m] of the curve up to each point; None for that of the chords.
         near: keep within the tolerance everywhere, and the chords' length only as far as that allows.
     """
-    keep = _distinct(points)
+    apart = np.concatenate([[True], segment_lengths(points) > 1e-9])
+    keep = np.flatnonzero(apart) if apart.sum() > 1 else np.array([0, len(points) - 1])
     clean = points[keep]
     clean[-1] = points[-1]
     wanted = None if lengths is None else lengths[keep]
-    from_end = _bends_more_at_end(clean)
+    arc = arc_lengths(clean)
+    from_end = bool(np.abs(turning_angles(clean)) @ (arc[1:-1] / arc[-1] - 0.5) > 1e-9)
     if from_end:
         clean, wanted = clean[::-1], None if wanted is None else wanted[-1] - wanted[::-1]
     breaks = [0, *_corners(clean, tolerance), len(clean) - 1]
@@ -118,16 +124,6 @@ def fit_curve(
         bezier=np.concatenate([run.bezier for run in runs]), straight=np.concatenate([run.straight for run in runs])
     )
     return whole.reversed() if from_end else whole
-
-
-def _bends_more_at_end(points: FloatArray) -> bool:
-    """Return whether a line bends more in its second half, and is fitted from its other end.
-
-    FITPACK places its knots from one end to the other, and the left and the right half of a piece run against each
-    other.
-    """
-    arc = arc_lengths(points)
-    return bool(np.abs(turning_angles(points)) @ (arc[1:-1] / arc[-1] - 0.5) > 1e-9)
 
 
 def _corners(points: FloatArray, tolerance: float) -> list[int]:
@@ -145,11 +141,6 @@ def _corners(points: FloatArray, tolerance: float) -> list[int]:
     return corners
 
 
-def _distinct(points: FloatArray) -> IndexArray:
-    keep = np.concatenate([[True], segment_lengths(points) > 1e-9])
-    return np.flatnonzero(keep) if keep.sum() > 1 else np.array([0, len(points) - 1])
-
-
 def _within_tolerance(curve: Curve, points: FloatArray, tolerance: float) -> Curve:
     """Return the curve, or one that is as much longer as it takes to keep within the tolerance of the points."""
     # Measured on the chords by which the curve is drawn.
@@ -157,19 +148,12 @@ def _within_tolerance(curve: Curve, points: FloatArray, tolerance: float) -> Cur
     for share in INSIDE:
         if _stray(curve.sample(), points) <= tolerance:
             break
-        curve = _fit_run(points, tolerance, _lengths_inside(points, share * tolerance), room=room)
+        # The lengths [m] (#P) of a curve that runs inside the points, no more than a share of the tolerance.
+        step, turn = segment_lengths(points), np.abs(turning_angles(points))
+        both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
+        longer = np.maximum(0.0, step * both**2 / 24 - share * tolerance * both)
+        curve = _fit_run(points, tolerance, np.concatenate([[0.0], np.cumsum(step + longer)]), room=room)
     return curve
-
-
-def _lengths_inside(points: FloatArray, depth: float) -> FloatArray:
-    """Return the lengths [m] (#P) of a curve that runs no more than `depth` [m] inside the points.
-
-    Over a chord h an arc that turns by t is longer by h t^2 / 24, and by t for each metre that it runs farther outside.
-    """
-    step, turn = segment_lengths(points), np.abs(turning_angles(points))
-    both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
-    longer = np.maximum(0.0, step * both**2 / 24 - depth * both)
-    return np.concatenate([[0.0], np.cumsum(step + longer)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -192,7 +176,7 @@ class _FitGoal:
     tolerance: float
     room: float
     bend: float
-    slack: float
+    leeway: float
     strict: bool
 
     def score(self, curve: Curve, length_error: float) -> float:
@@ -203,26 +187,7 @@ class _FitGoal:
             return np.inf
         length_error = max(length_error, abs(float(arc_lengths(samples)[-1] - self.arc[-1])))
         allowed = self.room if self.strict else self.room + self.bend / 24
-        return max(stray / allowed, length_error / (LENGTH * self.slack))
-
-
-def _fit_goal(points: FloatArray, tolerance: float, lengths: FloatArray | None, room: float | None) -> _FitGoal:
-    """Return what a curve along the points is measured by (arguments as for `_fit_run`)."""
-    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    bend = float((np.abs(turning_angles(points)) * np.maximum(step[:-1], step[1:])).max())
-    slack = 1.0
-    strict = room is not None
-    if room is not None:
-        slack = NEAR
-    elif lengths is None:
-        # A zigzag smoothed away is longer than the curve by the square of its width.
-        room, slack = tolerance, max(1.0, (tolerance / TOLERANCE) ** 2)
-    else:
-        room = OTHER_LENGTHS * tolerance
-        # What bends along a zigzag is to be smoothed away.
-        bend = 0.0 if tolerance > TOLERANCE else bend
-    arc = arc_lengths(points) if lengths is None else lengths
-    return _FitGoal(points=points, arc=arc, tolerance=tolerance, room=room, bend=bend, slack=slack, strict=strict)
+        return max(stray / allowed, length_error / (LENGTH * self.leeway))
 
 
 def _fit_run(
@@ -240,12 +205,27 @@ def _fit_run(
         lengths: #P, the wanted length [m] up to each point; None for that of the chords.
         room: largest distance [m] of a point from the curve; None for the tolerance, or more if `lengths` are given.
     """
-    if len(points) == 2 or _chord_distance(points).max() <= tolerance:
+    if _stray(points[[0, -1]], points) <= tolerance:
         return chords(points[[0, -1]])
-    goal = _fit_goal(points, tolerance, lengths, room)
+    # What a curve along the points is measured by.
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    bend = float((np.abs(turning_angles(points)) * np.maximum(step[:-1], step[1:])).max())
+    leeway = 1.0
+    strict = room is not None
+    if room is not None:
+        leeway = NEAR
+    elif lengths is None:
+        # A zigzag smoothed away is longer than the curve by the square of its width.
+        room, leeway = tolerance, max(1.0, (tolerance / TOLERANCE) ** 2)
+    else:
+        room = OTHER_LENGTHS * tolerance
+        # What bends along a zigzag is to be smoothed away.
+        bend = 0.0 if tolerance > TOLERANCE else bend
+    arc = arc_lengths(points) if lengths is None else lengths
+    goal = _FitGoal(points=points, arc=arc, tolerance=tolerance, room=room, bend=bend, leeway=leeway, strict=strict)
     best, least = chords(points), np.inf
     for smoothing in tolerance**2 * len(points) * np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001, 0.0]):
-        fit = _length_keeping_spline(points, goal.arc, float(smoothing), tolerance, LENGTH_WEIGHT * goal.slack)
+        fit = _length_keeping_spline(points, goal.arc, float(smoothing), tolerance, LENGTH_WEIGHT * goal.leeway)
         if fit is None:
             continue
         bezier, length_error = fit
@@ -288,7 +268,8 @@ def _length_keeping_spline(
         return None
     control = np.array(coefficients).T
     if degree == 2:
-        knots, control = _as_cubic(control)
+        a, b, c = control
+        knots, control = np.repeat([0.0, 1.0], 4), np.stack([a, (a + 2 * b) / 3, (2 * b + c) / 3, c])
     control[[0, -1]] = points[[0, -1]]
     if not np.isfinite(control).all():
         return None
@@ -306,26 +287,12 @@ def _length_keeping_spline(
     return result, off
 
 
-def _as_cubic(control: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Raise a parabola to a cubic: its knots and control points."""
-    a, b, c = control
-    return np.repeat([0.0, 1.0], 4), np.stack([a, (a + 2 * b) / 3, (2 * b + c) / 3, c])
-
-
 def chords(points: FloatArray) -> Curve:
     """Return the straight lines from point to point."""
     a, b = points[:-1], points[1:]
     return Curve(
         bezier=np.stack([a, a + (b - a) / 3, b - (b - a) / 3, b], axis=1), straight=np.ones(len(a), dtype=bool)
     )
-
-
-def _chord_distance(points: FloatArray) -> FloatArray:
-    """Return each point's distance [m] from the chord between the first and the last."""
-    import shapely
-
-    chord = shapely.LineString(points[[0, -1]])
-    return np.asarray(shapely.distance(chord, shapely.points(points)), dtype=np.float64)
 
 
 def _stray(line: FloatArray, points: FloatArray) -> float:
@@ -335,8 +302,220 @@ def _stray(line: FloatArray, points: FloatArray) -> float:
     return float(np.max(shapely.distance(shapely.LineString(line), shapely.points(points))))
 
 
-def _evaluate(control: FloatArray, t: FloatArray) -> FloatArray:
-    """Evaluate one cubic Bézier (4 by 2) at parameters t."""
-    s = 1 - t
-    weights = np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=1)
-    return weights @ control
+#: A control point's move counts this many times less than the same error in a point's place.
+MOVE_TOLERANCES = 20.0
+#: Largest number of Gauss-Newton steps, and of quadrature points between two points of the border.
+GAUSS_NEWTON, GAUSS = 8, 6
+_QUADRATURE = np.polynomial.legendre.leggauss(GAUSS)
+
+
+def adjust_lengths(
+    knots: FloatArray,
+    control: FloatArray,
+    points: FloatArray,
+    arc: FloatArray,
+    tolerance: float,
+    length_weight: float,
+) -> tuple[FloatArray, float]:
+    """Move the control points of a spline as little as possible, so that its length up to each point is `arc`.
+
+    Gauss-Newton on the errors of place, the errors of length and, softly, the control points' own moves.
+
+    Args:
+        knots, control: of a cubic B-spline; #control by 2 [m].
+        points: #P by 2 [m], near the spline.
+        arc: #P, the wanted length [m] up to each point.
+        tolerance: error of place [m] that counts as 1.
+        length_weight: error of length [m] that counts as 1.
+
+    Returns:
+        Control points (#control by 2 [m]), and by how much [m] the length is still off at worst.
+    """
+    system = _LengthSystem(knots, control, points, arc, tolerance, length_weight)
+    fit = system.at(control)
+    for _ in range(GAUSS_NEWTON):
+        move = system.move(fit)
+        for share in (1.0, 0.5, 0.25, 0.1):
+            tried = system.at(fit.control + share * move)
+            if tried.objective < fit.objective:
+                break
+        else:
+            break
+        fit = tried
+        if np.abs(move).max() < 1e-8:
+            break
+    return fit.control, float(np.abs(np.cumsum(fit.length_error)).max())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Fit:
+    """The errors of a fitted spline.
+
+    Attributes:
+        control: #control by 2 [m].
+        objective: what is minimised.
+        place_error: #P - 2 by 2, distance from the inner points in tolerances.
+        length_error: #P - 1, by how much [m] the spline is too long between each two points.
+        rate: #Q by 2, derivative of length by the slope at each point of quadrature, times its weight.
+    """
+
+    control: FloatArray
+    objective: float
+    place_error: FloatArray
+    length_error: FloatArray
+    rate: FloatArray
+
+
+class _LengthSystem:
+    """The equations of one Gauss-Newton step towards given lengths.
+
+    Up to each point the length depends on all control points before it, so the normal equations would be dense.
+    Therefore the errors e of the lengths are unknowns as well, bound by e_j - e_{j-1} = excess length between two
+    points. With the multipliers of these equations in place of e, and all unknowns in their order along the curve, the
+    matrix is banded. Where few control points follow many points the band would be as wide as the matrix, and the normal
+    equations are small.
+    """
+
+    def __init__(
+        self,
+        knots: FloatArray,
+        control: FloatArray,
+        points: FloatArray,
+        arc: FloatArray,
+        tolerance: float,
+        length_weight: float,
+    ) -> None:
+        at, count = arc / arc[-1], len(control)
+        span = np.diff(at)
+        node, weight = _QUADRATURE
+        self._weights = (span[:, None] * weight / 2).ravel()
+        self._points, self._steps, self._start = points[1:-1], np.diff(arc), control
+        self._tolerance, self._length_weight = tolerance, length_weight
+        self._control_weight = 1.0 / (MOVE_TOLERANCES * tolerance)
+        between = (at[:-1, None] + span[:, None] * (node + 1) / 2).ravel()
+        number, value, slope = _cubic_basis(knots, np.concatenate([at[1:-1], between]))
+        self._at_points, self._value = number[: len(at) - 2], value[: len(at) - 2]
+        self._at_quadrature, self._slope = number[len(at) - 2 :], slope[len(at) - 2 :]
+        self._few = count * count <= 4 * len(span)
+        if self._few:
+            by_point = self._summed(np.arange(len(at) - 2), self._at_points, self._value)[:, 1:-1]
+            self._fixed = by_point.T @ by_point / tolerance**2 + self._control_weight**2 * np.eye(count - 2)
+            return
+        # Places of the unknowns in their order: x and y of each control point but the ends, and one for each span.
+        middle = (knots[1:-3] + knots[2:-2] + knots[3:-1])[1:-1] / 3.0
+        order = np.argsort(np.concatenate([np.repeat(middle, 2), 0.5 * (at[:-1] + at[1:])]), kind="stable")
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order))
+        self._of_control = np.full((count, 2), -1, dtype=np.int64)
+        self._of_control[1:-1] = place[: 2 * count - 4].reshape(-1, 2)
+        self._of_span = place[2 * count - 4 :]
+        # The entries that stay the same in all steps, and the places of the others.
+        moved, span = self._of_control, self._of_span
+        pairs = (moved[self._at_points][:, :, None], moved[self._at_points][:, None, :])
+        rows, columns = (np.broadcast_to(of, (len(self._at_points), 4, 4, 2)) for of in pairs)
+        products = self._value[:, :, None, None] * self._value[:, None, :, None] / self._tolerance**2
+        inner = moved[1:-1].ravel()
+        diagonal = np.full(len(span), -2.0)
+        diagonal[0] = -1.0
+        beside = np.ones(len(span) - 1)
+        entries = [
+            (rows, columns, np.broadcast_to(products, rows.shape)),
+            (inner, inner, np.full(len(inner), self._control_weight**2)),
+            (span, span, diagonal),
+            (span[1:], span[:-1], beside),
+            (span[:-1], span[1:], beside),
+        ]
+        row, column, value = (np.concatenate([entry[k].ravel() for entry in entries]) for k in range(3))
+        free = (row >= 0) & (column >= 0)
+        row, column, value = row[free], column[free], value[free]
+        of_rate = moved[self._at_quadrature]
+        self._free = of_rate >= 0
+        to = of_rate[self._free]
+        by = np.broadcast_to(np.repeat(span, GAUSS)[:, None, None], of_rate.shape)[self._free]
+        self._band = int(max(np.abs(row - column).max(), np.abs(by - to).max()))
+        self._size = len(inner) + len(span)
+        fixed = np.bincount(self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size)
+        self._fixed = fixed.astype(np.float64, copy=False)
+        self._to = np.concatenate([self._flat(by, to), self._flat(to, by)])
+
+    def _flat(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the indices of entries in the flattened band that LAPACK's `gbsv` takes, whose upper rows are its own."""
+        return (2 * self._band + row - column) * self._size + column
+
+    def at(self, control: FloatArray) -> _Fit:
+        """Evaluate the fit of a spline with these control points, whose ends are those of the start."""
+        tangent = np.einsum("qk,qkd->qd", self._slope, control[self._at_quadrature])
+        speed = np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-12)
+        length_error = (self._weights * speed).reshape(-1, GAUSS).sum(axis=1) - self._steps
+        place_error = (np.einsum("pk,pkd->pd", self._value, control[self._at_points]) - self._points) / self._tolerance
+        moved = (control - self._start) * self._control_weight
+        off = np.cumsum(length_error) / self._length_weight
+        return _Fit(
+            control=control,
+            objective=float((place_error**2).sum() + off @ off + (moved**2).sum()),
+            place_error=place_error,
+            length_error=length_error,
+            rate=(self._weights / speed)[:, None] * tangent,
+        )
+
+    def move(self, fit: _Fit) -> FloatArray:
+        """Return the Gauss-Newton step from a fit (#control by 2 [m]); the ends stay."""
+        gradient = (fit.control - self._start) * self._control_weight**2
+        for axis in range(2):
+            along = self._value * fit.place_error[:, axis, None] / self._tolerance
+            gradient[:, axis] += np.bincount(self._at_points.ravel(), along.ravel(), minlength=len(gradient))
+        move = np.zeros_like(fit.control)
+        move[1:-1] = (self._move_few if self._few else self._move_many)(fit, gradient[1:-1])
+        return move
+
+    def _summed(self, row: NDArray[np.int64], number: NDArray[np.int64], value: FloatArray) -> FloatArray:
+        """Return a matrix with a column for each control point: the sum of values (#N by 4) by row (#N) and number (#N by 4)."""
+        shape = int(row[-1]) + 1, len(self._start)
+        flat = (row[:, None] * shape[1] + number).ravel()
+        return np.asarray(np.bincount(flat, value.ravel(), shape[0] * shape[1]).reshape(shape), dtype=np.float64)
+
+    def _move_few(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
+        """Solve the normal equations for the moves of the inner control points, #control - 2 by 2."""
+        span = np.repeat(np.arange(len(self._steps)), GAUSS)
+        rate = [self._summed(span, self._at_quadrature, self._slope * fit.rate[:, axis, None]) for axis in range(2)]
+        by_span = np.stack(rate, axis=2)[:, 1:-1].reshape(len(self._steps), -1)
+        length_rate = np.cumsum(by_span, axis=0) / self._length_weight
+        off = np.cumsum(fit.length_error) / self._length_weight
+        matrix = length_rate.T @ length_rate
+        matrix[::2, ::2] += self._fixed
+        matrix[1::2, 1::2] += self._fixed
+        solved = np.linalg.solve(matrix, -gradient.ravel() - length_rate.T @ off)
+        return np.asarray(solved, dtype=np.float64).reshape(-1, 2)
+
+    def _move_many(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
+        """Solve the banded equations for the moves of the inner control points, #control - 2 by 2."""
+        # Thousands of small systems: `scipy.linalg.solve_banded` takes longer to check its arguments than to solve one.
+        from scipy.linalg.lapack import dgbsv
+
+        rate = (self._slope[:, :, None] * fit.rate[:, None, :])[self._free] / -self._length_weight
+        band = self._fixed + np.bincount(self._to, np.concatenate([rate, rate]), minlength=len(self._fixed))
+        right = np.empty(self._size)
+        right[self._of_control[1:-1]] = -gradient
+        right[self._of_span] = fit.length_error / self._length_weight
+        _, _, solved, failed = dgbsv(
+            self._band, self._band, band.reshape(3 * self._band + 1, self._size), right, overwrite_ab=True
+        )
+        if failed:
+            raise np.linalg.LinAlgError("the spline's equations are singular")
+        moved: FloatArray = solved[self._of_control[1:-1]]
+        return moved
+
+
+def _cubic_basis(knots: FloatArray, at: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Return the cubic B-splines that are not zero at each place: numbers, values and slopes, #N by 4 each."""
+    from scipy.interpolate import BSpline
+
+    cubic, square = (BSpline.design_matrix(at, knots, degree) for degree in (3, 2))
+    number = cubic.indices.reshape(-1, 4).astype(np.int64)
+    # A cubic B-spline's slope is three times the difference of two quadratic ones, each over the width of its support.
+    lower = np.zeros((len(at), 5))
+    lower[:, 1:4] = square.data.reshape(-1, 3)
+    each = number[:, :1] + np.arange(5)
+    reach = knots[np.minimum(each + 3, len(knots) - 1)] - knots[each]
+    share = 3.0 * np.divide(lower, reach, out=np.zeros_like(lower), where=reach > 0.0)
+    return number, cubic.data.reshape(-1, 4), share[:, :-1] - share[:, 1:]

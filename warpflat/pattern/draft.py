@@ -5,7 +5,7 @@ Everything that the files show is worked out here once; the writers of DXF, SVG,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -17,7 +17,6 @@ from warpflat.pattern.allowance import cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve
 from warpflat.pattern.drafted import (
     DraftedCutout,
-    DraftedDart,
     DraftedEdge,
     DraftedGarment,
     DraftedPiece,
@@ -26,7 +25,6 @@ from warpflat.pattern.drafted import (
     SeamReport,
 )
 from warpflat.pattern.drafted_darts import (
-    DartLegs,
     dart_legs,
     dart_line,
     dart_notes,
@@ -36,7 +34,7 @@ from warpflat.pattern.drafted_darts import (
 from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
-from warpflat.pattern.piece_parts import Edge, Hole
+from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Garment, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
@@ -70,29 +68,25 @@ def draft_garment(
         InputError: an unknown size, or a half piece that reaches across its fold.
     """
     with printed_in(garment.words):
-        return _drafted(garment, tolerance, sizes, true=true)
-
-
-def _drafted(garment: Garment, tolerance: float | None, sizes: Sequence[str] | None, *, true: bool) -> DraftedGarment:
-    chosen = garment.sizes if sizes is None else tuple(sizes)
-    for size in chosen:
-        garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
-    drafted: dict[str, tuple[DraftedPiece, ...]] = {}
-    reports: list[SeamReport] = []
-    corners: list[CornerReport] = []
-    for size in chosen:
-        edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance, true=true)
-        corners += trued
-        pieces = {
-            piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
-        }
-        seams = [seam.of_size(size) for seam in garment.seams]
-        notches = seam_notches([*seams, *cut_darts(pieces)], pieces)
-        drafted[size] = tuple(
-            replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
-        )
-        reports += seam_reports(garment.seams, pieces, size)
-    return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
+        chosen = garment.sizes if sizes is None else tuple(sizes)
+        for size in chosen:
+            garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
+        drafted: dict[str, tuple[DraftedPiece, ...]] = {}
+        reports: list[SeamReport] = []
+        corners: list[CornerReport] = []
+        for size in chosen:
+            edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance, true=true)
+            corners += trued
+            pieces = {
+                piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
+            }
+            seams = [seam.of_size(size) for seam in garment.seams]
+            notches = seam_notches([*seams, *cut_darts(pieces)], pieces)
+            drafted[size] = tuple(
+                replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
+            )
+            reports += seam_reports(garment.seams, pieces, size)
+        return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
 
 
 def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
@@ -138,16 +132,49 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     darts = dart_legs(piece, edges)
     drafted_legs = {leg.name: leg for legs in darts.values() for leg in (legs.left, legs.right)}
     edges = tuple(drafted_legs.get(edge.name, edge) for edge in edges)
-    cut = cut_outline(_sides(edges, darts))
+    # The outline in order; a wedge stands for both legs of a folded dart.
+    folded = {legs.dart.left: legs.wedge for legs in darts.values() if legs.wedge is not None}
+    right_legs = {legs.dart.right for legs in darts.values() if legs.wedge is not None}
+    sides: list[Side | Wedge] = []
+    for edge in edges:
+        if edge.name in folded:
+            sides.append(folded[edge.name])
+        elif edge.name not in right_legs:
+            sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
+    cut = cut_outline(sides)
     drafted_darts = tuple(dart_line(legs, cut.points) for legs in darts.values())
     holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
     fisheyes = {hole.name: smooth_fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
-    cutouts = {hole.name: _cutout(hole, holes[hole.name]) for hole in piece.holes if hole.kind == "cutout"}
-    internal = _internal_lines(piece, frame, tolerance)
+    cutouts = {}
+    for hole in (hole for hole in piece.holes if hole.kind == "cutout"):
+        # A hole that is too small for an allowance is cut on its sewing line.
+        points = holes[hole.name]
+        line = cut_hole(points, hole.width)
+        cutouts[hole.name] = DraftedCutout(
+            sew_line=points, cut_line=points if line is None else line, width=0.0 if line is None else hole.width
+        )
+    lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
+    internal = {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
     grain = default_grain(sew_line, list(holes.values())) if piece.grain is None else _moved(piece.grain, frame)
     leg_lines = [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
     widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
+    # Pleats are not marked through the cloth.
+    drilled = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts if dart.dart.pleat is None]
+    drilled += [
+        DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]
+    ]
+    uneven = []
+    for name, line in fisheyes.items():
+        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in fisheye_legs(line)))))
+        if apart > SEAM_TOLERANCE:
+            uneven.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
+    # What even the widest tolerance leaves wavy.
+    wavy = [e.name for e in edges if tolerance is None and e.tolerance > TOLERANCE and is_wavy(e.curve)]
+    ragged = [
+        f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
+        f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
+    ]
     return DraftedPiece(
         piece=piece,
         frame=frame,
@@ -155,10 +182,10 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         cut_line=cut.points,
         darts=drafted_darts,
         drill_holes=(
-            *_drill_holes(drafted_darts, fisheyes),
+            *drilled,
             *(DrillHole(name=name, at=_moved(at[None], frame)[0]) for name, at in piece.marks.items()),
         ),
-        notches=dart_notches(piece, _wedges(darts), cut),
+        notches=dart_notches(piece, {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}, cut),
         internal_lines=internal,
         cutouts=cutouts,
         fisheyes=fisheyes,
@@ -173,61 +200,16 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         ),
         notes=(
             *cut.notes,
-            *_ragged_edges(edges, tolerance),
+            *(ragged if wavy else ()),
             *chain.from_iterable(map(dart_notes, darts.values())),
-            *_small_cutouts(piece, cutouts),
-            *_uneven_fisheyes(fisheyes),
+            *[
+                f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
+                for hole in piece.holes
+                if hole.name in cutouts and cutouts[hole.name].width < hole.width
+            ],
+            *uneven,
         ),
     )
-
-
-def _wedges(darts: Mapping[str, DartLegs]) -> dict[str, Wedge]:
-    """Return the darts that are folded."""
-    return {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}
-
-
-def _internal_lines(piece: Piece, frame: FloatArray, tolerance: float | None) -> dict[str, FloatArray]:
-    """Return the lines inside, without the teeth in which they run along a mesh unless a tolerance is given."""
-    lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
-    return {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
-
-
-def _drill_holes(darts: Sequence[DraftedDart], fisheyes: Mapping[str, FloatArray]) -> tuple[DrillHole, ...]:
-    """Return the tips of all darts but pleats, which are marked through the cloth."""
-    holes = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in darts if dart.dart.pleat is None]
-    holes += [DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]]
-    return tuple(holes)
-
-
-def _ragged_edges(edges: Sequence[DraftedEdge], tolerance: float | None) -> list[str]:
-    """Return a note on the edges that even the widest tolerance leaves wavy."""
-    smoothed = [edge for edge in edges if tolerance is None and edge.tolerance > TOLERANCE]
-    wavy = [edge.name for edge in smoothed if is_wavy(edge.curve)]
-    if not wavy:
-        return []
-    return [
-        f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
-        f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
-    ]
-
-
-def _small_cutouts(piece: Piece, cutouts: Mapping[str, DraftedCutout]) -> list[str]:
-    """Return notes on the holes that are too small for their allowance."""
-    return [
-        f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
-        for hole in piece.holes
-        if hole.name in cutouts and cutouts[hole.name].width < hole.width
-    ]
-
-
-def _uneven_fisheyes(fisheyes: Mapping[str, FloatArray]) -> list[str]:
-    """Return notes on the fish-eye darts whose sides differ in length."""
-    notes = []
-    for name, line in fisheyes.items():
-        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in fisheye_legs(line)))))
-        if apart > SEAM_TOLERANCE:
-            notes.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
-    return notes
 
 
 def _frame(piece: Piece) -> FloatArray:
@@ -298,27 +280,6 @@ def _drafted_edge(edge: Edge, curve: Curve, fitted: tuple[Curve, float], points:
     return DraftedEdge(
         edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1]
     )
-
-
-def _sides(edges: Sequence[DraftedEdge], darts: Mapping[str, DartLegs]) -> list[Side | Wedge]:
-    """Return the outline in order; a wedge stands for both legs of a folded dart."""
-    folded = {legs.dart.left: legs.wedge for legs in darts.values() if legs.wedge is not None}
-    right_legs = {legs.dart.right for legs in darts.values() if legs.wedge is not None}
-    sides: list[Side | Wedge] = []
-    for edge in edges:
-        if edge.name in folded:
-            sides.append(folded[edge.name])
-        elif edge.name not in right_legs:
-            sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
-    return sides
-
-
-def _cutout(hole: Hole, points: FloatArray) -> DraftedCutout:
-    """Return the sewing and the cutting line of a hole; one line if it is too small for an allowance."""
-    line = cut_hole(points, hole.width)
-    if line is None:
-        return DraftedCutout(sew_line=points, cut_line=points, width=0.0)
-    return DraftedCutout(sew_line=points, cut_line=line, width=hole.width)
 
 
 def nest_label(pieces: Sequence[DraftedPiece]) -> Label:

@@ -68,8 +68,11 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
         fold_to = dart.fold_to or _fold_side(left.line, right.line)
         wedge = Wedge(name=dart.name, left=left.line, right=right.line, fold_to=fold_to)
         legs = DartLegs(dart=dart, left=left, right=right, wedge=wedge)
-        # Legs that are one line (a dart of no width) have nothing to fold.
-        folded = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and dart.pleat is None and _has_room(legs))
+        # A dart is cut away if its mouth is so wide that something is left between the legs' allowances. Legs that are one
+        # line (a dart of no width) have nothing to fold.
+        widths = _leg_width(left) + _leg_width(right)
+        has_room = widths == 0 or legs.mouth >= widths + LEAST_WASTE
+        folded = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and dart.pleat is None and has_room)
         found[dart.name] = replace(
             legs,
             left=replace(left, width=0.0 if folded else _leg_width(left)),
@@ -77,12 +80,6 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
             wedge=wedge if folded else None,
         )
     return found
-
-
-def _has_room(legs: DartLegs) -> bool:
-    """Return whether the mouth is so wide that something is cut away between the legs' allowances."""
-    widths = _leg_width(legs.left) + _leg_width(legs.right)
-    return widths == 0 or legs.mouth >= widths + LEAST_WASTE
 
 
 def _leg_width(leg: DraftedEdge) -> float:
@@ -113,20 +110,16 @@ def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:
     far = ends[np.argmax(np.linalg.norm(ends - wedge.tip, axis=1))]
     fold = np.stack([wedge.tip, far])
     if are_curved(left, right):
-        fold = np.concatenate([_middle_line(left[::-1], right), fold[1:]])
+        # The middle line of two lines with one start, by shares of their lengths.
+        shares = np.linspace(0.0, 1.0, FOLD_POINTS)
+        sides = [
+            np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
+            for line, arc in ((line, arc_lengths(line)) for line in (left[::-1], right))
+        ]
+        fold = np.concatenate([np.asarray((sides[0] + sides[1]) / 2), fold[1:]])
     if legs.dart.pleat is not None:
         fold = drawn_leg(fold[::-1], legs.dart.pleat)[::-1]
     return DraftedDart(dart=legs.dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=legs.mouth)
-
-
-def _middle_line(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the middle line of two lines with one start, by shares of their lengths."""
-    shares = np.linspace(0.0, 1.0, FOLD_POINTS)
-    sides = [
-        np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
-        for line, arc in ((line, arc_lengths(line)) for line in (first, second))
-    ]
-    return np.asarray((sides[0] + sides[1]) / 2)
 
 
 def dart_notes(legs: DartLegs) -> list[str]:

@@ -14,10 +14,9 @@ from warpflat.core.polyline import arc_lengths, resample
 from warpflat.core.text import name_without_number
 from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import nest_label
-from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
+from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafted_darts import fisheye_legs
-from warpflat.pattern.label import Label
-from warpflat.pattern.lettering import Words, text_width
+from warpflat.pattern.label import Label, Words, text_width
 from warpflat.pattern.words import translate, translate_name
 
 if TYPE_CHECKING:
@@ -113,10 +112,23 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
     """
     if len(pieces) == 1:
         return (draw_piece(pieces[0], paper),)
+    import shapely
+
     joints = () if paper is None else paper.joints
     drawings = []
     middle = len(pieces) // 2
-    edge = _most_graded_edge(pieces)
+
+    def shift_across(name: str) -> float:
+        middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
+        start, end = pieces[0].edge(name).line[[0, -1]]
+        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
+        shift = middles[1] - middles[0]
+        return abs(float(shift[0] * along[1] - shift[1] * along[0]))
+
+    # Where the sizes lie farthest apart a size is easiest to read off its line.
+    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
+    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
+    edge = max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
     for index, piece in enumerate(pieces):
         strokes = [
             *_cut_strokes(piece, open_folds=paper is not None),
@@ -133,15 +145,28 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             label = nest_label(pieces)
             strokes += [*grain_strokes(piece.grain), *_internal_strokes(piece), *_leader_strokes(label)]
             sizes = ", ".join(p.size for p in pieces)
-            words += [*_list_sizes(label, piece.size, sizes), *_line_names(piece, borders=False, joints=joints)]
+            # The label names all sizes in place of its own, no wider than it is.
+            rows = label.words()
+            for number, row in enumerate(rows):
+                one_size, all_sizes = translate("size {size}", size=piece.size), translate("sizes {sizes}", sizes=sizes)
+                if row.text == one_size[0].upper() + one_size[1:]:
+                    text = all_sizes[0].upper() + all_sizes[1:]
+                    height = row.height * min(1.0, label.width / text_width(text, row.height))
+                    rows[number] = replace(row, text=text, height=height)
+            words += [*rows, *_line_names(piece, borders=False, joints=joints)]
             words += _notch_letters(piece, paper)
             for fold in piece.fold_edges:
                 fold_strokes, fold_words = _fold_bracket(fold, joints)
                 strokes += fold_strokes
                 words += fold_words
-        drawings.append(
-            Drawing(piece=piece, strokes=tuple(strokes), words=(*words, *_size_tags(piece, edge, index, len(pieces))))
-        )
+        if edge:
+            # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
+            ring = shapely.LinearRing(piece.cut_line)
+            for start in (0.08, 0.62):
+                at = resample(piece.edge(edge).line, start + 0.3 * (index + 0.5) / len(pieces))
+                on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+                words.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
+        drawings.append(Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words)))
     return tuple(drawings)
 
 
@@ -200,7 +225,10 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
         if dart.fold is not None
     ]
     for index, notch in enumerate(piece.notches):
-        strokes += _notch_strokes(notch, index)
+        for slit, base in enumerate(notch.base):
+            name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
+            line = np.stack([base, base + notch.depth * notch.direction])
+            strokes.append(Stroke(role="notch", name=name, points=line))
     for hole in piece.drill_holes:
         turn = np.linspace(0, 2 * np.pi, 17)[:-1]
         ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -218,14 +246,6 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
             Stroke(role="dart", name=f"{name}.right", points=right),
             Stroke(role="dart_fold", name=f"{name}.fold", points=left[[0, -1]]),
         ]
-    return strokes
-
-
-def _notch_strokes(notch: Notch, index: int) -> list[Stroke]:
-    strokes = []
-    for slit, base in enumerate(notch.base):
-        name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
-        strokes.append(Stroke(role="notch", name=name, points=np.stack([base, base + notch.depth * notch.direction])))
     return strokes
 
 
@@ -275,9 +295,28 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True, joints: Sequence[F
     """
     import shapely
 
-    lines = _named_lines(piece, borders=borders)
+    # The lines that get a name: the name, its line, and whether it stands to the left of the line.
+    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
+    second_legs = {dart.dart.right for dart in piece.darts}
+    named = [(name, line, False) for name, line in piece.internal_lines.items()]
+    for edge in piece.edges:
+        if edge.name in first_legs:
+            named.append((first_legs[edge.name], piece.drawn_line(edge), True))
+        elif borders and edge.kind != "fold" and edge.name not in second_legs:
+            named.append((edge.name, edge.line, True))
+    named += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
+    called = {name for name, _, _ in named}
+    lines = [(translate_name(name_without_number(name, called)), line, inwards) for name, line, inwards in named]
     drawn = [shapely.LineString(line) for _, line, _ in lines]
-    obstacles = [*_name_obstacles(piece), *(shapely.LineString(joint) for joint in joints)]
+    obstacles = [
+        *[
+            *([shapely.Polygon(piece.label.box)] if piece.label.leader is None else []),
+            *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
+            *(shapely.LinearRing(cutout.sew_line) for cutout in piece.cutouts.values()),
+            *(shapely.LineString(stroke.points) for stroke in grain_strokes(piece.grain)),
+        ],
+        *(shapely.LineString(joint) for joint in joints),
+    ]
     words = []
     for index, (name, line, inwards) in enumerate(lines):
         others = shapely.union_all([*obstacles, *(other for key, other in enumerate(drawn) if key != index)])
@@ -286,33 +325,6 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True, joints: Sequence[F
             words.append(placed)
             obstacles.append(_text_box(placed))
     return words
-
-
-def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, FloatArray, bool]]:
-    """Return the lines that get a name: the name, its line, and whether it stands to the left of the line."""
-    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
-    second_legs = {dart.dart.right for dart in piece.darts}
-    lines = [(name, line, False) for name, line in piece.internal_lines.items()]
-    for edge in piece.edges:
-        if edge.name in first_legs:
-            lines.append((first_legs[edge.name], piece.drawn_line(edge), True))
-        elif borders and edge.kind != "fold" and edge.name not in second_legs:
-            lines.append((edge.name, edge.line, True))
-    lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
-    called = {name for name, _, _ in lines}
-    return [(translate_name(name_without_number(name, called)), line, inwards) for name, line, inwards in lines]
-
-
-def _name_obstacles(piece: DraftedPiece) -> list[Geometry]:
-    """Return what names keep clear of besides other lines: the label, drill holes, cutouts and the grain."""
-    import shapely
-
-    return [
-        *([shapely.Polygon(piece.label.box)] if piece.label.leader is None else []),
-        *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
-        *(shapely.LinearRing(cutout.sew_line) for cutout in piece.cutouts.values()),
-        *(shapely.LineString(stroke.points) for stroke in grain_strokes(piece.grain)),
-    ]
 
 
 def _place_name(name: str, line: FloatArray, obstacles: Geometry, *, inwards: bool) -> Words | None:
@@ -324,7 +336,19 @@ def _place_name(name: str, line: FloatArray, obstacles: Geometry, *, inwards: bo
     for share in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
         if not half <= share * length <= length - half:
             continue
-        words = _words_along(name, line, share, half, inwards=inwards)
+        # The name stands above its line, or to the left of a border (`inwards`).
+        near, far = resample(line, share - half / length), resample(line, share + half / length)
+        along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+        left = np.array([-along[1], along[0]])
+        # Upright, and steep ones read upwards.
+        if along[0] < -0.2 or (abs(along[0]) <= 0.2 and along[1] < 0):
+            along = -along
+        aside = left if inwards else np.array([-along[1], along[0]])
+        # Clear of the whole stretch, however it bends.
+        stretch = [resample(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
+        bulge = max(float((point - near) @ aside) for point in stretch)
+        at = (near + far) / 2 + (bulge + NAME_GAP) * aside
+        words = Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
         distance = float(obstacles.distance(_text_box(words)))
         if distance > clear:
             clear, chosen = distance, words
@@ -341,23 +365,6 @@ def _text_box(words: Words) -> Polygon:
     cosine, sine = np.cos(words.angle), np.sin(words.angle)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     return shapely.Polygon(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ turn.T)
-
-
-def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwards: bool) -> Words:
-    """Write a name beside a line, upright: above it, or to its left (`inwards`) if the line is a border."""
-    length = max(float(arc_lengths(line)[-1]), 1e-12)
-    near, far = resample(line, share - half / length), resample(line, share + half / length)
-    along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
-    left = np.array([-along[1], along[0]])
-    # Upright, and steep ones read upwards.
-    if along[0] < -0.2 or (abs(along[0]) <= 0.2 and along[1] < 0):
-        along = -along
-    aside = left if inwards else np.array([-along[1], along[0]])
-    # Clear of the whole stretch, however it bends.
-    stretch = [resample(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
-    bulge = max(float((point - near) @ aside) for point in stretch)
-    at = (near + far) / 2 + (bulge + NAME_GAP) * aside
-    return Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
 
 
 def grain_strokes(grain: FloatArray) -> list[Stroke]:
@@ -401,45 +408,3 @@ def _fold_bracket(edge: DraftedEdge, joints: Sequence[FloatArray] = ()) -> tuple
 
 def _leader_strokes(label: Label) -> list[Stroke]:
     return [] if label.leader is None else [Stroke(role="leader", name="", points=label.leader)]
-
-
-def _list_sizes(label: Label, size: str, sizes: str) -> list[Words]:
-    """Return the label's words with all sizes in place of its own, no wider than the label is."""
-    words = label.words()
-    for index, row in enumerate(words):
-        own, all_sizes = translate("size {size}", size=size), translate("sizes {sizes}", sizes=sizes)
-        if row.text == own[0].upper() + own[1:]:
-            text = all_sizes[0].upper() + all_sizes[1:]
-            height = row.height * min(1.0, label.width / text_width(text, row.height))
-            words[index] = replace(row, text=text, height=height)
-    return words
-
-
-def _most_graded_edge(pieces: tuple[DraftedPiece, ...]) -> str:
-    """Return the edge on which the sizes lie farthest apart: there a size is easiest to read off its own line."""
-
-    def shift_across(name: str) -> float:
-        middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
-        start, end = pieces[0].edge(name).line[[0, -1]]
-        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
-        shift = middles[1] - middles[0]
-        return abs(float(shift[0] * along[1] - shift[1] * along[0]))
-
-    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
-    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
-    return max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
-
-
-def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[Words]:
-    """Write the size on its own cut line, staggered along an edge so that the tags of sizes do not collide."""
-    import shapely
-
-    if not edge:
-        return []
-    ring = shapely.LinearRing(piece.cut_line)
-    words = []
-    for start in (0.08, 0.62):
-        at = resample(piece.edge(edge).line, start + 0.3 * (index + 0.5) / count)
-        on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
-        words.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
-    return words

@@ -87,7 +87,17 @@ def fair_line(
             rows = [(even, image[added]), (is_straight, is_straight[added])]
             even, is_straight = (np.concatenate(row if at_end else row[::-1]) for row in rows)
             first += 0 if at_end else len(image) - 1
-    basis = _straight_basis(is_straight)
+    # The points are sums of free ones (#P by #F): those in a straight row lie between the ends of the row.
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_straight, [False]]).astype(np.int8)))
+    sums = np.eye(len(is_straight))
+    inner = np.zeros(len(is_straight), dtype=bool)
+    for begin, end in edges.reshape(-1, 2):
+        last = end - 1
+        share = (np.arange(begin + 1, last) - begin) / max(last - begin, 1)
+        sums[begin + 1 : last] = 0.0
+        sums[begin + 1 : last, begin], sums[begin + 1 : last, last] = 1.0 - share, share
+        inner[begin + 1 : last] = True
+    basis = sums[:, ~inner]
     bend = (wave / (2 * np.pi * places[1])) ** 3 * np.diff(basis, n=3, axis=0)
     solved = np.linalg.solve(basis.T @ basis + bend.T @ bend, basis.T @ even)
     smooth = (basis @ solved)[first : first + len(places)]
@@ -190,20 +200,6 @@ def _evenly(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     arc = arc_lengths(points)
     places = np.linspace(0.0, arc[-1], int(np.clip(np.ceil(arc[-1] / STEP), FEWEST, MOST)))
     return places, points_at_lengths(points, places)
-
-
-def _straight_basis(is_straight: BoolArray) -> FloatArray:
-    """Return the points as sums of free ones (#P by #F): points in a straight row lie between the ends of the row."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_straight, [False]]).astype(np.int8)))
-    basis = np.eye(len(is_straight))
-    inner = np.zeros(len(is_straight), dtype=bool)
-    for first, end in edges.reshape(-1, 2):
-        last = end - 1
-        share = (np.arange(first + 1, last) - first) / max(last - first, 1)
-        basis[first + 1 : last] = 0.0
-        basis[first + 1 : last, first], basis[first + 1 : last, last] = 1.0 - share, share
-        inner[first + 1 : last] = True
-    return basis[:, ~inner]
 
 
 def _distance(points: FloatArray, line: FloatArray) -> float:

@@ -56,19 +56,54 @@ def fit_edges(
         seams: between them; the legs of the pieces' darts count as seams too.
         tolerance: [m] for all edges; None takes the least of `TOLERANCES` that makes a clean curve of each.
     """
+    import shapely
+
     fitted = {}
     for piece in pieces:
         for edge in piece.edges:
             line = lines[piece.name, edge.name]
-            fitted[piece.name, edge.name] = _fit_edge(line[[0, -1]] if edge.kind == "fold" else line, tolerance)
+            line = line[[0, -1]] if edge.kind == "fold" else line
+            # The least of `TOLERANCES` that makes the curve clean, or the largest.
+            for tried in TOLERANCES if tolerance is None else (tolerance,):
+                curve = fit_curve(line, tried)
+                if tolerance is not None or not _ragged(curve):
+                    break
+            fitted[piece.name, edge.name] = curve, tried
     if tolerance is None:
         for first, second, against, ease in _paired_edges(pieces, seams):
             wide = max(fitted[first][1], fitted[second][1])
             if wide > TOLERANCE and len(lines[first]) == len(lines[second]):
-                fitted[first], fitted[second] = _fit_ragged_seam(lines[first], lines[second], against, ease)
+                # Both sides of a ragged seam are smoothed, and get the lengths of the one that is then shorter.
+                sides = [lines[first], lines[second][::-1] if against else lines[second]]
+                longer = np.array([1.0, 1.0 + ease])
+                # A short zigzag may have no smooth line of the right length: a wiggle is better than a seam that does not match.
+                found, used = [fit_curve(side) for side in sides], TOLERANCES[-1]
+                for width in TOLERANCES[1:]:
+                    reached = [
+                        _lengths_along(fit_curve(side, width), side) / share
+                        for side, share in zip(sides, longer, strict=True)
+                    ]
+                    lengths = min(reached, key=lambda places: float(places[-1]))
+                    curves = [
+                        fit_curve(side, width, lengths=lengths * share)
+                        for side, share in zip(sides, longer, strict=True)
+                    ]
+                    difference = abs(curves[1].length - curves[0].length * longer[1])
+                    if difference <= SAFE * LOCAL_TOLERANCE:
+                        found, used = curves, width
+                    if difference <= EQUAL and not any(map(_ragged, curves)):
+                        break
+                fitted[first], fitted[second] = (found[0], used), (found[1].reversed() if against else found[1], used)
     _keep_near(pieces, lines, seams, fitted, tolerance)
     for piece in pieces:
-        _replace_crossing_curves(piece, lines, fitted)
+        # Curves that cross themselves or each other are replaced by their chords.
+        keys = [(piece.name, edge.name) for edge in piece.edges]
+        drawn = {key: shapely.LineString(fitted[key][0].sample()) for key in keys}
+        if shapely.Polygon(np.concatenate([line.coords[:-1] for line in drawn.values()])).is_valid:
+            continue
+        for key in keys:
+            if not drawn[key].is_simple or any(drawn[key].crosses(drawn[other]) for other in keys if other != key):
+                fitted[key] = chords(lines[key]), fitted[key][1]
     return fitted
 
 
@@ -102,17 +137,6 @@ def smooth_line(line: FloatArray) -> FloatArray:
     return smooth
 
 
-def _fit_edge(line: FloatArray, tolerance: float | None) -> tuple[Curve, float]:
-    """Fit a curve within the tolerance, or within the least of `TOLERANCES` that makes it clean; return both."""
-    if tolerance is not None:
-        return fit_curve(line, tolerance), tolerance
-    for tried in TOLERANCES:
-        curve = fit_curve(line, tried)
-        if not _ragged(curve):
-            break
-    return curve, tried
-
-
 def _ragged(curve: Curve) -> bool:
     """Return whether a curve has too many segments or waves for a clean border."""
     return len(curve.bezier) > CURVES + curve.length / CURVE or is_wavy(curve)
@@ -140,8 +164,15 @@ def _keep_near(
     tolerance: float | None,
 ) -> None:
     """Bring the curves of clean edges within the tolerance of their points, where their seams allow it."""
-    tried = fitted | _near_curves(pieces, lines, fitted, TOLERANCE if tolerance is None else tolerance)
-    unchecked = list(_sewn(pieces, seams))
+    within = TOLERANCE if tolerance is None else tolerance
+    keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
+    clean = [key for key in keys if fitted[key][1] <= within]
+    tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in clean}
+    # Both sides of every seam and dart, in one direction, and the second side's ease.
+    unchecked: list[tuple[Sides, Eased]] = [(seam.sides, (seam.ease, seam.eased)) for seam in seams]
+    for name, dart in ((piece.name, dart) for piece in pieces for dart in piece.darts):
+        left, right = SeamSide(piece=name, edge=dart.left), SeamSide(piece=name, edge=dart.right, reversed=True)
+        unchecked.append((((left,), (right,)), (0.0, (0.0, 1.0))))
     # The edges of a mirror pair are sewn at two seams: a curve that one of them rejects changes the other.
     while unequal := [seam for seam in unchecked if _difference(*_both(seam, lines, tried)) > SAFE]:
         for sides, ease in unequal:
@@ -153,34 +184,12 @@ def _keep_near(
     fitted |= tried
 
 
-def _near_curves(
-    pieces: Sequence[Piece],
-    lines: Mapping[EdgeKey, FloatArray],
-    fitted: Mapping[EdgeKey, tuple[Curve, float]],
-    tolerance: float,
-) -> dict[EdgeKey, tuple[Curve, float]]:
-    """Return curves that keep within the tolerance [m] of their points, for all clean edges that are not on a fold."""
-    keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
-    clean = [key for key in keys if fitted[key][1] <= tolerance]
-    return {key: (fit_curve(lines[key], tolerance, near=True), tolerance) for key in clean}
-
-
 def _both(
     seam: tuple[Sides, Eased], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
 ) -> tuple[FloatArray, FloatArray, Eased]:
     """Return the lengths along both sides of a seam at their points, and the second side's ease."""
     (first, second), ease = seam
     return _lengths_at_points(first, lines, curves), _lengths_at_points(second, lines, curves), ease
-
-
-def _sewn(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Sides, Eased]]:
-    """Yield both sides of every seam and dart, in one direction, and the second side's ease."""
-    for seam in seams:
-        yield seam.sides, (seam.ease, seam.eased)
-    for piece in pieces:
-        for dart in piece.darts:
-            left, right = SeamSide(piece=piece.name, edge=dart.left), SeamSide(piece=piece.name, edge=dart.right)
-            yield ((left,), (SeamSide(piece=right.piece, edge=right.edge, reversed=True),)), (0.0, (0.0, 1.0))
 
 
 def _lengths_at_points(
@@ -217,30 +226,6 @@ def _paired_edges(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tu
             yield (piece.name, dart.left), (piece.name, dart.right), True, 0.0
 
 
-def _fit_ragged_seam(
-    first: FloatArray, second: FloatArray, against: bool, ease: float
-) -> tuple[tuple[Curve, float], tuple[Curve, float]]:
-    """Smooth both sides of a ragged seam, and give both the lengths of the one that is then shorter."""
-    sides = [first, second[::-1] if against else second]
-    longer = np.array([1.0, 1.0 + ease])
-    # A short zigzag may have no smooth line of the right length: a wiggle is better than a seam that does not match.
-    found, used = [fit_curve(side) for side in sides], TOLERANCES[-1]
-    for tolerance in TOLERANCES[1:]:
-        reached = [
-            _lengths_along(fit_curve(side, tolerance), side) / share for side, share in zip(sides, longer, strict=True)
-        ]
-        lengths = min(reached, key=lambda places: float(places[-1]))
-        curves = [
-            fit_curve(side, tolerance, lengths=lengths * share) for side, share in zip(sides, longer, strict=True)
-        ]
-        difference = abs(curves[1].length - curves[0].length * longer[1])
-        if difference <= SAFE * LOCAL_TOLERANCE:
-            found, used = curves, tolerance
-        if difference <= EQUAL and not any(map(_ragged, curves)):
-            break
-    return (found[0], used), (found[1].reversed() if against else found[1], used)
-
-
 def _lengths_along(curve: Curve, points: FloatArray) -> FloatArray:
     """Return the length [m] along the curve at each of the points (#P)."""
     import shapely
@@ -249,18 +234,3 @@ def _lengths_along(curve: Curve, points: FloatArray) -> FloatArray:
     places = np.maximum.accumulate(shapely.line_locate_point(line, shapely.points(points)))
     places[[0, -1]] = 0.0, line.length
     return np.asarray(places)
-
-
-def _replace_crossing_curves(
-    piece: Piece, lines: Mapping[EdgeKey, FloatArray], fitted: dict[EdgeKey, tuple[Curve, float]]
-) -> None:
-    """Replace curves of a piece that cross themselves or each other by their chords."""
-    import shapely
-
-    keys = [(piece.name, edge.name) for edge in piece.edges]
-    drawn = {key: shapely.LineString(fitted[key][0].sample()) for key in keys}
-    if shapely.Polygon(np.concatenate([line.coords[:-1] for line in drawn.values()])).is_valid:
-        return
-    for key in keys:
-        if not drawn[key].is_simple or any(drawn[key].crosses(drawn[other]) for other in keys if other != key):
-            fitted[key] = chords(lines[key]), fitted[key][1]

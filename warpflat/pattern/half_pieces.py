@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,17 +29,17 @@ ON_AXIS = 1e-6
 def halved(garment: DraftedGarment) -> DraftedGarment:
     """Return the garment with every wide piece that is its own mirror image, in all sizes, as a half on the fold."""
     names = [piece.name for piece in next(iter(garment.pieces.values()))]
-    on_fold = {name for name in names if all(_is_wide(p) and is_symmetric(p) for p in garment.all_sizes(name))}
+    on_fold = {
+        name
+        for name in names
+        if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in garment.all_sizes(name))
+    }
     sides = {name: _kept_side(garment.all_sizes(name)[0], garment.garment.seams) for name in on_fold}
     pieces = {
         size: tuple(_half(piece, garment, sides[piece.name]) if piece.name in on_fold else piece for piece in row)
         for size, row in garment.pieces.items()
     }
     return replace(garment, pieces=pieces)
-
-
-def _is_wide(piece: DraftedPiece) -> bool:
-    return float(np.ptp(piece.cut_line[:, 0])) >= NARROW
 
 
 def is_symmetric(piece: DraftedPiece) -> bool:
@@ -87,8 +87,8 @@ def _kept_side(piece: DraftedPiece, seams: Sequence[Seam]) -> float:
     """Return the side that is drawn, -1 or 1 along x: whose seams meet the drawn copies, else the left one's."""
     axis, votes = _axis(piece), 0.0
     for seam in seams:
-        for own, others in (seam.sides, seam.sides[::-1]):
-            for side in own:
+        for chain, others in (seam.sides, seam.sides[::-1]):
+            for side in chain:
                 if side.piece == piece.name and any(other.mirrored for other in others):
                     votes -= 2 * _side_of(piece.edge(side.edge).line, axis)
     for edge in piece.edges:
@@ -104,19 +104,46 @@ def _side_of(line: FloatArray, axis: float) -> float:
 
 def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedPiece:
     """Return the half of a symmetric piece on one side, with the fold along x = 0 and its lower end in the origin."""
+    import shapely
+
     axis = _axis(piece)
     edges = [part for edge in piece.edges if (part := _kept_part(edge, axis, side)) is not None]
-    first = next(k for k in range(len(edges)) if _gap(edges[k - 1], edges[k]) > 10 * ON_AXIS)
+    # The first edge after the gap where the other half was.
+    first = next(
+        k
+        for k in range(len(edges))
+        if float(np.linalg.norm(edges[k - 1].curve.bezier[-1, 3] - edges[k].curve.bezier[0, 0])) > 10 * ON_AXIS
+    )
     edges = [*edges[first:], *edges[:first]]
     start, end = edges[-1].curve.bezier[-1, 3], edges[0].curve.bezier[0, 0]
     low = start if start[1] < end[1] else end
     shift = -low
-    edges = [_moved_edge(edge, shift) for edge in edges]
+    edges = [_with_curve(edge, Curve(bezier=edge.curve.bezier + shift, straight=edge.curve.straight)) for edge in edges]
     names = {edge.name: without_side(edge.name) for edge in edges}
     if len(set(names.values())) < len(names):
         names = {name: name for name in names}
     edges = [replace(edge, edge=replace(edge.edge, name=names[edge.name])) for edge in edges]
-    edges.append(_fold_edge(piece, edges[-1].line[-1], edges[0].line[0], {edge.name for edge in edges}))
+    # The edge along the axis is named as the line of the piece that lies there.
+    start, end = edges[-1].line[-1], edges[0].line[0]
+    taken = {edge.name for edge in edges}
+    candidates = [
+        name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - _axis(piece)).max() < INNER
+    ]
+    name = next((name for name in candidates if name not in taken), "fold")
+    thirds = np.stack([start + k / 3 * (end - start) for k in range(4)])
+    curve = Curve(bezier=thirds[None], straight=np.array([True]))
+    edge = Edge(name=name, points=np.stack([start, end]), kind="fold")
+    edges.append(
+        DraftedEdge(
+            edge=edge,
+            curve=curve,
+            line=np.stack([start, end]),
+            width=0.0,
+            places=np.array([0.0, float(np.linalg.norm(end - start))]),
+            fit_error=0.0,
+            tolerance=0.0,
+        )
+    )
     darts = [
         replace(dart.dart, name=without_side(dart.dart.name), left=names[dart.dart.left], right=names[dart.dart.right])
         for dart in piece.darts
@@ -127,6 +154,17 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         for name, line in piece.fisheyes.items()
         if side * (line[0, 0] - axis) > 0.0
     ]
+    # The parts of lines on one side of the axis, without those that lie on it.
+    far = 10.0
+    box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
+    kept: dict[str, FloatArray] = {}
+    for name, line in piece.internal_lines.items():
+        inside = shapely.intersection(shapely.LineString(line), box)
+        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "LineString"]
+        for part in parts:
+            points = np.asarray(part.coords)
+            if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER and without_side(name) not in kept:
+                kept[without_side(name)] = points + shift
     half = Piece(
         name=piece.name,
         size=piece.size,
@@ -135,7 +173,7 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         edges=[edge.edge for edge in edges],
         darts=darts,
         holes=holes,
-        internal_lines=_kept_lines(piece.internal_lines, axis, side, shift),
+        internal_lines=kept,
         marks={
             hole.name: hole.at + shift
             for hole in piece.drill_holes
@@ -147,9 +185,31 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         title=piece.piece.title,
         units=piece.piece.units,
     )
-    notches = _kept_notches(piece, garment.garment.seams, side, names, [(e.name, e.line - shift) for e in edges[:-1]])
+    # The notches of seams on one side of the axis, each on its edge of the half. A seam across the axis (a waist) whose
+    # notches all lie on the other side gets their mirror images.
+    lines = [(e.name, e.line - shift) for e in edges[:-1]]
+    axis, dart_names = _axis(piece), {dart.dart.name for dart in piece.darts}
+    on_side = [
+        n for n in piece.notches if n.seam not in dart_names and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS
+    ]
+    across = {
+        seam.name
+        for seam in garment.garment.seams
+        for row in seam.sides
+        for s in row
+        if s.piece == piece.name and s.edge in names
+    }
+    across -= {notch.seam for notch in on_side}
+    flip, moved_by = np.array([-1.0, 1.0]), np.array([2 * axis, 0.0])
+    for notch in piece.notches:
+        if notch.seam in across:
+            bases = tuple(base * flip + moved_by for base in notch.base)
+            on_side.append(replace(notch, at=notch.at * flip + moved_by, base=bases, direction=notch.direction * flip))
+    drawn = [shapely.LineString(line) for _, line in lines]
+    nearest = [lines[int(np.argmin(shapely.distance(drawn, shapely.Point(notch.at))))][0] for notch in on_side]
     notches = tuple(
-        _along_fold(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base))) for n in notches
+        _along_fold(replace(n, edge=edge, at=n.at + shift, base=tuple(base + shift for base in n.base)))
+        for n, edge in zip(on_side, nearest, strict=True)
     )
     return replace(draft_half(half, garment.name, tuple(edges), notches, piece.notes), enlarged=piece.enlarged)
 
@@ -163,47 +223,6 @@ def _along_fold(notch: Notch) -> Notch:
         notch, at=notch.at * upright, base=(notch.base[0] * upright,),
         direction=np.sign(notch.direction[1]) * upright,
     )  # fmt: skip
-
-
-def _kept_notches(
-    piece: DraftedPiece,
-    seams: Sequence[Seam],
-    side: float,
-    names: Mapping[str, str],
-    lines: Sequence[tuple[str, FloatArray]],
-) -> tuple[Notch, ...]:
-    """Return the notches of seams on one side of the axis, each on its edge of the half.
-
-    A seam across the axis (a waist) whose notches all lie on the other side gets their mirror images.
-
-    Args:
-        piece: whole.
-        seams: of the garment.
-        side: that is kept, -1 or 1 along x.
-        names: of the half's edges, by those of the whole.
-        lines: the half's edges by name, where they lie on the whole piece.
-    """
-    import shapely
-
-    axis, own = _axis(piece), {dart.dart.name for dart in piece.darts}
-    kept = [n for n in piece.notches if n.seam not in own and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS]
-    across = {
-        seam.name for seam in seams for row in seam.sides for s in row if s.piece == piece.name and s.edge in names
-    }
-    across -= {notch.seam for notch in kept}
-    flip, shift = np.array([-1.0, 1.0]), np.array([2 * axis, 0.0])
-    for notch in piece.notches:
-        if notch.seam in across:
-            bases = tuple(base * flip + shift for base in notch.base)
-            kept.append(replace(notch, at=notch.at * flip + shift, base=bases, direction=notch.direction * flip))
-    drawn = [shapely.LineString(line) for _, line in lines]
-    nearest = [lines[int(np.argmin(shapely.distance(drawn, shapely.Point(notch.at))))][0] for notch in kept]
-    return tuple(replace(notch, edge=edge) for notch, edge in zip(kept, nearest, strict=True))
-
-
-def _gap(before: DraftedEdge, after: DraftedEdge) -> float:
-    """Return the distance [m] from the end of an edge to the start of the next."""
-    return float(np.linalg.norm(before.curve.bezier[-1, 3] - after.curve.bezier[0, 0]))
 
 
 def _kept_part(edge: DraftedEdge, axis: float, side: float) -> DraftedEdge | None:
@@ -239,45 +258,6 @@ def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None
 def _with_curve(edge: DraftedEdge, curve: Curve) -> DraftedEdge:
     """Return an edge along another curve, of the same name, kind and width."""
     line = curve.sample()
-    own = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
+    shortened = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
     places = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    return replace(edge, edge=own, curve=curve, line=line, places=places)
-
-
-def _moved_edge(edge: DraftedEdge, shift: FloatArray) -> DraftedEdge:
-    return _with_curve(edge, Curve(bezier=edge.curve.bezier + shift, straight=edge.curve.straight))
-
-
-def _fold_edge(piece: DraftedPiece, start: FloatArray, end: FloatArray, taken: set[str]) -> DraftedEdge:
-    """Return the edge along the axis, named as the line of the piece that lies there."""
-    names = [name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - _axis(piece)).max() < INNER]
-    name = next((name for name in names if name not in taken), "fold")
-    thirds = np.stack([start + k / 3 * (end - start) for k in range(4)])
-    curve = Curve(bezier=thirds[None], straight=np.array([True]))
-    edge = Edge(name=name, points=np.stack([start, end]), kind="fold")
-    return DraftedEdge(
-        edge=edge,
-        curve=curve,
-        line=np.stack([start, end]),
-        width=0.0,
-        places=np.array([0.0, float(np.linalg.norm(end - start))]),
-        fit_error=0.0,
-        tolerance=0.0,
-    )
-
-
-def _kept_lines(lines: Mapping[str, FloatArray], axis: float, side: float, shift: FloatArray) -> dict[str, FloatArray]:
-    """Return the parts of lines on one side of the axis, without those that lie on it."""
-    import shapely
-
-    far = 10.0
-    box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
-    kept: dict[str, FloatArray] = {}
-    for name, line in lines.items():
-        inside = shapely.intersection(shapely.LineString(line), box)
-        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "LineString"]
-        for part in parts:
-            points = np.asarray(part.coords)
-            if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER and without_side(name) not in kept:
-                kept[without_side(name)] = points + shift
-    return kept
+    return replace(edge, edge=shortened, curve=curve, line=line, places=places)

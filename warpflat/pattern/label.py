@@ -1,22 +1,92 @@
-"""The label of a piece: its text, and where there is room for it; the grain line of a piece that names none."""
+"""The text on a pattern: its letters, DejaVu Sans, the label of a piece and where there is room for it, and a default grain line."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.text import size_words
-from warpflat.pattern.lettering import Words, text_width, wrap_text
 from warpflat.pattern.measures import length_words
 from warpflat.pattern.pieces import Piece
 from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
+    from reportlab.pdfbase.ttfonts import TTFont
     from shapely import Geometry, Polygon
+
+__all__ = ["BOLD", "CAPITALS", "FONT", "Words", "embedded_font", "text_width", "wrap_text"]
+
+
+FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
+#: Height of capitals over the font's size.
+CAPITALS = 0.729
+#: Width over the font's size of letters that the font lacks: in other fonts they are no wider than their body.
+UNKNOWN = 1.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Words:
+    """One line of text.
+
+    Attributes:
+        text: what it says.
+        at: its centre [m].
+        height: of its capitals [m].
+        angle: [rad] counter-clockwise.
+        bold: in bold letters.
+        tag: names a size on that size's own line: in the line's colour, on a white ground.
+    """
+
+    text: str
+    at: FloatArray
+    height: float
+    angle: float = 0.0
+    bold: bool = False
+    tag: bool = False
+
+
+@cache
+def embedded_font(name: str) -> TTFont:
+    """Return FONT or BOLD for PDF files."""
+    from reportlab.pdfbase.ttfonts import TTFont
+
+    # The fonts have most of the world's letters and come with matplotlib; importing that takes longer than writing a pattern.
+    found = find_spec("matplotlib")
+    assert found is not None
+    assert found.origin is not None
+    return TTFont(name, str(Path(found.origin).parent / "mpl-data" / "fonts" / "ttf" / f"{name}.ttf"))
+
+
+def text_width(text: str, height: float, *, bold: bool = False) -> float:
+    """Return the width [m] of one line whose capitals are `height` [m] high."""
+    widths = _widths(BOLD if bold else FONT)
+    return sum(widths.get(ord(letter), UNKNOWN) for letter in text) * height / CAPITALS
+
+
+@cache
+def _widths(name: str) -> dict[int, float]:
+    """Return the width of each letter over the font's size, by code point."""
+    return {code: width / 1000 for code, width in embedded_font(name).face.charWidths.items()}
+
+
+def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> str:
+    """Turn spaces of a text into line breaks where a line would be wider than `width` [m]; words stay whole."""
+    rows: list[str] = []
+    for word in text.split():
+        longer = f"{rows[-1]} {word}" if rows else word
+        if rows and text_width(longer, height, bold=bold) <= width:
+            rows[-1] = longer
+        else:
+            rows.append(word)
+    return "\n".join(rows)
+
 
 Item = TypeVar("Item")
 
@@ -114,8 +184,18 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     lines += [
         f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
     ]
-    if allowances := _allowance_words(piece):
-        lines.append(translate("Includes {allowances}", allowances=allowances))
+    # The legs of a dart that is cut away are sewn as a seam.
+    allowances = []
+    for kind in ("seam", "hem"):
+        alike = [e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind == "dart" and e.width > 0)]
+        values = [length_words(width, piece.units) for width in sorted({round(e.width, 4) for e in alike})]
+        if values:
+            # The unit once: "6/10 mm".
+            numbers = [value.removesuffix(f" {piece.units}") for value in values]
+            widths = f"{'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}"
+            allowances.append(translate(f"{kind} {{widths}}", widths=widths))
+    if allowances:
+        lines.append(translate("Includes {allowances}", allowances=", ".join(allowances)))
     title = garment.replace("_", " ")
     if title.upper() != lines[0]:
         lines.append(title)
@@ -134,20 +214,6 @@ def cutting_words(piece: Piece) -> str:
 def printed_size(size: str) -> str:
     """Return the words for a size as they are printed."""
     return translate("size {size}", size=size) if size_words(size) != size else translate(size)
-
-
-def _allowance_words(piece: Piece) -> str:
-    """Return the allowances of seams and hems; the legs of a dart that is cut away are sewn as a seam."""
-    words = []
-    for kind in ("seam", "hem"):
-        own = [e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind == "dart" and e.width > 0)]
-        values = [length_words(width, piece.units) for width in sorted({round(e.width, 4) for e in own})]
-        if values:
-            # The unit once: "6/10 mm".
-            numbers = [value.removesuffix(f" {piece.units}") for value in values]
-            widths = f"{'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}"
-            words.append(translate(f"{kind} {{widths}}", widths=widths))
-    return ", ".join(words)
 
 
 def place_label(
@@ -182,10 +248,26 @@ def place_label(
         found += [] if label is None else [label]
         if label is not None and _relative_size(label) >= ENOUGH:
             break
-    return (
-        max(found, key=_relative_size)
-        if found
-        else _label_beside(cut.buffer(0).difference(shapely.union_all(away)), texts)
+    if found:
+        return max(found, key=_relative_size)
+    # To the right of the cloth, with a leader to it at half its height.
+    cloth = cut.buffer(0).difference(shapely.union_all(away))
+    left, bottom, right, top = cloth.bounds
+    rows = tuple(
+        (wrap_text(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
+        for k, (text, height) in enumerate(texts)
+    )
+    beside = Label(at=np.zeros(2), lines=rows)
+    beside = beside.scaled(min(1.0, BESIDE_WIDTH / beside.width))
+    middle = (bottom + top) / 2
+    across = shapely.LineString([(left - 1, middle), (right + 1, middle)]).intersection(cloth)
+    near = max(shapely.get_parts(across), key=lambda part: part.bounds[2] if part.length > 0 else -np.inf)
+    target = near.bounds[2] - min(LEADER, near.length / 2)
+    start = right + BESIDE_GAP
+    return replace(
+        beside,
+        at=np.array([start + 0.001 + beside.width / 2, middle]),
+        leader=np.array([[start, middle], [target, middle]]),
     )
 
 
@@ -208,7 +290,11 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
     places = _Remembered(_roomy_places([part for part in parts if part.area > 1e-7]))
     best, reached = None, 0.0
     for label, penalty in _wrapped_labels(tuple(lines)):
-        shape = np.asarray(shapely.MultiPoint(_corners(label)).convex_hull.exterior.coords)
+        corners = []
+        for row in label.words():
+            half = np.array([text_width(row.text, row.height, bold=row.bold), row.height * LEADING]) / 2
+            corners.append(row.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        shape = np.asarray(shapely.MultiPoint(np.concatenate(corners)).convex_hull.exterior.coords)
         for part, at, angle in places:
             if reached >= 1.0:  # most often at the first place
                 break
@@ -253,15 +339,6 @@ def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Labe
                 yield Label(at=np.zeros(2), lines=rows), penalty * BROKEN**breaks
 
 
-def _corners(label: Label) -> FloatArray:
-    """Return the corners of all rows' boxes [m]."""
-    corners = []
-    for words in label.words():
-        half = np.array([text_width(words.text, words.height, bold=words.bold), words.height * LEADING]) / 2
-        corners.append(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    return np.concatenate(corners)
-
-
 def _roomy_places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, FloatArray, float]]:
     """Yield the centres of widest ellipses, each with its polygon and the angle of lines along it.
 
@@ -295,29 +372,6 @@ def _largest_factor(part: Polygon, shape: FloatArray, at: FloatArray, floor: flo
         middle = (low + high) / 2
         low, high = (middle, high) if fits(middle) else (low, middle)
     return low
-
-
-def _label_beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
-    """Place a label to the right of the cloth, with a leader to it at half its height."""
-    import shapely
-
-    left, bottom, right, top = cloth.bounds
-    rows = tuple(
-        (wrap_text(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
-        for k, (text, height) in enumerate(lines)
-    )
-    label = Label(at=np.zeros(2), lines=rows)
-    label = label.scaled(min(1.0, BESIDE_WIDTH / label.width))
-    middle = (bottom + top) / 2
-    across = shapely.LineString([(left - 1, middle), (right + 1, middle)]).intersection(cloth)
-    near = max(shapely.get_parts(across), key=lambda part: part.bounds[2] if part.length > 0 else -np.inf)
-    target = near.bounds[2] - min(LEADER, near.length / 2)
-    start = right + BESIDE_GAP
-    return replace(
-        label,
-        at=np.array([start + 0.001 + label.width / 2, middle]),
-        leader=np.array([[start, middle], [target, middle]]),
-    )
 
 
 def _rotation(angle: float) -> FloatArray:

@@ -91,7 +91,18 @@ def lay_out(
         points = occupied_points(group)
         boxes.append((points.min(axis=0), points.max(axis=0)))
     extents = [high - low for low, high in boxes] + ([np.array(reserved)] if reserved is not None else [])
-    rows = _rows(extents, width, gap)
+    # Boxes by falling height, each in the first row with room: (box, left edge).
+    rows: list[list[tuple[int, float]]] = []
+    ends: list[float] = []
+    for i in sorted(range(len(extents)), key=lambda i: (-float(extents[i][1]), i)):
+        wide = float(extents[i][0])
+        fits = [r for r, end in enumerate(ends) if end + gap + wide + gap <= width + 1e-9]
+        if fits:
+            rows[fits[0]].append((i, ends[fits[0]] + gap))
+            ends[fits[0]] += gap + wide
+        else:
+            rows.append([(i, gap)])
+            ends.append(gap + wide)
     top, places = 0.0, {}
     for row in rows:
         height = max(float(extents[i][1]) for i, _ in row)
@@ -110,19 +121,3 @@ def lay_out(
         matrix = np.column_stack([np.eye(2), offset])
         placed.append(Placed(pieces=tuple(group), matrix=matrix, box=np.stack([corners[i], corners[i] + extents[i]])))
     return Sheet(placed=tuple(placed), size=total, reserved=corners.get(len(groups)))
-
-
-def _rows(extents: Sequence[FloatArray], width: float, gap: float) -> list[list[tuple[int, float]]]:
-    """Return rows of (box, left edge): boxes by falling height, each in the first row with room."""
-    rows: list[list[tuple[int, float]]] = []
-    ends: list[float] = []
-    for i in sorted(range(len(extents)), key=lambda i: (-float(extents[i][1]), i)):
-        wide = float(extents[i][0])
-        fits = [r for r, end in enumerate(ends) if end + gap + wide + gap <= width + 1e-9]
-        if fits:
-            rows[fits[0]].append((i, ends[fits[0]] + gap))
-            ends[fits[0]] += gap + wide
-        else:
-            rows.append([(i, gap)])
-            ends.append(gap + wide)
-    return rows

@@ -16,9 +16,10 @@ from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.label import Label, fit_label, printed_size
 from warpflat.pattern.matched_lay import Stripes
 from warpflat.pattern.pieces import unknown_size
+from warpflat.pattern.tile_nesting import nest_on_strip
 from warpflat.pattern.words import printed_in, translate
 
-__all__ = ["Cloth", "Copy", "Marker", "make_marker"]
+__all__ = ["WIDTHS", "Cloth", "Copy", "Marker", "cloth_needed", "make_marker"]
 
 
 #: Copies are nested as polygons that are larger by up to this [m] and have far fewer corners.
@@ -298,11 +299,6 @@ def _mirror(edge: DraftedEdge) -> Callable[[FloatArray], FloatArray]:
     return lambda points: (points - start) @ turn.T + start
 
 
-def _slits(piece: DraftedPiece) -> list[FloatArray]:
-    """Return every notch from the cut line inwards, each 2 by 2 [m]."""
-    return [np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base]
-
-
 def _of_both_halves(piece: DraftedPiece, lines: list[FloatArray]) -> list[FloatArray]:
     """Return lines (#P by 2 [m]) of a piece, with their mirror images where it is a half on the fold."""
     for edge in piece.fold_edges:
@@ -373,7 +369,10 @@ def _placed(
         fold_lines=tuple(moved(edge.line) for edge in piece.fold_edges),
         grain=moved(piece.grain),
         name=None,
-        notches=tuple(moved(slit) for slit in both(_slits(piece))),
+        notches=tuple(
+            moved(slit)
+            for slit in both([np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base])
+        ),
     )
 
 
@@ -393,3 +392,30 @@ def _named(copy: Copy) -> Copy:
         if (name := fit_label(room, rows, least=LEAST)) is not None:
             break
     return replace(copy, name=name)
+
+
+#: Widths [m] at which cloth is sold.
+WIDTHS = (0.90, 1.15, 1.50)
+#: Between pieces, and unused at either selvedge [m].
+GAP, SELVEDGE = 0.006, 0.010
+
+
+def cloth_needed(garment: DraftedGarment, size: str) -> dict[str, tuple[float | None, ...]]:
+    """Return the length [m] of cloth for one garment at each of `WIDTHS`, by fabric; None where a piece is too wide.
+
+    Whole pieces are laid on one layer with their grain along it, either way up. The lay is quick and repeatable; a
+    marker (:func:`warpflat.pattern.marker.make_marker`) searches longer and finds shorter ones.
+    """
+    import shapely
+
+    shapes: dict[str, list[shapely.Polygon]] = {}
+    for piece in garment.pieces[size]:
+        whole = shapely.Polygon(unfold_piece(piece))
+        mirrored = shapely.transform(whole, lambda points: points * [-1.0, 1.0])
+        for cloth, quantity in cloths_of(piece).items():
+            pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
+            shapes.setdefault(cloth, []).extend(mirrored if pairs and k % 2 else whole for k in range(quantity))
+    return {
+        fabric: tuple(nest_on_strip(row, width=width - 2 * SELVEDGE, gap=GAP) for width in WIDTHS)
+        for fabric, row in shapes.items()
+    }

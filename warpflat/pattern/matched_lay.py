@@ -67,9 +67,40 @@ def lay_by_rule(
     Raises:
         InputError: a seam to be matched does not exist, or a piece is too wide.
     """
+    import shapely
+
     repeat = stripes.repeat
     cell = np.where(repeat > 0.0, repeat / np.maximum(1, np.ceil(repeat / CELL)), CELL)
-    phases = _phases(copies, stripes, garment)
+    # For each copy where its origin lies in the repeat [m]; not a number where it is not bound.
+    known = {seam.name: seam for seam in garment.garment.seams}
+    points: dict[str, list[tuple[int, FloatArray]]] = {}
+    for name in stripes.seams:
+        if name not in known:
+            raise InputError(f"match: no seam {name!r}; {nearest(name, known)}")
+        for side in (row[0] for row in known[name].sides):
+            for k, copy in enumerate(copies):
+                if copy.piece.name != side.piece:
+                    continue
+                notches = [notch for notch in copy.piece.notches if notch.seam == name]
+                line = copy.piece.edge(side.edge).line
+                at = min(notches, key=lambda n: n.length).at if notches else line[-1 if side.reversed else 0]
+                if all(k != other for other, _ in points.get(name, ())):
+                    points.setdefault(name, []).append((k, copy.linear @ at))
+    phases: list[FloatArray] = [np.full(2, np.nan) for _ in copies]
+    for start in range(len(copies)):
+        if np.isfinite(phases[start]).all() or all(k != start for joined in points.values() for k, _ in joined):
+            continue
+        phases[start], queue = np.zeros(2), [start]
+        while queue:
+            here = queue.pop()
+            for joined in points.values():
+                mine = next((at for k, at in joined if k == here), None)
+                if mine is None:
+                    continue
+                for k, at in joined:
+                    if not np.isfinite(phases[k]).all():
+                        phases[k] = phases[here] + mine - at
+                        queue.append(k)
     masks, lows = [], []
     for copy, phase in zip(copies, phases, strict=True):
         outline = copy.outline @ copy.linear.T
@@ -78,7 +109,16 @@ def lay_by_rule(
         into = np.where(np.isfinite(phase) & (repeat > 0), np.mod(np.nan_to_num(phase) + low, cell), 0.5 * gap)
         if copy.at_fold:
             into[1] = 0.0
-        masks.append(_mask(outline - low + into, cell, gap, at_fold=copy.at_fold))
+        # The cells that an outline touches, grown by half of the gap; x in rows, y in columns, from the origin.
+        grown = shapely.Polygon(outline - low + into).buffer(0.5 * gap)
+        if copy.at_fold:
+            grown = grown.intersection(shapely.box(-1.0, 0.0, 100.0, 100.0))
+        high = np.array(grown.bounds[2:])
+        tall, wide = np.maximum(1, np.ceil(high / cell - 1e-9)).astype(int)
+        shapely.prepare(grown)
+        x, y = cell[0] * np.arange(tall)[:, None], cell[1] * np.arange(wide)[None, :]
+        cells: BoolArray = shapely.intersects(grown, shapely.box(x, y, x + cell[0], y + cell[1]))
+        masks.append(Mask(cells=cells, quarters=0, extent=high))
         lows.append(low - into)
     across = int(np.floor(width / cell[1]))
     for copy, mask in zip(copies, masks, strict=True):
@@ -128,56 +168,3 @@ def lay_by_rule(
             )
         )  # fmt: skip
     return laid
-
-
-def _mask(outline: FloatArray, cell: FloatArray, gap: float, *, at_fold: bool) -> Mask:
-    """Return an outline as the cells that it touches, grown by half of the gap; x in rows, y in columns, from the origin."""
-    import shapely
-
-    grown = shapely.Polygon(outline).buffer(0.5 * gap)
-    if at_fold:
-        grown = grown.intersection(shapely.box(-1.0, 0.0, 100.0, 100.0))
-    high = np.array(grown.bounds[2:])
-    rows, columns = np.maximum(1, np.ceil(high / cell - 1e-9)).astype(int)
-    shapely.prepare(grown)
-    x, y = cell[0] * np.arange(rows)[:, None], cell[1] * np.arange(columns)[None, :]
-    cells: BoolArray = shapely.intersects(grown, shapely.box(x, y, x + cell[0], y + cell[1]))
-    return Mask(cells=cells, quarters=0, extent=high)
-
-
-def _phases(copies: Sequence[Laid], stripes: Stripes, garment: DraftedGarment) -> list[FloatArray]:
-    """Return for each copy where its origin lies in the repeat [m]; not a number where it is not bound.
-
-    Raises:
-        InputError: there is no such seam.
-    """
-    known = {seam.name: seam for seam in garment.garment.seams}
-    points: dict[str, list[tuple[int, FloatArray]]] = {}
-    for name in stripes.seams:
-        if name not in known:
-            raise InputError(f"match: no seam {name!r}; {nearest(name, known)}")
-        for side in (row[0] for row in known[name].sides):
-            for k, copy in enumerate(copies):
-                if copy.piece.name != side.piece:
-                    continue
-                notches = [notch for notch in copy.piece.notches if notch.seam == name]
-                line = copy.piece.edge(side.edge).line
-                at = min(notches, key=lambda n: n.length).at if notches else line[-1 if side.reversed else 0]
-                if all(k != other for other, _ in points.get(name, ())):
-                    points.setdefault(name, []).append((k, copy.linear @ at))
-    phases: list[FloatArray] = [np.full(2, np.nan) for _ in copies]
-    for start in range(len(copies)):
-        if np.isfinite(phases[start]).all() or all(k != start for rows in points.values() for k, _ in rows):
-            continue
-        phases[start], queue = np.zeros(2), [start]
-        while queue:
-            here = queue.pop()
-            for rows in points.values():
-                mine = next((at for k, at in rows if k == here), None)
-                if mine is None:
-                    continue
-                for k, at in rows:
-                    if not np.isfinite(phases[k]).all():
-                        phases[k] = phases[here] + mine - at
-                        queue.append(k)
-    return phases

@@ -37,6 +37,10 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
     for seam in seams:
         lines = [SeamLine(side, pieces) for side in seam.sides]
         first, second = (line.length for line in lines)
+        # Edges that come from no mesh have no common vertices.
+        worst = None
+        if all(edge.edge.vertices is not None for line in lines for edge in line.edges):
+            worst = worst_difference(lines[0].places, lines[1].places, seam.ease, seam.eased)
         reports.append(
             SeamReport(
                 name=seam.name,
@@ -45,7 +49,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
                 length_mm=(first * 1000, second * 1000),
                 ease=seam.ease,
                 difference_mm=(second - first * (1 + seam.ease)) * 1000,
-                local_mm=_local_difference(lines[0], lines[1], seam),
+                local_mm=None if worst is None else 1000 * worst,
             )
         )
     return reports
@@ -72,7 +76,11 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 notches.setdefault(piece, []).append(notch)
         for line, other in ((first, second), (second, first)):
             for joint in line.joints[1:-1] / line.length:
-                length = _opposite(seam, float(joint), forward=line is first) * other.length
+                # The joint's share of one side's length, and that of the place on the other side opposite to it.
+                shares = np.linspace(0.0, 1.0, 1001)
+                reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
+                table = (shares, reached) if line is first else (reached, shares)
+                length = float(np.interp(float(joint), *table)) * other.length
                 if np.abs(other.joints - length).min() > CLEAR and not other.mirrored(length):
                     single = other.notch(seam.name, length, double=False)
                     if single is not None:
@@ -95,13 +103,6 @@ def _notch_pair(seam: Seam, lines: Sequence[SeamLine], fraction: float) -> list[
         if len(matched) == len(found):
             return matched
     return []
-
-
-def _opposite(seam: Seam, share: float, *, forward: bool) -> float:
-    """Return the share of one side's length opposite to that of the other's; `forward`: from the first side to the second."""
-    shares = np.linspace(0.0, 1.0, 1001)
-    reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
-    return float(np.interp(share, *((shares, reached) if forward else (reached, shares))))
 
 
 def _fractions(seam: Seam, first: SeamLine, second: SeamLine) -> list[float]:
@@ -167,14 +168,6 @@ def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_li
     if len(hits) == 0:
         return None
     return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])
-
-
-def _local_difference(one: SeamLine, other: SeamLine, seam: Seam) -> float | None:
-    """Return the worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
-    if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
-        return None
-    worst = worst_difference(one.places, other.places, seam.ease, seam.eased)
-    return None if worst is None else 1000 * worst
 
 
 class SeamLine:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,18 +14,16 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
 from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
-from warpflat.pattern.piece_checks import check_piece
-from warpflat.pattern.piece_parts import SAME_POINT, Dart, Edge, Hole, check_points
+from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
 from warpflat.pattern.seam_difference import eased_length
 from warpflat.pattern.words import translate_name
+from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
-__all__ = [
-    "Garment",
-    "Piece",
-    "Seam",
-    "SeamSide",
-    "unknown_size",
-]
+if TYPE_CHECKING:
+    import shapely
+
+__all__ = ["Garment", "Piece", "Seam", "SeamSide", "unknown_size"]
+
 
 ROLES = ("shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket")
 
@@ -201,42 +201,36 @@ class Garment:
         if not self.pieces or not all(self.pieces.values()):
             raise InputError(f"garment {self.name!r} has no pieces; every size needs at least one")
         for size, pieces in self.pieces.items():
-            self._check_pieces(size, pieces)
-            self._check_seams(size)
+            # Every size has the same pieces, each once.
+            names = [piece.name for piece in pieces]
+            doubled = sorted({n for n in names if names.count(n) > 1})
+            if doubled:
+                raise InputError(
+                    f"garment {self.name!r}{f', size {size}' if size else ''}: piece {doubled[0]!r} occurs twice; names are unique"
+                )
+            expected = {piece.name for piece in next(iter(self.pieces.values()))}
+            if set(names) != expected:
+                odd = sorted(set(names) ^ expected)[0]
+                raise InputError(
+                    f"garment {self.name!r}: piece {odd!r} is not in every size; all sizes have the same pieces"
+                )
+            for piece in pieces:
+                if piece.size != size:
+                    raise InputError(f"piece {piece.name!r} says size {piece.size!r} but is listed under {size!r}")
+            # Every seam's edges exist in every size, and none is on the fold.
+            for seam in self.seams:
+                for side in (*seam.sides[0], *seam.sides[1]):
+                    try:
+                        edge = self.piece(side.piece, size).edge(side.edge)
+                    except InputError as error:
+                        raise InputError(f"seam {seam.name!r}{f', size {size}' if size else ''}: {error}") from None
+                    if edge.kind == "fold":
+                        raise InputError(f"seam {seam.name!r}: edge {side} lies on the fold and cannot be sewn")
         if self.sample_size is not None and self.sample_size not in self.pieces:
             raise unknown_size(self.name, self.sample_size, self.pieces)
         seen = [seam.name for seam in self.seams]
         if len(set(seen)) < len(seen):
             raise InputError(f"garment {self.name!r}: a seam's name occurs twice; names are unique")
-
-    def _check_pieces(self, size: str, pieces: Sequence[Piece]) -> None:
-        """Check that one size has the same pieces as the first one, each once."""
-        names = [piece.name for piece in pieces]
-        doubled = sorted({n for n in names if names.count(n) > 1})
-        if doubled:
-            raise InputError(
-                f"garment {self.name!r}{f', size {size}' if size else ''}: piece {doubled[0]!r} occurs twice; names are unique"
-            )
-        expected = {piece.name for piece in next(iter(self.pieces.values()))}
-        if set(names) != expected:
-            odd = sorted(set(names) ^ expected)[0]
-            raise InputError(
-                f"garment {self.name!r}: piece {odd!r} is not in every size; all sizes have the same pieces"
-            )
-        for piece in pieces:
-            if piece.size != size:
-                raise InputError(f"piece {piece.name!r} says size {piece.size!r} but is listed under {size!r}")
-
-    def _check_seams(self, size: str) -> None:
-        """Check that every seam's edges exist in one size and are not on the fold."""
-        for seam in self.seams:
-            for side in (*seam.sides[0], *seam.sides[1]):
-                try:
-                    edge = self.piece(side.piece, size).edge(side.edge)
-                except InputError as error:
-                    raise InputError(f"seam {seam.name!r}{f', size {size}' if size else ''}: {error}") from None
-                if edge.kind == "fold":
-                    raise InputError(f"seam {seam.name!r}: edge {side} lies on the fold and cannot be sewn")
 
     @property
     def sizes(self) -> tuple[str, ...]:
@@ -276,3 +270,113 @@ def unknown_size(garment: str, size: str, sizes: Iterable[str]) -> InputError:
     if tuple(sizes) == ("",):
         return InputError(f"garment {garment!r} has no sizes: it is not graded; leave {size!r} out")
     return InputError(f"garment {garment!r} has no size {size!r}; {nearest(size, sizes)}")
+
+
+# A place in Shapely's messages: "Self-intersection[0.036 0.674]".
+_PLACE = re.compile(r"\[(\S+) (\S+)\]")
+
+
+def check_piece(
+    where: str, *, edges: Sequence[Edge], darts: Sequence[Dart], holes: Sequence[Hole], lines: Mapping[str, FloatArray]
+) -> None:
+    """Check a piece of a pattern.
+
+    Args:
+        where: what messages begin with.
+        edges, darts, holes: of the piece.
+        lines: inside it, by name.
+
+    Raises:
+        InputError: a name that is unfit or occurs twice, edges that do not follow each other around a simple outline, a fold that is
+            not straight, a dart whose legs are none, or a hole that crosses itself.
+    """
+    import shapely
+
+    # Names are printable and unique.
+    for what, names in (
+        ("edge", [e.name for e in edges]),
+        ("dart", [d.name for d in darts]),
+        ("hole", [h.name for h in holes]),
+        ("line", list(lines)),
+    ):
+        for name in names:
+            check_label(name, f"{where}: {what}")
+        doubled = sorted({n for n in names if names.count(n) > 1})
+        if doubled:
+            raise InputError(f"{where}: {what} {doubled[0]!r} occurs twice; names are unique in a piece")
+    # Edges follow each other around a simple outline, counter-clockwise.
+    if not edges:
+        raise InputError(f"{where} has no edges; its outline needs at least one")
+    for edge, follows in zip(edges, [*edges[1:], edges[0]], strict=True):
+        gap = float(np.linalg.norm(edge.points[-1] - follows.points[0]))
+        if gap > SAME_POINT:
+            raise InputError(
+                f"{where}: edge {edge.name!r} ends {gap * 1000:.3f} mm from where {follows.name!r} starts; "
+                "edges follow each other and share their corners"
+            )
+        if edge.kind == "fold":
+            start, end = edge.points[0], edge.points[-1]
+            span = float(np.linalg.norm(end - start))
+            if span < SAME_POINT:
+                raise InputError(f"{where}: fold edge {edge.name!r} is closed; a fold is straight")
+            direction = (end - start) / span
+            offset = edge.points - start
+            stray = float(np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0]).max())
+            if stray > FOLD_STRAIGHT:
+                raise InputError(
+                    f"{where}: fold edge {edge.name!r} strays {stray * 1000:.2f} mm from straight; a fold strays at most "
+                    f"{FOLD_STRAIGHT * 1000:.1f} mm (constrain it to a line)"
+                )
+    outline = np.concatenate([edge.points[:-1] for edge in edges])
+    if len(outline) < 3:
+        raise InputError(f"{where}: the outline has {len(outline)} points; it needs at least 3")
+    polygon = shapely.Polygon(outline)
+    if not polygon.is_valid or polygon.area <= 0:
+        raise InputError(f"{where}: the outline {_outline_fault(polygon)}")
+    if not polygon.exterior.is_ccw:
+        raise InputError(f"{where}: the outline runs clockwise; list its edges counter-clockwise")
+    # A dart's legs are edges of its kind that follow each other.
+    by_name = {edge.name: edge for edge in edges}
+    names = list(by_name)
+    legs = []
+    for dart in darts:
+        for leg in (dart.left, dart.right):
+            if leg not in by_name:
+                raise InputError(f"{where} has no edge {leg!r}; {nearest(leg, names)}")
+            if by_name[leg].kind != "dart":
+                raise InputError(
+                    f"{where}: dart {dart.name!r} uses edge {leg!r} of kind {by_name[leg].kind!r}, not 'dart'"
+                )
+        if names[(names.index(dart.left) + 1) % len(names)] != dart.right:
+            raise InputError(
+                f"{where}: dart {dart.name!r}: edge {dart.right!r} must follow {dart.left!r} (the left leg comes "
+                "first, counter-clockwise, and ends in the tip)"
+            )
+        legs += [dart.left, dart.right]
+    for edge in edges:
+        if edge.kind == "dart" and legs.count(edge.name) != 1:
+            raise InputError(
+                f"{where}: edge {edge.name!r} is of kind 'dart' but belongs to {legs.count(edge.name)} darts, not 1"
+            )
+    # The cloth around holes does not overlap.
+    for hole in holes:
+        width = overlap_width(hole.points)
+        if width <= OVERLAP:
+            continue
+        if hole.kind == "dart":
+            raise InputError(f"{where}: dart {hole.name!r} {overlapping(width)}")
+        raise InputError(
+            f"{where}: the cloth around hole {hole.name!r} lies on itself by {width * 1000:.1f} mm; a hole runs "
+            "counter-clockwise and does not cross itself"
+        )
+
+
+def _outline_fault(polygon: shapely.Polygon) -> str:
+    """Return why a closed line is no outline, and what to do about it."""
+    import shapely
+
+    if polygon.length <= 0 or polygon.convex_hull.area <= 1e-9 * polygon.length**2:
+        return "encloses no area"
+    place = _PLACE.search(shapely.is_valid_reason(polygon))
+    at = "" if place is None else f" at ({1e3 * float(place[1]):.1f}, {1e3 * float(place[2]):.1f}) mm in the plane"
+    return f"crosses itself{at}: flat, the piece lies over itself there; cut it apart, so that no piece does"

@@ -57,17 +57,13 @@ def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
     """Return what each piece is called: one that is cut in pairs has no side."""
     titles = {
         piece.name: translate_name(without_side(piece.name))
-        if _in_pairs(piece) and not piece.title
+        if piece.paired and piece.quantity % 2 == 0 and not piece.on_fold and not piece.title
         else piece.printed_name
         for piece in pieces
     }
     plain = list(titles.values())
     names = {piece.name: piece.printed_name for piece in pieces}
     return {name: title if plain.count(title) == 1 else names[name] for name, title in titles.items()}
-
-
-def _in_pairs(piece: Piece) -> bool:
-    return piece.paired and piece.quantity % 2 == 0 and not piece.on_fold
 
 
 def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
@@ -122,16 +118,28 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
                 pleats="; ".join(pleats),
             )
         )
-    patches = [titles[piece.name] for piece in pieces if piece.piece.role == "pocket" and _is_patch(piece)]
+    patches = [
+        titles[piece.name]
+        for piece in pieces
+        if piece.piece.role == "pocket" and any(edge.kind == "hem" for edge in piece.edges)
+    ]
     if patches:
         steps.append(
             translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=", ".join(patches))
         )
     seams = sewn_seams(garment, size)
     for stage in sorted({seam.stage for seam in seams}):
-        own = [seam for seam in seams if seam.stage == stage]
         what = translate(_STAGES[stage][0] if stage < len(_STAGES) else "Sew")
-        parts = [f"{seam.letter} ({_join(seam)}{_eased(seam)})" for seam in own]
+        parts = []
+        for seam in (seam for seam in seams if seam.stage == stage):
+            first, second = seam.sides
+            words = translate("{seam}: {first} to {second}", seam=seam.name, first=first, second=second)
+            if first == second:
+                words = translate("{seam} of the {first}", seam=seam.name, first=first)
+            if abs(seam.ease) >= 5e-4:
+                longer, share = (second, seam.ease) if seam.ease > 0 else (first, 1.0 / (1.0 + seam.ease) - 1.0)
+                words += translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
+            parts.append(f"{seam.letter} ({words})")
         steps.append(translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(parts)))
     free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
     if free:
@@ -139,7 +147,19 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     hems = _free_edges(pieces, garment.garment.seams, titles, ("hem",))
     if hems:
         steps.append(translate("Turn up and sew the hems: {edges}.", edges=hems))
-    return (*steps, *_button_steps(pieces, titles))
+    buttons = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
+    return (
+        *steps,
+        *[
+            translate(
+                "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
+                count=count,
+                title=title,
+            )
+            for title, count in buttons.items()
+            if count > 1
+        ],
+    )
 
 
 def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
@@ -162,24 +182,6 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
     return 0
 
 
-def _is_patch(piece: DraftedPiece) -> bool:
-    return any(edge.kind == "hem" for edge in piece.edges)
-
-
-def _button_steps(pieces: Sequence[DraftedPiece], titles: Mapping[str, str]) -> list[str]:
-    """Return the steps for buttons."""
-    own = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
-    return [
-        translate(
-            "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
-            count=count,
-            title=title,
-        )
-        for title, count in own.items()
-        if count > 1
-    ]
-
-
 def _letter(number: int) -> str:
     """Return A, B, ... Z, AA, AB, ..."""
     letters = ""
@@ -192,21 +194,6 @@ def _letter(number: int) -> str:
 
 def _words(side: Sequence[SeamSide], titles: Mapping[str, str]) -> str:
     return " + ".join(dict.fromkeys(titles[part.piece] for part in side))
-
-
-def _join(seam: SewnSeam) -> str:
-    first, second = seam.sides
-    if first == second:
-        return translate("{seam} of the {first}", seam=seam.name, first=first)
-    return translate("{seam}: {first} to {second}", seam=seam.name, first=first, second=second)
-
-
-def _eased(seam: SewnSeam) -> str:
-    if abs(seam.ease) < 5e-4:
-        return ""
-    longer = seam.sides[1] if seam.ease > 0 else seam.sides[0]
-    share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
-    return translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
 
 
 def _dart_names(piece: DraftedPiece, *, pleats: bool = False) -> list[str]:
@@ -226,9 +213,9 @@ def _free_edges(
     for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
         for edge in piece.piece.edges:
             if edge.kind in kinds and (piece.name, edge.name) not in sewn:
-                own = found.setdefault(translate_name(without_side(edge.name)), [])
-                own += [] if titles[piece.name] in own else [titles[piece.name]]
-    return "; ".join(f"{name} ({', '.join(own)})" for name, own in found.items())
+                of_edge = found.setdefault(translate_name(without_side(edge.name)), [])
+                of_edge += [] if titles[piece.name] in of_edge else [titles[piece.name]]
+    return "; ".join(f"{name} ({', '.join(of_edge)})" for name, of_edge in found.items())
 
 
 def _listed(names: Sequence[str]) -> str:

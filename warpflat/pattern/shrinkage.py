@@ -10,7 +10,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.curves import Curve
-from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
+from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 
 __all__ = ["Shrinkage", "enlarged"]
 
@@ -77,10 +77,19 @@ def _larger(piece: DraftedPiece, shrinkage: Shrinkage) -> DraftedPiece:
         replace(notch, at=notch.at * factors, base=tuple(base * factors for base in notch.base))
         for notch in piece.notches
     ]
+    edges = [
+        replace(
+            edge,
+            curve=Curve(bezier=edge.curve.bezier * factors, straight=edge.curve.straight),
+            line=edge.line * factors,
+            places=np.interp(edge.places, arc_lengths(edge.line), arc_lengths(edge.line * factors)),
+        )
+        for edge in piece.edges
+    ]
     leader = None if piece.label.leader is None else piece.label.leader * factors
     return replace(
         piece,
-        edges=tuple(_larger_edge(edge, factors) for edge in piece.edges),
+        edges=tuple(edges),
         cut_line=piece.cut_line * factors,
         darts=tuple(darts),
         drill_holes=tuple(replace(hole, at=hole.at * factors) for hole in piece.drill_holes),
@@ -92,15 +101,4 @@ def _larger(piece: DraftedPiece, shrinkage: Shrinkage) -> DraftedPiece:
         label=replace(piece.label, at=piece.label.at * factors, leader=leader),
         notes=(*piece.notes, shrinkage.words),
         enlarged=(float(factors[0]), float(factors[1])),
-    )
-
-
-def _larger_edge(edge: DraftedEdge, factors: FloatArray) -> DraftedEdge:
-    before = arc_lengths(edge.line)
-    line = edge.line * factors
-    return replace(
-        edge,
-        curve=Curve(bezier=edge.curve.bezier * factors, straight=edge.curve.straight),
-        line=line,
-        places=np.interp(edge.places, before, arc_lengths(line)),
     )

@@ -98,17 +98,11 @@ def allowance_strip(side: Side, body: Polygon) -> Geometry:
         if (fill := corner_fill(corner, a, b, side.width, side.width)) is not None
     ]
     strip = difference(union([*quads, *fills]), body)
-    return _parts_along(strip, side.points)
-
-
-def _parts_along(strip: Geometry, line: FloatArray) -> Geometry:
-    """Keep the parts of a strip along its edge: a wide strip may pass through a narrow piece and come out again."""
-    import shapely
-
+    # The strip keeps its parts along its edge: a wide strip may pass through a narrow piece and come out again.
     parts = shapely.get_parts(strip)
     if len(parts) <= 1:
         return strip
-    edge = shapely.LineString(line)
+    edge = shapely.LineString(side.points)
     kept = [part for part in parts if part.buffer(2 * GRID).intersection(edge).length > 1e-5]
     return union(kept)
 

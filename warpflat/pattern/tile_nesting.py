@@ -101,7 +101,11 @@ def nest_on_tiles(
     masks = [_masks(shape, cell, gap, (0, 1, 2, 3)) for shape in shapes]
     total = sum(float(shape.area) for shape in shapes)
     needed = int(np.ceil(total / float(np.prod(step))))
-    counts = _column_counts(masks, per_tile, shared, needed)
+    # The numbers of columns that are tried: around a square sheet, and wide enough for every shape.
+    narrowest = max(min(mask.cells.shape[1] for mask in row) for row in masks)
+    least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
+    square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
+    counts = list(range(least, max(least, square) + 3))
     heights = [_heights(masks, count, per_tile, shared) for count in counts]
     sizes = [(max(height) + needed // count + 2, count) for count, height in zip(counts, heights, strict=True)]
     # Where shapes do not fit together there is room at last for all above each other.
@@ -116,7 +120,18 @@ def nest_on_tiles(
                 if laid is not None and (best is None or laid[0] < best[0]):
                     best = laid
     assert best is not None
-    return _places(best[1], cell, step, overlap, gap)
+    # Places on the sheet [m], y upwards, and its size, without unused rows and columns at its end.
+    shapes_laid = best[1]
+    margin = gap / 2 + CELL / 20
+    right = max(column * cell[0] + mask.extent[0] for mask, _, column in shapes_laid) + 2 * margin
+    lower = max(row * cell[1] + mask.extent[1] for mask, row, _ in shapes_laid) + 2 * margin
+    size = np.maximum(1, np.ceil((np.array([right, lower]) - overlap) / step - 1e-9)) * step + overlap
+    places = []
+    for mask, row, column in shapes_laid:
+        top = size[1] - row * cell[1] - margin
+        corner = np.array([column * cell[0] + margin, top - mask.extent[1]])
+        places.append(TurnedShape(quarters=mask.quarters, corner=corner))
+    return places, size
 
 
 def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> float | None:
@@ -135,19 +150,17 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
         places.clear()
         length = 0
         for k in order:
-            found = [(*_highest(places, mask), mask) for mask in masks[k]]
+            # The first free place (row, column) of each mask.
+            found = []
+            for mask in masks[k]:
+                free = places.free(mask)
+                row = int(np.argmax(free.any(axis=1)))
+                found.append((row, int(np.argmax(free[row])), mask))
             row, column, mask = min(found, key=lambda item: (max(length, item[0] + len(item[2].cells)), item[0]))
             places.take(mask, row, column)
             length = max(length, row + len(mask.cells))
         lengths.append(length)
     return min(lengths) * float(cell[1])
-
-
-def _highest(places: Places, mask: Mask) -> tuple[int, int]:
-    """Return the first free place (row, column) of a mask."""
-    free = places.free(mask)
-    row = int(np.argmax(free.any(axis=1)))
-    return row, int(np.argmax(free[row]))
 
 
 def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -> list[Mask]:
@@ -189,16 +202,6 @@ def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: t
     return np.ascontiguousarray(cells)
 
 
-def _column_counts(
-    masks: Sequence[Sequence[Mask]], per_tile: tuple[int, ...], shared: tuple[int, int], needed: int
-) -> list[int]:
-    """Return the numbers of columns that are tried: around a square sheet, and wide enough for every shape."""
-    narrowest = max(min(mask.cells.shape[1] for mask in row) for row in masks)
-    least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
-    square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
-    return list(range(least, max(least, square) + 3))
-
-
 def _heights(
     masks: Sequence[Sequence[Mask]], columns: int, per_tile: tuple[int, ...], shared: tuple[int, int]
 ) -> list[int]:
@@ -231,7 +234,23 @@ def _lay(
         for mask in masks[k]:
             if (np.array(mask.cells.shape) > sheet.occupied.shape).any():
                 continue
-            price = _prices(mask, used, grid, sheet.free(mask))
+            # A place costs the new tiles that it takes, and a little for rows, columns and distance.
+            free = sheet.free(mask)
+            (per_row, per_column), tile_rows = grid.per_tile, grid.tiles[0]
+            down, across = free.shape
+            touched, cells = grid.touched(mask), mask.cells
+            over = touched.shape[1], touched.shape[3]
+            new = np.pad(np.where(used, 0.0, 1.0), ((0, over[0]), (0, over[1])))
+            windows = np.lib.stride_tricks.sliding_window_view(new, over)  # by the tile where a mask starts
+            cost = np.tensordot(windows, touched, axes=([2, 3], [1, 3])).transpose(0, 2, 1, 3)
+            flat = cost.reshape((tile_rows + 1) * per_row, -1)[:down, :across]
+            r, c = np.arange(down)[:, None], np.arange(across)[None, :]
+            # Among places that take equally few tiles: a compact sheet, and the upper left.
+            lower, right = (r + cells.shape[0]) / per_row, (c + cells.shape[1]) / per_column
+            lowest = int(np.flatnonzero(used.any(axis=1))[-1]) + 1 if used.any() else 0
+            widest = int(np.flatnonzero(used.any(axis=0))[-1]) + 1 if used.any() else 0
+            spread = SPREAD * (np.maximum(0, np.ceil(lower) - lowest) + np.maximum(0, np.ceil(right) - widest))
+            price = np.where(free, flat + spread + 1e-3 * (lower + right), np.inf)
             row, column = divmod(int(np.argmin(price)), price.shape[1])
             if np.isfinite(price[row, column]) and (best is None or price[row, column] < best[0] - 1e-9):
                 best = float(price[row, column]), mask, row, column
@@ -242,25 +261,6 @@ def _lay(
         used |= _touched(best[1].cells, best[2], best[3], grid)
     spread = SPREAD * (int(used.any(axis=1).sum()) + int(used.any(axis=0).sum()))
     return float(used.sum()) + spread, [places[k] for k in range(len(masks))]
-
-
-def _prices(mask: Mask, used: BoolArray, grid: _Grid, free: BoolArray) -> FloatArray:
-    """Return for every place of a mask how many new tiles it takes, and a little for rows, columns and distance."""
-    (per_row, per_column), tile_rows = grid.per_tile, grid.tiles[0]
-    down, across = free.shape
-    touched, cells = grid.touched(mask), mask.cells
-    over = touched.shape[1], touched.shape[3]
-    new = np.pad(np.where(used, 0.0, 1.0), ((0, over[0]), (0, over[1])))
-    windows = np.lib.stride_tricks.sliding_window_view(new, over)  # by the tile where a mask starts
-    price = np.tensordot(windows, touched, axes=([2, 3], [1, 3])).transpose(0, 2, 1, 3)
-    flat = price.reshape((tile_rows + 1) * per_row, -1)[:down, :across]
-    r, c = np.arange(down)[:, None], np.arange(across)[None, :]
-    # Among places that take equally few tiles: a compact sheet, and the upper left.
-    lower, right = (r + cells.shape[0]) / per_row, (c + cells.shape[1]) / per_column
-    lowest = int(np.flatnonzero(used.any(axis=1))[-1]) + 1 if used.any() else 0
-    widest = int(np.flatnonzero(used.any(axis=0))[-1]) + 1 if used.any() else 0
-    spread = SPREAD * (np.maximum(0, np.ceil(lower) - lowest) + np.maximum(0, np.ceil(right) - widest))
-    return np.where(free, flat + spread + 1e-3 * (lower + right), np.inf)
 
 
 def _blocks(size: int, per_tile: int, shared: int) -> tuple[IntArray, IntArray]:
@@ -339,20 +339,3 @@ class Places:
         """Take everything away."""
         self.occupied[:] = False
         self._here = None
-
-
-def _places(
-    laid: Sequence[tuple[Mask, int, int]], cell: FloatArray, step: FloatArray, overlap: float, gap: float
-) -> tuple[list[TurnedShape], FloatArray]:
-    """Return places on the sheet [m], y upwards, and its size, without unused rows and columns at its end."""
-    margin = gap / 2 + CELL / 20
-    right = max(column * cell[0] + mask.extent[0] for mask, _, column in laid) + 2 * margin
-    lower = max(row * cell[1] + mask.extent[1] for mask, row, _ in laid) + 2 * margin
-    tiles = np.maximum(1, np.ceil((np.array([right, lower]) - overlap) / step - 1e-9))
-    size = tiles * step + overlap
-    places = []
-    for mask, row, column in laid:
-        top = size[1] - row * cell[1] - margin
-        corner = np.array([column * cell[0] + margin, top - mask.extent[1]])
-        places.append(TurnedShape(quarters=mask.quarters, corner=corner))
-    return places, size

@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import zlib
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -21,9 +21,8 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
 from warpflat.core.usd_process import UNREADABLE, read_apart
-from warpflat.export.colours import energy_colours
+from warpflat.export.colours import VertexColours, energy_colours
 from warpflat.export.geometry import face_areas, outline_edges
-from warpflat.export.usd_colours import VertexColours
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
@@ -79,12 +78,12 @@ class FilmPiece:
         """Return the topology at a frame."""
         counts = np.asarray(self._pattern.GetFaceVertexCountsAttr().Get(time))
         corners = np.array(self._pattern.GetFaceVertexIndicesAttr().Get(time), dtype=np.int32)
-        own = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
+        on_surface = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
         space = np.array(self._surface.GetPointsAttr().Get(), dtype=np.float64)
         faces = np.full((len(counts), 4), -1, dtype=np.int32)
         faces[np.arange(4) < counts[:, None]] = corners
         origin = np.zeros(int(corners.max()) + 1, dtype=np.int32)
-        origin[corners] = own
+        origin[corners] = on_surface
         return Shape(faces=faces, surface=space[origin])
 
     def positions(self, time: int, count: int) -> FloatArray:
@@ -240,14 +239,16 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
         )
         blocks += [_planes(triangles.astype(np.uint32)), _planes(edges.astype(np.uint32))]
         blocks.append(_planes(space.steps(shape.surface)))
-    layouts = [
-        (number, shape, piece.positions(time, len(shape.surface)), time)
-        for number, shape, time in _at(piece, shapes, stored)
-    ]
-    box = _Box(np.concatenate([positions for _, _, positions, _ in layouts]))
+    layouts = []
+    for time in stored:
+        number, at = sum(change <= time for change in piece.changes) - 1, min(time, piece.times[-1])
+        layouts.append((number, piece.positions(at, len(shapes[number].surface)), at))
+    box = _Box(np.concatenate([positions for _, positions, _ in layouts]))
     before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
-    painted = [VertexColours(shape.faces, _areas(shape), len(shape.surface)) for shape in shapes]
-    for number, _, positions, time in layouts:
+    painted = [
+        VertexColours(shape.faces, face_areas(shape.surface, shape.faces), len(shape.surface)) for shape in shapes
+    ]
+    for number, positions, time in layouts:
         steps, colours = box.steps(positions), piece.rows(time, painted[number])
         same = before is not None and before[0] == number
         blocks.append(_planes(steps - before[1] if same and before else steps))
@@ -264,20 +265,8 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
     return entry, blocks
 
 
-def _areas(shape: Shape) -> FloatArray:
-    """Return the areas of the faces on the surface, #F [m2]."""
-    return face_areas(shape.surface, shape.faces)
-
-
-def _at(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> Iterator[tuple[int, Shape, int]]:
-    """Yield for each stored frame the number of its topology, that topology, and the frame."""
-    for time in stored:
-        number = sum(change <= time for change in piece.changes) - 1
-        yield number, shapes[number], min(time, piece.times[-1])
-
-
 class _Box:
-    """A box around points, in which places are told in 65,535 steps along its longest side."""
+    """A box around points, with 65,535 steps along its longest side."""
 
     def __init__(self, points: FloatArray) -> None:
         self._low = points.min(axis=0)

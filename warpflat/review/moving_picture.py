@@ -52,7 +52,10 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
         pieces = open_film(folder / "frames.usdc")
         if film:
             images = _images(pieces, _evenly(pieces[0].times, _FRAMES), _LONG_SIDE)
-            _save(folder / "film.webp", images, loop=0, duration=_durations(pieces[0].times, len(images)), quality=80)
+            count = len(images)
+            # The last frame stays for a moment.
+            durations = [round(1000 * len(pieces[0].times) / _RATE / count)] * (count - 1) + [1500]
+            _save(folder / "film.webp", images, loop=0, duration=durations, quality=80)
             written.append("film.webp")
         if sheet:
             columns, rows = _SHEET
@@ -71,11 +74,6 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
 def _evenly(times: Sequence[int], most: int) -> list[int]:
     picked = np.unique(np.round(np.linspace(0, len(times) - 1, min(most, len(times)))).astype(int))
     return [times[number] for number in picked]
-
-
-def _durations(times: Sequence[int], count: int) -> list[int]:
-    """Return how long each picture is shown [ms]; the last one for a second and a half."""
-    return [round(1000 * len(times) / _RATE / count)] * (count - 1) + [1500]
 
 
 def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -> list[Image.Image]:

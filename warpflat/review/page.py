@@ -17,11 +17,12 @@ from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import guarded, open_file, read_result
 from warpflat.core.output import atomic_path, latest_file, recorded_files
+from warpflat.core.text import energy_words
 from warpflat.export.colours import SMALLEST_SCALE
 from warpflat.review.film import open_film, pack_film, pack_foreign_film
-from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
 
 __all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
+
 
 # Nothing on the page may ask for anything from elsewhere, nor from the disk.
 _POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
@@ -80,7 +81,11 @@ def pack_frames(folder: Path) -> dict[str, Any] | None:
 
 def pack_pictures(folder: Path, files: Sequence[str]) -> dict[str, str]:
     """Pack the pictures among the files of a folder for the page; return them by name."""
-    return {file: _image(latest_file(folder / file)) for file in files if _is_shown(file)}
+    return {
+        file: _image(latest_file(folder / file))
+        for file in files
+        if file.endswith(".png") and file != "contact_sheet.png"
+    }
 
 
 def write_review(
@@ -124,21 +129,94 @@ def _page(
     film, packed = "", None
     if "frames.usdc" in files:
         packed = packed_film()
-        film = (
-            _film_section(packed)
-            if packed
-            else "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
-        )
+        film = "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
+        if packed:
+            # No text of a film may end the script it stands in.
+            data = json.dumps(packed, separators=(",", ":")).replace("<", "\\u003c")
+            buttons = "".join(
+                f'<button data-view="{view}">{view.capitalize()}</button>'
+                for view in ("all", "front", "side", "back", "pattern")
+            )
+            colours = base64.b64decode(packed["colours"])
+            stops = ",".join(
+                f"rgb({colours[i]},{colours[i + 1]},{colours[i + 2]})" for i in range(0, len(colours), 3 * 15)
+            )
+            hint = "drag to turn, shift-drag to move, wheel to zoom"
+            scale = f'0 <i style="background:linear-gradient(90deg,{stops})"></i> {packed["scale"]:.3g} J/m² strain energy density · '
+            if packed["scale"] <= SMALLEST_SCALE:
+                scale = "No strain energy: the cloth lies flat without strain · "
+            film = (
+                f'<div class="stage"><canvas id="view"></canvas><div class="bar"><button id="play">Play</button>'
+                f'<input id="slider" type="range" min="0" value="0" aria-label="frame"><span id="label"></span>{buttons}</div>'
+                f'<div class="scale">{scale}{hint}</div></div>'
+                f'<script id="film" type="application/json">{data}</script>'
+            )
     notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
+    shown = {**pack_pictures(folder, [file for file in files if file not in pictures]), **pictures}
+    order = sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
+    drawings = []
+    for file in sorted(file for file in files if file.endswith(".svg")):
+        text = base64.b64encode(_bytes(latest_file(folder / file))).decode("ascii")
+        drawings.append(f'<img class="drawing" alt="{escape(file)}" src="data:image/svg+xml;base64,{text}">')
+    # The verdict and the numbers that a reviewer looks at first.
+    pieces = metrics["pieces"].values()
+    flips = sum(piece["flipped_faces"] for piece in pieces)
+    unfinished = [name for name, piece in metrics["pieces"].items() if not piece["converged"]]
+    overlap = sum(piece.get("overlap_m2", 0.0) for piece in pieces)
+    wrong = [
+        *([f"not at rest: {', '.join(unfinished)}"] if unfinished else []),
+        *([f"{flips} flipped faces"] if flips else []),
+        *([f"{1e6 * overlap:.3g} mm² lie over each other"] if overlap else []),
+    ]
+    verdict = (
+        f'<p class="verdict bad">{escape("; ".join(wrong))}</p>'
+        if wrong
+        else '<p class="verdict good">At rest, no flipped faces, no overlap.</p>'
+    )
+    area = sum(piece["area_m2"] for piece in pieces)
+    cards = [
+        (energy_words(sum(piece["strain_energy_j"] for piece in pieces)), "strain energy"),
+        (f"{100 * max(piece['length_error'] for piece in pieces):.2g} %", "largest length error"),
+        (f"{100 * max(piece['area_error'] for piece in pieces):.2g} %", "largest area error"),
+        (f"{area:.3g} m²", "cloth"),
+        (str(len(metrics["pieces"])), "piece" if len(metrics["pieces"]) == 1 else "pieces"),
+        (", ".join(sorted({piece["fabric"] for piece in pieces})), "fabric"),
+    ]
+    if metrics.get("seams"):
+        worst = max(abs(seam["difference_mm"]) for seam in metrics["seams"])
+        cards.insert(3, (f"{worst:.2f} mm", "largest seam difference"))
+    boxes = "".join(f'<div class="card"><b>{escape(value)}</b><span>{what}</span></div>' for value, what in cards)
+    # Size, errors and energy of every piece.
+    rows = [
+        (
+            name,
+            f"{piece['vertices']:,}",
+            f"{piece['faces']:,}",
+            f"{1e4 * piece['area_m2']:,.0f} cm²",
+            f"{100 * piece['length_error']:.3g} %",
+            f"{100 * piece['area_error']:.3g} %",
+            f"{100 * piece['boundary_error']:.3g} %",
+            str(piece["flipped_faces"]),
+        )
+        for name, piece in metrics["pieces"].items()
+    ]
+    head = ("piece", "vertices", "faces", "area", "length error", "area error", "border error", "flips")
+    worn = ""
+    if "drape.webp" in files:
+        text = base64.b64encode(_bytes(latest_file(folder / "drape.webp"))).decode("ascii")
+        worn = (
+            f'<img alt="drape.webp" src="data:image/webp;base64,{text}"><p>Front, left side and back, coloured by the gap to the body; '
+            "frames.usdc holds the same in space.</p>"
+        )
     sections = [
-        ("", summary_cards(metrics)),
+        ("", f'{verdict}<div class="cards">{boxes}</div>'),
         ("From the development to rest", film),
-        ("Worn: from the designed surface to rest", _worn(folder, files)),
-        ("Pictures", _pictures(folder, files, pictures)),
-        ("Pattern", _drawings(folder, files)),
+        ("Worn: from the designed surface to rest", worn),
+        ("Pictures", "".join(f'<img alt="{escape(file)}" src="{shown[file]}">' for file in order)),
+        ("Pattern", "".join(drawings)),
         ("Cuts and darts", ledger_table(metrics)),
         ("Seams", seam_table(metrics)),
-        ("Pieces", piece_table(metrics)),
+        ("Pieces", _table(head, rows)),
         ("Energy, stage by stage", energy_table(metrics)),
         ("Body", size_table(metrics)),
         ("Notes", "<ul>" + "".join(f"<li>{escape(note)}</li>" for note in notes) + "</ul>" if notes else ""),
@@ -153,60 +231,6 @@ def _page(
         f'<body><main><h1>{escape(name)}</h1><p class="sub">warpflat {escape(str(metrics["warpflat"]))}</p>'
         f"{body}</main>{script}</body></html>\n"
     )
-
-
-def _film_section(film: Mapping[str, Any]) -> str:
-    """Return the viewer with its film."""
-    # No text of a film may end the script it stands in.
-    data = json.dumps(film, separators=(",", ":")).replace("<", "\\u003c")
-    buttons = "".join(
-        f'<button data-view="{view}">{view.capitalize()}</button>'
-        for view in ("all", "front", "side", "back", "pattern")
-    )
-    colours = base64.b64decode(film["colours"])
-    stops = ",".join(f"rgb({colours[i]},{colours[i + 1]},{colours[i + 2]})" for i in range(0, len(colours), 3 * 15))
-    hint = "drag to turn, shift-drag to move, wheel to zoom"
-    scale = (
-        f'0 <i style="background:linear-gradient(90deg,{stops})"></i> {film["scale"]:.3g} J/m² strain energy density · '
-    )
-    if film["scale"] <= SMALLEST_SCALE:
-        scale = "No strain energy: the cloth lies flat without strain · "
-    return (
-        f'<div class="stage"><canvas id="view"></canvas><div class="bar"><button id="play">Play</button>'
-        f'<input id="slider" type="range" min="0" value="0" aria-label="frame"><span id="label"></span>{buttons}</div>'
-        f'<div class="scale">{scale}{hint}</div></div>'
-        f'<script id="film" type="application/json">{data}</script>'
-    )
-
-
-def _is_shown(file: str) -> bool:
-    return file.endswith(".png") and file != "contact_sheet.png"
-
-
-def _pictures(folder: Path, files: Sequence[str], packed: Mapping[str, str]) -> str:
-    shown = {**pack_pictures(folder, [file for file in files if file not in packed]), **packed}
-    order = sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
-    return "".join(f'<img alt="{escape(file)}" src="{shown[file]}">' for file in order)
-
-
-def _worn(folder: Path, files: Sequence[str]) -> str:
-    """Return the moving picture of the drape."""
-    if "drape.webp" not in files:
-        return ""
-    text = base64.b64encode(_bytes(latest_file(folder / "drape.webp"))).decode("ascii")
-    return (
-        f'<img alt="drape.webp" src="data:image/webp;base64,{text}"><p>Front, left side and back, coloured by the gap to the body; '
-        "frames.usdc holds the same in space.</p>"
-    )
-
-
-def _drawings(folder: Path, files: Sequence[str]) -> str:
-    found = sorted(file for file in files if file.endswith(".svg"))
-    parts = []
-    for file in found:
-        text = base64.b64encode(_bytes(latest_file(folder / file))).decode("ascii")
-        parts.append(f'<img class="drawing" alt="{escape(file)}" src="data:image/svg+xml;base64,{text}">')
-    return "".join(parts)
 
 
 def _image(path: Path) -> str:
@@ -234,3 +258,83 @@ def _bytes(path: Path) -> bytes:
 
 def _data(file: str) -> str:
     return resources.files("warpflat.review").joinpath("data", file).read_text(encoding="utf-8")
+
+
+Metrics = Mapping[str, Any]
+
+
+def energy_table(metrics: Metrics) -> str:
+    """Return the energies at the end of every stage, with the change since the first relaxation."""
+    rows = []
+    for name, piece in metrics["pieces"].items():
+        whole = next((stage["strain_energy_j"] for stage in piece["stages"] if stage["name"] == "relax"), 0.0)
+        for stage in piece["stages"]:
+            energy = stage["strain_energy_j"]
+            after = stage["name"] not in ("develop", "steps", "relax") and whole > 0.0
+            rows.append(
+                (
+                    name,
+                    stage["name"],
+                    energy_words(energy),
+                    f"{100 * (energy / whole - 1.0):+.1f} %" if after else "",
+                    energy_words(stage["model_energy_j"]),
+                    f"{stage['steps']:,}",
+                    f"{stage['seconds']:.2f} s",
+                    "" if stage["name"] == "develop" else "yes" if stage["converged"] else "NO",
+                )
+            )
+    head = ("piece", "stage", "strain energy", "since whole", "model energy", "steps", "time", "at rest")
+    return _table(head, rows, text=2)
+
+
+def ledger_table(metrics: Metrics) -> str:
+    """Return every cut with what it opens; empty if there is none."""
+    rows = []
+    for name, piece in metrics["pieces"].items():
+        for cut in piece.get("cuts", ()):
+            for seam in cut["seams"]:
+                angle = f"{seam['angle_deg']:.1f}°" if "angle_deg" in seam else ""
+                legs = " / ".join(f"{1e3 * leg:.1f}" for leg in (seam["left_seam_m"], seam["right_seam_m"]))
+                rows.append((name, cut["name"], seam["kind"], f"{1e3 * seam['opening_m']:.1f} mm", angle, f"{legs} mm"))
+    return _table(("piece", "cut", "kind", "opening", "angle", "sides"), rows, text=3)
+
+
+def seam_table(metrics: Metrics) -> str:
+    """Return every seam with its two lengths; empty if there is none."""
+    rows = [
+        (
+            seam["name"],
+            " + ".join(seam["sides"]),
+            f"{seam['length_mm'][0]:.1f} mm",
+            f"{seam['length_mm'][1]:.1f} mm",
+            f"{seam['difference_mm']:+.3f} mm",
+            f"{100 * seam['ease']:.1f} %",
+        )
+        for seam in metrics.get("seams") or ()
+    ]
+    return _table(("seam", "edges", "first", "second", "difference", "ease"), rows, text=2)
+
+
+def size_table(metrics: Metrics) -> str:
+    """Return heights and girths of the mannequin; empty if there is none."""
+    levels = (metrics.get("mannequin") or {}).get("levels") or {}
+    rows = [
+        (name, f"{100 * level['height_m']:.1f} cm", f"{100 * level['girth_m']:.1f} cm")
+        for name, level in levels.items()
+    ]
+    return _table(("level", "height", "girth"), rows)
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], *, text: int = 1) -> str:
+    """Return a table whose first `text` columns are words; empty without rows."""
+    if not rows:
+        return ""
+
+    def line(cells: Sequence[str], tag: str) -> str:
+        return "".join(
+            f"<{tag}{' class=text' if column < text else ''}>{escape(cell)}</{tag}>"
+            for column, cell in enumerate(cells)
+        )
+
+    body = "".join(f"<tr>{line(row, 'td')}</tr>" for row in rows)
+    return f'<div class="scroll"><table><tr>{line(head, "th")}</tr>{body}</table></div>'

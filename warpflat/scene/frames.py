@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from itertools import chain, pairwise
 from pathlib import Path
+from tempfile import TemporaryFile
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import CannotWriteError, system_reason
 from warpflat.core.output import optional_file
-from warpflat.scene.frames_keys import FilmStage, Frame, Key, KeyFile
+from warpflat.export.geometry import Polylines
 from warpflat.scene.schema import OutputTable
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
@@ -27,7 +32,218 @@ if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
     from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["MANNEQUIN", "Film", "FrameRecorder", "FrameSchedule", "path_in_pattern"]
+__all__ = ["MANNEQUIN", "Film", "FilmStage", "FrameRecorder", "FrameSchedule", "KeyFile", "path_in_pattern"]
+
+
+# Largest displacement below which a stage stands still [m].
+_STILL = 1e-7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """A computed layout in a :class:`KeyFile`.
+
+    Attributes:
+        place: where its arrays begin in the file [bytes].
+        measures: numbers of this layout.
+    """
+
+    place: int
+    measures: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """A frame of one piece.
+
+    Attributes:
+        measures: numbers of this layout.
+        positions: #P by 2, the layout [m]; None of one in between that is not asked for.
+        face_energy_density: #F, strain energy per area [J/m2]; None of a layout evenly between the computed ones before and after.
+    """
+
+    measures: Mapping[str, float]
+    positions: NDArray[np.float32] | None = None
+    face_energy_density: NDArray[np.float32] | None = None
+
+
+@dataclass(kw_only=True, eq=False)
+class FilmStage:
+    """A part of a piece's film in which its topology stays.
+
+    Attributes:
+        name: of the solver's stage.
+        vertex_count, face_count: size of the pattern.
+        topology: what the first frame of the stage changes: faces, lines, cuts; nothing if the topology goes on.
+        keys: the computed layouts, the first and the last of the stage among them.
+        still: whether it only shows its one layout.
+        last_first_step: number of the last of the paper's steps with which it begins; 0 without them.
+    """
+
+    name: str
+    vertex_count: int
+    face_count: int
+    topology: Mapping[str, IntArray | Mapping[str, Any] | Mapping[str, Polylines] | None]
+    keys: list[Key] = field(default_factory=list)
+    still: bool = False
+    last_first_step: int = 0
+
+
+class KeyFile:
+    """A file without a name, in which computed layouts are kept until the end of the run; used in a ``with`` block.
+
+    Attributes:
+        film: the file that is made of them.
+        failed: whether a layout could not be kept.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._file = cast(BinaryIO, TemporaryFile(dir=folder, buffering=0))  # noqa: SIM115 (open as long as the film)
+        self._end = 0
+        self.film = folder / "frames.usdc"
+        self.failed = False
+
+    def __enter__(self) -> KeyFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def append(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> Key:
+        """Write a layout (#P by 2 [m]) and its energies per face (#F [J/m2]).
+
+        Raises:
+            InputError: there is no room for it.
+        """
+        key = Key(place=self._end, measures=dict(measures))
+        try:
+            self._file.seek(self._end)
+            for values in (positions, density):
+                left = memoryview(np.ascontiguousarray(values, dtype=np.float32).tobytes())
+                while left:
+                    # Unbuffered, a write may take only a part.
+                    written = self._file.write(left)
+                    self._end, left = self._end + written, left[written:]
+        except OSError as error:
+            reason = system_reason(error)
+            raise CannotWriteError(f"cannot write {self.film}: {reason}") from error
+        return key
+
+    def positions(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:
+        """Read the layout of a key, #P by 2 [m]."""
+        return self._read(key.place, 2 * stage.vertex_count).reshape(-1, 2)
+
+    def density(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:
+        """Read the energies of a key, #F [J/m2]."""
+        return self._read(key.place + 8 * stage.vertex_count, stage.face_count)
+
+    def _read(self, place: int, count: int) -> NDArray[np.float32]:
+        self._file.seek(place)
+        content = bytearray()
+        while len(content) < 4 * count:
+            content += self._file.read(4 * count - len(content))
+        return np.frombuffer(content, dtype=np.float32)
+
+    def displacement(self, stage: FilmStage, keys: Sequence[Key]) -> float:
+        """Return how far the vertex that moves farthest comes in these layouts from its place at the start of a stage [m]."""
+        first = self.positions(stage, stage.keys[0])
+        return max(_largest_move(first, self.positions(stage, key)) for key in keys)
+
+    def thin(self, stage: FilmStage, spacing: float) -> tuple[list[Key], list[float]]:
+        """Return keys at least `spacing` apart [m], the first and the last among them, and the distances between them [m]."""
+        kept, at = [stage.keys[0]], self.positions(stage, stage.keys[0])
+        distances = list[float]()
+        for key in stage.keys[1:]:
+            positions = self.positions(stage, key)
+            distance = _largest_move(at, positions)
+            if distance >= spacing and key is not stage.keys[-1]:
+                kept.append(key)
+                distances.append(distance)
+                at = positions
+        if len(stage.keys) > 1:
+            last = self.positions(stage, stage.keys[-1])
+            if distances and _largest_move(at, last) < 0.5 * spacing:
+                # The end replaces a key that lies close to it.
+                kept.pop()
+                distances.pop()
+                at = self.positions(stage, kept[-1])
+            kept.append(stage.keys[-1])
+            distances.append(_largest_move(at, last))
+        return kept, distances
+
+    def place_frames(self, stage: FilmStage, *, steps: float, at_least: int, most_keys: int) -> tuple[list[Key], int]:
+        """Choose the keys that are shown, and the number of frames.
+
+        Args:
+            stage: of the film.
+            steps: into so many frames the stage's largest displacement is parted, or more.
+            at_least: frames.
+            most_keys: at least 2.
+        """
+        reach = self.displacement(stage, stage.keys)
+        if reach <= _STILL:
+            return [stage.keys[0], stage.keys[-1]], at_least
+        spacing = 2.0 * reach / steps
+        while True:
+            keys, distances = self.thin(stage, spacing)
+            shown = max(self.displacement(stage, keys), _STILL)  # the layout farthest out may be left out
+            wanted = 1 + sum(math.ceil(steps * distance / shown) for distance in distances)
+            if len(keys) <= 2 or (len(keys) <= most_keys and wanted <= 4 * at_least):
+                return keys, max(wanted, at_least)
+            spacing *= 1.5
+
+    def frames(self, stage: FilmStage, keys: Sequence[Key], number: int, *, between: bool) -> Iterator[Frame]:
+        """Yield `number` frames along the path through these keys, each of which is one of the frames.
+
+        Those between two keys have no energies of their own: the way from one to the next is straight and even. Their layouts are there
+        if `between` asks for them.
+        """
+        distances = [_largest_move(self.positions(stage, a), self.positions(stage, b)) for a, b in pairwise(keys)]
+        yield self._computed(stage, keys[0])
+        counts = spread(distances, number - 1)
+        for (begin, end), count in zip(pairwise(keys), counts, strict=True):
+            for step in range(1, count):
+                share = step / count
+                measures = {
+                    key: (1.0 - share) * value + share * end.measures[key]
+                    for key, value in begin.measures.items()
+                    if key in end.measures
+                }
+                first, last = (self.positions(stage, key) if between else None for key in (begin, end))
+                layout = None if first is None or last is None else first + np.float32(share) * (last - first)
+                yield Frame(positions=layout, measures=measures)
+            yield self._computed(stage, end)
+        for _ in range(number - 1 - sum(counts)):
+            yield self._computed(stage, keys[-1])
+
+    def _computed(self, stage: FilmStage, key: Key) -> Frame:
+        return Frame(
+            positions=self.positions(stage, key),
+            face_energy_density=self.density(stage, key),
+            measures=key.measures,
+        )
+
+
+def spread(distances: Sequence[float], number: int) -> list[int]:
+    """Part `number` steps among distances so that the longest step is as short as can be; each distance takes at least one."""
+    counts = [1] * len(distances)
+    queue = [(-distance, index) for index, distance in enumerate(distances)]
+    heapq.heapify(queue)
+    for _ in range(number - len(distances)):
+        if not queue:
+            break
+        _, index = queue[0]
+        counts[index] += 1
+        heapq.heapreplace(queue, (-distances[index] / counts[index], index))
+    return counts
+
+
+def _largest_move(before: NDArray[np.float32], after: NDArray[np.float32]) -> float:
+    """Return how far the vertex that moves farthest moves [m]."""
+    return float(np.sqrt(((after - before) ** 2).sum(axis=1).max()))
+
 
 # The file of the mannequin, to which that of the frames refers.
 MANNEQUIN = "mannequin.usdc"
@@ -152,7 +368,23 @@ class Film:
             for frame in range(count):
                 for name, (stage, _, _) in shots.items():
                     begins = frame == 0 and number < len(pieces[name])
-                    self._write_frame(writer, name, stage, next(frames[name]), number=number, begins=begins)
+                    shown = next(frames[name])
+                    measures = {
+                        "stage": _STEPS if 0 < shown.measures.get("step", 0) <= stage.last_first_step else stage.name,
+                        "stage_number": number,
+                        "interpolated": shown.face_energy_density is None,
+                        **{key: round(value) if key in _COUNTS else value for key, value in shown.measures.items()},
+                    }
+                    if shown.positions is None or shown.face_energy_density is None:
+                        writer.write_between(name, shown.positions, measures)
+                        continue
+                    writer.write(
+                        name,
+                        positions=shown.positions,
+                        face_energy_density=shown.face_energy_density,
+                        **(stage.topology if begins else {}),  # type: ignore[arg-type]
+                        measures=measures,
+                    )
 
     def _shot(self, stages: Sequence[FilmStage], number: int) -> tuple[FilmStage, list[Key], int]:
         """Return a stage of a piece, the keys that are shown and the number of frames that it needs.
@@ -183,31 +415,6 @@ class Film:
             self._keys.frames(stage, [key], 1 if key is not keys[-1] else count - len(keys) + 1, between=False)
             for key in keys
         )
-
-    def _write_frame(
-        self, writer: FrameWriter, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool
-    ) -> None:
-        measures = {
-            "stage": _STEPS if 0 < frame.measures.get("step", 0) <= stage.last_first_step else stage.name,
-            "stage_number": number,
-            "interpolated": frame.face_energy_density is None,
-            **_counts_whole(frame.measures),
-        }
-        if frame.positions is None or frame.face_energy_density is None:
-            writer.write_between(name, frame.positions, measures)
-            return
-        writer.write(
-            name,
-            positions=frame.positions,
-            face_energy_density=frame.face_energy_density,
-            **(stage.topology if begins else {}),  # type: ignore[arg-type]
-            measures=measures,
-        )
-
-
-def _counts_whole(measures: Mapping[str, float]) -> dict[str, float | int]:
-    """Return measures with counts as whole numbers."""
-    return {key: round(value) if key in _COUNTS else value for key, value in measures.items()}
 
 
 #: Stage of the paper's steps with which a relaxation begins (`warpflat.flattening.progress`, which loads the solver).
@@ -301,7 +508,12 @@ class FrameRecorder:
             self._faces = surface.faces
             topology |= {"faces": surface.faces, "lines": surface.lines}
         if self._plans:
-            topology["cuts"] = self._cut_lines()
+            topology["cuts"] = {
+                plan.name: [
+                    run for path in plan.paths for run in path_in_pattern(self._surface.faces, self._faces, path)
+                ]
+                for plan in self._plans
+            }
         self.stages.append(
             FilmStage(
                 name=name, vertex_count=len(positions), face_count=len(surface.faces), topology=topology, still=still
@@ -313,19 +525,13 @@ class FrameRecorder:
         """Return whether the layout lies far enough from the one kept last, by the way of the stage until now."""
         if self._schedule.is_even:
             return True
-        moved, way = (np.abs(positions - before).max() for before in (self._last, self._first))
-        return bool(moved > _KEPT * way)
+        moved, travelled = (np.abs(positions - before).max() for before in (self._last, self._first))
+        return bool(moved > _KEPT * travelled)
 
     def _keep(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> None:
         assert self._keys is not None
         self.stages[-1].keys.append(self._keys.append(positions, density, measures))
         self._last = positions
-
-    def _cut_lines(self) -> dict[str, list[IntArray]]:
-        return {
-            plan.name: [run for path in plan.paths for run in path_in_pattern(self._surface.faces, self._faces, path)]
-            for plan in self._plans
-        }
 
 
 def path_in_pattern(faces: IntArray, pattern_faces: IntArray, path: IntArray) -> list[IntArray]:

@@ -141,8 +141,8 @@ def edge_table(path: Path, *, sewing: Path | None = None) -> str:
 def _read(path: Path, table: SewingTable) -> tuple[Garment, dict[str, Lift], dict[str, Any] | None]:
     """Return the pattern, the ways to its designed surface, and the run's table of its body."""
     from warpflat.draping.lift import read_lift
+    from warpflat.export.pattern_json import read_pattern_json
     from warpflat.export.read_dxf import read_dxf
-    from warpflat.export.read_pattern_json import read_pattern_json
     from warpflat.export.read_svg import read_svg
 
     allowance = None if table.allowance_mm is None else 1e-3 * table.allowance_mm

@@ -181,9 +181,9 @@ def _run(
         if reviewed and "frames.usdc" in files:
             with optional_file(page, [], part="the film"):
                 packed = pack_frames(folder)
-        files += pictures.result()
         if settings.drape is None:
             measured, fit_notes, remedies, worn = fit.result()
+        files += pictures.result()
         files += [*worn, "metrics.json"]
         if reviewed:
             with optional_file(page, []):

@@ -1,4 +1,4 @@
-"""From coarse to fine, on pieces too large to factor: edge collapse, the minimum there, carried up.
+"""From coarse to fine, on pieces too large to factor: a coarser mesh (`warpflat.solver.collapse`), the minimum there, carried up.
 
 On the piece itself the paper's steps, which are good at what interpolation leaves, and L-BFGS go on (`warpflat.solver.minimise`).
 """
@@ -21,6 +21,7 @@ from warpflat.solver.minimise import relax
 from warpflat.solver.steps import Relaxation
 from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.cells import make_cells
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 
@@ -35,32 +36,34 @@ _FACTOR_BOUNDS = (0.1, 10.0)
 def coarse_minimum(state: Relaxation) -> FloatArray:
     """Return the minimum of a piece on a coarser mesh, interpolated on its own, #V by 2 [m]; its present layout where that is better.
 
+    A grid has a quarter of its vertices there, and starts from the minimum on a coarser grid itself (nested iteration). Any other mesh goes
+    at once to one that is cheap to factor: what it gains by the meshes between is lost again by interpolation over uneven triangles.
+
     Args:
         state: the piece in its first layout; it is placed in the one returned.
     """
     fine, start = state.network, state.positions()
     steps = list(iterate_coarsenings(fine.surface, CHEAP))
+    if rows_and_columns(fine.surface) is not None:
+        steps = steps[:1]
     if not steps:
         return start
-    kept = np.arange(fine.vertex_count, dtype=np.int32)
-    into, face_of = kept, np.arange(fine.face_count, dtype=np.int32)
+    kept = into = np.arange(fine.vertex_count, dtype=np.int32)
+    face_of = np.arange(fine.face_count, dtype=np.int32)
     for step in steps:
         kept, into, face_of = kept[step.kept], step.into[into], face_of[step.face_of]
     surface, layout = steps[-1].surface, np.ascontiguousarray(start[kept])
-    unfolded = as_rigid_layout(surface, layout)
+    unfolded = as_rigid_layout(surface, layout) if len(kept) <= CHEAP else None
     layout = layout if unfolded is None else unfolded
     if (make_cells(surface).least_shares(layout) <= 0.0).any():
         layout, left = untangle(surface, layout, least_area=_LEAST_AREA)
         if left:
             return start
-
-    def measured(place: FloatArray, directions: FloatArray) -> Relaxation:
-        network = _coarse_network(fine, surface, directions, face_of)
-        _calibrate(network, directions, fine, start)
-        return Relaxation(network, state.options, start=place, alignments=alignments)
-
+    network = _coarse_network(fine, surface, layout, face_of)
+    _calibrate(network, layout, fine, start)
     alignments = _coarse_alignments(state.alignments, into, layout)
-    coarse = measured(layout, layout)
+    coarse = Relaxation(network, state.options, start=layout, alignments=alignments)
+    coarse_minimum(coarse)
     relax(coarse)
     layout = coarse.positions()
     for step in reversed(steps):

@@ -1,11 +1,11 @@
-"""Edge collapse: a quarter of a mesh's vertices, faces between them, and the interpolation from there.
+"""Coarser meshes: a quarter of a mesh's vertices, faces between them, and the interpolation from there.
 
-A mesh loses vertices by edge collapses, an independent set of them in each pass, until about a quarter is left: a vertex collapses into
-the neighbour that leaves the best triangles, and a border vertex only along the border. So corners, holes and cracks remain: the two
-sides of a crack have different vertices, and nothing joins them. In a pass vertices collapse one after the other, and the rings of the
-neighbours that stay are kept up to date. A vertex looks for its best neighbour only if no neighbour of it has collapsed in the pass. At the
-end the triangles with three different corners left are the faces. Collapsed vertices lie in the triangles left: these are the weights
-by which layouts of the coarser mesh are interpolated.
+A rectangular grid of quads keeps every second row and column. Any other mesh loses vertices by edge collapses, an independent set of them
+in each pass, until about a quarter is left: a vertex collapses into the neighbour that leaves the best triangles, and a border vertex only
+along the border. So corners, holes and cracks remain: the two sides of a crack have different vertices, and nothing joins them. In a pass
+vertices collapse one after the other, and the rings of the neighbours that stay are kept up to date. A vertex looks for its best neighbour
+only if no neighbour of it has collapsed in the pass. At the end the triangles with three different corners left are the faces. Collapsed
+vertices lie in the triangles left: these are the weights by which layouts of the coarser mesh are interpolated.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, kron
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.compile import launch_quietly
 from warpflat.core.launch import record
 from warpflat.core.sums import range_offsets
 from warpflat.kernels.coarsen import Ring, collapse, compose_rows, locate, order_rings, sort_corners
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.triangles import triangulate
 
@@ -67,7 +68,8 @@ class Coarsening:
 
 @once_per_surface
 def _next(surface: Surface) -> Coarsening | None:
-    return coarsen(surface)
+    grid = rows_and_columns(surface)
+    return coarsen(surface) if grid is None else _every_second(surface, grid)
 
 
 def iterate_coarsenings(surface: Surface, smallest: int = _COARSEST) -> Iterator[Coarsening]:
@@ -78,6 +80,46 @@ def iterate_coarsenings(surface: Surface, smallest: int = _COARSEST) -> Iterator
             return
         yield step
         surface = step.surface
+
+
+def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
+    """Keep every second row and column of a grid (#rows by #columns vertices), and the last ones; between them layouts are bilinear."""
+    place = np.empty(grid.size, dtype=np.int32)
+    place[grid.ravel()] = np.arange(grid.size, dtype=np.int32)
+    lines = [np.union1d(np.arange(0, count, 2), count - 1) for count in grid.shape]
+    between, nearest = zip(*(_linear(kept, count) for kept, count in zip(lines, grid.shape, strict=True)), strict=True)
+    kept = grid[np.ix_(*lines)]
+    number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
+    faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
+    row, column = (of[surface.faces].min(axis=1) for of in np.divmod(place, grid.shape[1]))
+    face_at = np.empty((grid.shape[0] - 1, grid.shape[1] - 1), dtype=np.int32)
+    face_at[row, column] = np.arange(len(surface.faces), dtype=np.int32)
+    vertices = surface.vertices[kept.ravel()]
+    return Coarsening(
+        surface=Surface(
+            vertices=vertices,
+            faces=faces,
+            name=surface.name,
+            input_vertices=vertices,
+            input_index=number.ravel(),
+        ),
+        kept=kept.ravel(),
+        into=number[np.ix_(*nearest)].ravel()[place],
+        prolongation=csr_array(kron(*between, format="csr"))[place],
+        face_of=face_at[np.ix_(*(line[:-1] for line in lines))].ravel(),
+    )
+
+
+def _linear(kept: IntArray, count: int) -> tuple[csr_array, IntArray]:
+    """Return the weights by which the lines kept interpolate all of them, `count` by #kept, and the nearest of these to each."""
+    every = np.arange(count)
+    before = np.minimum(np.searchsorted(kept, every, side="right") - 1, len(kept) - 2)
+    share = (every - kept[before]) / (kept[before + 1] - kept[before])
+    entries = np.column_stack([1.0 - share, share]).ravel()
+    columns = np.column_stack([before, before + 1]).astype(np.int32).ravel()
+    weights = csr_array((entries, columns, 2 * np.arange(count + 1, dtype=np.int32)), shape=(count, len(kept)))
+    weights.eliminate_zeros()
+    return weights, before + (share > 0.5)
 
 
 def coarsen(surface: Surface) -> Coarsening | None:

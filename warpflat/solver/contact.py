@@ -20,8 +20,8 @@ from warpflat.core.arrays import FloatArray, IndexArray
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.energy import NO_CONTACTS, Contacts, Energy, Point
 from warpflat.solver.grain import align_grain, remove_rotation
-from warpflat.solver.metric import LaplacianFactor, Metric, Solve
-from warpflat.solver.minimise import Descent
+from warpflat.solver.metric import LaplacianFactor, Metric
+from warpflat.solver.minimise import Cloth, Descent
 from warpflat.solver.steps import Relaxation
 from warpflat.solver.stop import Outcome, Remainder, RemainderEstimate
 from warpflat.surface.connectivity import border_of
@@ -151,32 +151,13 @@ def _closest(v: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, F
     return distance, t, away / np.maximum(distance, 1e-300)[:, None]
 
 
-class _Problem:
-    """The energy that is minimised: cloth and barrier."""
-
-    def __init__(self, state: Relaxation, gap: float) -> None:
-        self.state = state
-        self._energy = Energy(state, Barrier.of(state.network, gap))
-        self._metric = Metric(LaplacianFactor(state.network), state.alignments)
-
-    def at(self, positions: FloatArray) -> Point:
-        """Evaluate a layout."""
-        return self._energy.at(positions)
-
-    def solver(self, point: Point) -> Solve:
-        """Return the solution by the metric at a point."""
-        return self._metric.solver(point.touch.vertices, point.touch.rows)
-
-    def residual(self, point: Point) -> float:
-        """Return the largest force on a vertex over the mean force of the springs."""
-        springs, force = self.state.network.spring_arrays, -point.gradient
-        a, b = (point.positions[springs.ends[:, k]] for k in range(2))
-        tension = springs.stiffness * np.abs(np.linalg.norm(b - a, axis=1) - springs.rest_length)
-        weight = np.bincount(springs.ends.ravel(), np.repeat(springs.stiffness, 2), minlength=len(force)).astype(
-            np.float64
-        )
-        remove_rotation(self.state.alignments, point.positions, force, weight)
-        return float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
+def _residual(state: Relaxation, point: Point) -> float:
+    """Return the largest force on a vertex, that of contact included, over the mean force of the springs."""
+    springs, force = state.network.spring_arrays, -point.gradient
+    a, b = (point.positions[springs.ends[:, k]] for k in range(2))
+    tension = springs.stiffness * np.abs(np.linalg.norm(b - a, axis=1) - springs.rest_length)
+    remove_rotation(state.alignments, point.positions, force, state.network.spring_stiffness.numpy())
+    return float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
 
 
 def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
@@ -191,7 +172,8 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     """
     began, start = time.perf_counter(), state.positions()
     align_grain(state.alignments, start)
-    problem = _Problem(state, gap)
+    energy = Energy(state, Barrier.of(state.network, gap))
+    problem = Cloth(energy, Metric(LaplacianFactor(state.network), state.alignments))
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return None
@@ -201,7 +183,7 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     while not at_rest and descent.iterations < most and descent.step():
         left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         at_rest = left.is_small(state.options) or descent.is_at_rest(state.options)
-    residual = problem.residual(descent.point)
+    residual = _residual(state, descent.point)
     end = descent.point.positions.copy()
     align_grain(state.alignments, end)
     state.place(end)

@@ -2,9 +2,9 @@
 
 Each equation c(x) = 0 of the network (a seam's two lengths, a straight line, a fixed length) is held by 1/2 k (c + o)^2 with a finite
 stiffness k. A round minimises the energy of cloth and equations. Then the offset o grows by the residual c, until all equations hold
-(Nocedal and Wright, Numerical Optimization, chapter 17). The first round begins with the paper's steps. L-BFGS takes the rest, over one
-factor of the Gauss-Newton stiffness J^T J of cloth and equations, so that stiff equations cost no more iterations than soft ones. Contact
-(`warpflat.solver.contact`) may be a term of the energy.
+(Nocedal and Wright, Numerical Optimization, chapter 17). The first round begins with the paper's steps, unless an earlier relaxation under
+the same equations goes on. L-BFGS takes the rest, over one factor of the Gauss-Newton stiffness J^T J of cloth and equations, so that stiff
+equations cost no more iterations than soft ones. Contact (`warpflat.solver.contact`) may be a term of the energy.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier
 from warpflat.solver.energy import Energy, Point
 from warpflat.solver.grain import align_grain
-from warpflat.solver.metric import Metric, Solve, StiffnessFactor
-from warpflat.solver.minimise import Descent
+from warpflat.solver.metric import Metric, StiffnessFactor
+from warpflat.solver.minimise import Cloth, Descent
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation, relax_by_steps, take_first_steps
 from warpflat.solver.stop import Outcome
@@ -30,7 +30,7 @@ __all__ = ["ConstrainedOutcome", "factor_pays", "relax_under_equations"]
 
 # A round ends when by the metric the next step could release at most this times the squared residual tolerance, as a share of the energy,
 # or after so many steps.
-_NEGLIGIBLE_RELEASE = 0.1
+_NEGLIGIBLE_RELEASE = 0.05
 _STEPS_PER_ROUND = 200
 _MOST_ROUNDS = 50
 # Rounds over which the violation must come down, or the equations contradict each other.
@@ -67,26 +67,9 @@ def factor_pays(network: SpringNetwork, options: RelaxOptions) -> bool:
     return options.solver != "paper" and network.vertex_count <= _MOST_VERTICES
 
 
-class _SewnCloth:
-    """The energy of a network and its equations, and the factor of its stiffness in the layout at the start."""
-
-    def __init__(self, state: Relaxation, gap: float) -> None:
-        self._state = state
-        self._energy = Energy(state, Barrier.of(state.network, gap) if gap else None)
-        self.factor_again()
-
-    def factor_again(self) -> None:
-        """Factor the stiffness in the present layout of the state."""
-        state = self._state
-        self._metric = Metric(StiffnessFactor(state.network, state.positions(), state.alignments), state.alignments)
-
-    def at(self, positions: FloatArray) -> Point:
-        """Evaluate a layout."""
-        return self._energy.at(positions)
-
-    def solver(self, point: Point) -> Solve:
-        """Return the solution by the metric: the factor plus the stiffness of the contacts."""
-        return self._metric.solver(point.touch.vertices, point.touch.rows)
+def _stiffness_metric(state: Relaxation) -> Metric:
+    """Factor the stiffness of cloth and equations in the present layout."""
+    return Metric(StiffnessFactor(state.network, state.positions(), state.alignments), state.alignments)
 
 
 def relax_under_equations(
@@ -114,11 +97,13 @@ def relax_under_equations(
     align_grain(state.alignments, start)
     state.place(start)
     state.check_start()
-    # Steps know no contact.
-    first = None if gap else take_first_steps(state)
+    # Steps know no contact. Where offsets are known, an earlier minimum goes on, in which the forces of seams and cloth balance: to the
+    # steps a seam's tension is a large energy, and they would carry soft cloth along a flat valley.
+    goes_on = network.seams is not None and network.seams.offset.numpy().any()
+    first = None if gap or goes_on else take_first_steps(state)
     layout = None if first is None else state.positions()
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
-    problem = _SewnCloth(state, gap)
+    problem = Cloth(Energy(state, Barrier.of(network, gap) if gap else None), _stiffness_metric(state))
     descent = Descent(problem, problem.at(state.positions()))
     factored_at = 0
     while True:
@@ -151,7 +136,7 @@ def relax_under_equations(
             network.seams.offset.assign(network.seams.offset.numpy() + correction(residuals))
         is_stale = descent.iterations - factored_at > _STEPS_PER_FACTOR
         if is_stale:
-            problem.factor_again()
+            problem.metric = _stiffness_metric(state)
             factored_at = descent.iterations
         descent.renew(forget=is_stale)
 

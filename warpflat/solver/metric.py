@@ -2,8 +2,8 @@
 
 A metric A stands for the second derivative of the energy; the direction of descent is A^-1 times the force. Two matrices are factored.
 `LaplacianFactor`: the Laplacian of the surface times the cloth's stiffness, the same for all layouts (Liu et al. 2017). On surfaces too
-large to factor its solution is a V-cycle: damped Jacobi before and after a correction by the coarser mesh, whose matrix is P^T L P, down
-to one that is factored (Briggs, Henson and McCormick, A Multigrid Tutorial); L-BFGS takes as many iterations with it.
+large to factor its solution is a V-cycle: damped Jacobi before and after a correction by the Laplacian of the coarser mesh, down to one
+that is factored (Briggs, Henson and McCormick, A Multigrid Tutorial); L-BFGS takes as many iterations with it.
 `StiffnessFactor`: the Gauss-Newton stiffness J^T J of springs, guard and equations in one layout, in which stiff seams cost no more
 iterations than soft ones.
 
@@ -14,10 +14,10 @@ which are held as rows of infinite stiffness, without the I.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array, vstack
 
 from warpflat.core.arrays import FloatArray, IntArray
@@ -68,32 +68,27 @@ class Factor(Protocol):
 
 
 @once_per_surface
-def laplacian_solution(surface: Surface) -> Callable[[FloatArray], FloatArray]:
+def laplacian_solution(surface: Surface) -> Solve:
     """Return the solution by the Laplacian (`warpflat.surface.laplacian`), or on a large surface what a V-cycle makes of it.
 
     Right sides are #V by #N. Both are symmetric, and in single precision.
     """
-    if factor_pays(surface):
+    step = None if factor_pays(surface) else next(iterate_coarsenings(surface, CHEAP), None)
+    if step is None:
         return laplacian_solver(surface)
-    matrix, levels = csr_array(held_laplacian(surface)), []
-    for step in iterate_coarsenings(surface, CHEAP):
-        up = step.prolongation
-        down = csr_array(up.T)
-        inverse = (_DAMPING / matrix.diagonal()).astype(np.float32)[:, None]
-        levels.append((matrix.astype(np.float32), inverse, up.astype(np.float32), down.astype(np.float32)))
-        matrix = csr_array(down @ matrix @ up)
-    lowest = factor_symmetric(csc_array(matrix), dtype=np.float32)
+    coarser, matrix = laplacian_solution(step.surface), csr_array(held_laplacian(surface), dtype=np.float32)
+    inverse = (_DAMPING / matrix.diagonal())[:, None]
+    up = step.prolongation.astype(np.float32)
+    down = csr_array(up.T)
 
-    def cycle(level: int, right: NDArray[np.float32]) -> NDArray[np.float32]:
-        if level == len(levels):
-            return lowest(right.astype(np.float64)).astype(np.float32)
-        fine, inverse, up, down = levels[level]
-        x = inverse * right
-        x += up @ cycle(level + 1, down @ (right - fine @ x))
-        x += inverse * (right - fine @ x)
-        return x
+    def cycle(right: FloatArray) -> FloatArray:
+        force = right.astype(np.float32)
+        x = inverse * force
+        x += up @ coarser(down @ (force - matrix @ x)).astype(np.float32)
+        x += inverse * (force - matrix @ x)
+        return np.ascontiguousarray(x, dtype=np.float64)
 
-    return lambda right: np.ascontiguousarray(cycle(0, right.astype(np.float32)), dtype=np.float64)
+    return cycle
 
 
 class LaplacianFactor:
@@ -190,18 +185,24 @@ class Metric:
         self._factor = factor
         self._chords, self._across = _chords(alignments)
 
-    def solver(self, vertices: IntArray | None = None, lever: FloatArray | None = None) -> Solve:
+    @cached_property
+    def _without_contacts(self) -> Solve:
+        return self._solver(np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3, 2)))
+
+    def solver(self, vertices: IntArray, lever: FloatArray) -> Solve:
         """Return the solution by the factor plus a row R^T R for each contact; it does not move chords sideways.
 
         Args:
             vertices: #C by 3, of contacts, if any.
             lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
         """
+        return self._solver(vertices, lever) if len(vertices) else self._without_contacts
+
+    def _solver(self, vertices: IntArray, lever: FloatArray) -> Solve:
         factor, count = self._factor, len(self._chords)
         chord = np.zeros((count, 3, 2))
         chord[:, 0], chord[:, 1] = self._across, -self._across
-        vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
-        lever = chord if lever is None else np.concatenate([chord, lever])
+        vertices, lever = np.concatenate([self._chords, vertices]), np.concatenate([chord, lever])
         if len(vertices) == 0:
             return factor.solve
         own, at = np.unique(vertices, return_inverse=True)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -29,7 +29,7 @@ from warpflat.solver.steps import Relaxation, Watch, relax_by_steps, take_first_
 from warpflat.solver.stop import Outcome, Remainder, RemainderEstimate, Status, looked_back, relative_change
 from warpflat.surface.connectivity import border_of
 
-__all__ = ["Descent", "Measure", "Problem", "relax"]
+__all__ = ["Cloth", "Descent", "Measure", "Problem", "line_search", "relax"]
 
 # Corrections that L-BFGS remembers.
 _MEMORY = 8
@@ -64,6 +64,22 @@ class Problem(Protocol[P]):
 
     def solver(self, point: P) -> Solve:
         """Return the solution by the metric at a point."""
+
+
+@dataclass
+class Cloth:
+    """The energy of a network, with its seams and contacts, and the metric to which each layout adds the stiffness of its contacts."""
+
+    energy: Energy
+    metric: Metric
+
+    def at(self, positions: FloatArray) -> Point:
+        """Evaluate a layout."""
+        return self.energy.at(positions)
+
+    def solver(self, point: Point) -> Solve:
+        """Return the solution by the metric at a point."""
+        return self.metric.solver(point.touch.vertices, point.touch.rows)
 
 
 class _Memory:
@@ -119,6 +135,30 @@ def _products(rows: NDArray[np.float32], vectors: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ij,j->i", rows, vectors.ravel()))
 
 
+def line_search(
+    at: Callable[[FloatArray], P], start: P, direction: FloatArray, *, longest: float = 1.0
+) -> tuple[P | None, float, int]:
+    """Halve a step until the energy falls enough by Armijo's rule (Nocedal and Wright, algorithm 3.1).
+
+    Args:
+        at: evaluates a layout.
+        start: where the step begins.
+        direction: the whole step, #V by 2 or 3 [m].
+        longest: the share of it that is tried first.
+
+    Returns:
+        The point at its end, None if no step makes the energy fall; the share that was taken; how many layouts were evaluated.
+    """
+    descent, fraction, tried = dot(start.gradient, direction), longest, 0
+    while descent < 0.0 and fraction > _LEAST_FRACTION:
+        new = at(start.positions + fraction * direction)
+        tried += 1
+        if new.energy <= start.energy + _ARMIJO * fraction * descent:
+            return new, fraction, tried
+        fraction *= 0.5
+    return None, 0.0, tried
+
+
 class Descent(Generic[P]):
     """A running minimisation.
 
@@ -170,10 +210,13 @@ class Descent(Generic[P]):
         """Take one step; return False, and stay, where none makes the energy fall."""
         while True:
             direction = self._memory.direction(self.point.gradient, self._problem.solver(self.point))
-            descent = dot(self.point.gradient, direction)
-            self.release = -0.5 * descent
-            new = self._search(direction, descent)
+            self.release = -0.5 * dot(self.point.gradient, direction)
+            # Where steps are short, the next one seldom is much longer.
+            longest = min(1.0, _LONGER * self.fraction)
+            new, fraction, tried = line_search(self._problem.at, self.point, direction, longest=longest)
+            self.tried += tried
             if new is not None:
+                self.fraction = fraction
                 break
             if self._memory.is_empty:
                 self.is_stuck = True
@@ -192,18 +235,6 @@ class Descent(Generic[P]):
         self.point = self._problem.at(self.point.positions)
         self.history[-1] = self.point.energy
         self.is_stuck = False
-
-    def _search(self, direction: FloatArray, descent: float) -> P | None:
-        """Halve a step until the energy falls enough. Where steps are short, the next one seldom is much longer."""
-        fraction = min(1.0, _LONGER * self.fraction)
-        while descent < 0.0 and fraction > _LEAST_FRACTION:
-            new = self._problem.at(self.point.positions + fraction * direction)
-            self.tried += 1
-            if new.energy <= self.point.energy + _ARMIJO * fraction * descent:
-                self.fraction = fraction
-                return new
-            fraction *= 0.5
-        return None
 
 
 def _continued(new: Relaxation, state: Relaxation) -> Relaxation:
@@ -239,22 +270,6 @@ class _Directions:
         return new
 
 
-class _Cloth:
-    """The energy of a network alone, and the metric that is the same in all layouts."""
-
-    def __init__(self, state: Relaxation) -> None:
-        self.energy = Energy(state)
-        self._solve = Metric(LaplacianFactor(state.network), state.alignments).solver()
-
-    def at(self, positions: FloatArray) -> Point:
-        """Evaluate a layout."""
-        return self.energy.at(positions)
-
-    def solver(self, point: Point) -> Solve:
-        """Return the solution by the metric."""
-        return self._solve
-
-
 def relax(
     state: Relaxation,
     *,
@@ -281,23 +296,20 @@ def relax(
         return relax_by_steps(state, watch=watch, each_step=each_step)
     if state.check_start().at_rest:
         return state.make_outcome(state.steps, state.work_units, began_at=time.perf_counter())
-    start = state.positions()
+    start = measured = state.positions()
     align_grain(state.alignments, start)
     state.place(start)
     first = take_first_steps(state, each_step=each_step) if first_steps else None
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
     start = state.positions()
     layout = None if first is None else start
-    align_grain(state.alignments, start)
-    if measure is not None and first is not None:
-        state = _continued(measure(start, start), state)
-    problem = _Cloth(state)
+    problem = Cloth(Energy(state), Metric(LaplacianFactor(state.network), state.alignments))
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return state.make_outcome(steps_before, work_before, began_at=began_at)
     descent, options = Descent(problem, point), state.options
     estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
-    directions = None if measure is None else _Directions(measure, start)
+    directions = None if measure is None else _Directions(measure, measured)
 
     done = False
     while not done:

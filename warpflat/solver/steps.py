@@ -21,7 +21,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -40,14 +39,13 @@ from warpflat.kernels.implicit import (
     BondForces,
     VertexForces,
     advance,
-    compute_kinetic_energy,
     gather_forces,
     gather_potential,
     stop,
 )
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.grain import GrainAlignment, hold_grain, remove_rotation
+from warpflat.solver.grain import GrainAlignment, align_grain, hold_grain, remove_rotation
 from warpflat.solver.membrane_stiffness import TangentMatrix
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.stop import Energies, Outcome, Status, relative_change
@@ -62,8 +60,8 @@ IMPLICIT_STEP, IMPLICIT_STEP_AT_REST = (1.0, 1.0, 1.0), (0.0, 1.0, 1.0)
 _TURNS = 4
 # Steps between two updates of a membrane's tangent stiffness.
 _MATRIX_INTERVAL = 100
-# The first steps are looked at after so many of them, and are at most so many: an iteration of L-BFGS takes as long as three or four.
-_FIRST_STEPS_PER_CHECK, _MOST_FIRST_STEPS = 5, 20
+# The first steps are looked at after so many of them, and are at most so many: an iteration of L-BFGS takes as long as two to four.
+_FIRST_STEPS_PER_CHECK, _MOST_FIRST_STEPS = 3, 12
 
 
 class Relaxation:
@@ -251,17 +249,10 @@ class Relaxation:
             self.position.assign(positions)
 
     def energies(self) -> Energies:
-        """Return the energies of the present state [J]."""
-        net, kinetic = self.network, 0.0
+        """Return the energies of the present layout [J]."""
         self._measure_potential.launch()
         springs, cells = self._total(self._vertex_energy), self._total(self._face_energy)
-        if self.velocity.numpy().any():
-            given, made = [net.mass, self.velocity], [self._vertex_energy]
-            record(compute_kinetic_energy, dim=net.vertex_count, inputs=given, outputs=made, device=net.device).launch()
-            kinetic = self._total(self._vertex_energy)
-        if net.model == "springs":
-            return Energies(springs, cells, kinetic)
-        return Energies(cells, 0.0, kinetic)
+        return Energies(springs, cells) if self.network.model == "springs" else Energies(cells, 0.0)
 
     def evaluate(self) -> tuple[float, FloatArray]:
         """Return the energy of the cloth in the present layout [J], and the forces of cloth and seams, #V by 2 [N]; no step may follow."""
@@ -426,7 +417,6 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
             state.work_units += 1.0
             if each_step is not None:
                 each_step(state)
-        state.hold_grain()
         energies = state.energies()
         now = energies.potential + network.seam_energy(state.position)
         # Eq. (11).
@@ -434,16 +424,15 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
         change, before = relative_change(before, now, count), now
     state.takes_first_steps = False
     state.velocity.zero_()
-    state.load.zero_()
+    layout = state.positions() if before < first else start
+    align_grain(state.alignments, layout)
     if not before < first:
-        state.place(start)
         energies = status.energies
     elif network.seams is None and network.bonds.freedom.numpy().all():
         # Nothing holds a piece in its place, from which steps drift by some millimetres. L-BFGS leaves its first vertex where it is.
-        layout = state.positions()
         for each in state.alignments:
             layout[each.vertices] += start[each.vertices][0] - layout[each.vertices][0]
-        state.place(layout)
+    state.place(layout)
     state.status = Status(energies=energies)
     return Outcome(
         converged=True,
@@ -452,7 +441,7 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
         restarts=state.restarts,
         energy_change=change,
         residual=math.nan,
-        energies=replace(energies, kinetic=0.0),
+        energies=energies,
         seconds=time.perf_counter() - began_at,
     )
 

@@ -36,27 +36,20 @@ def relative_change(before: float, after: float, steps: float = 1.0) -> float:
 
 @dataclass(frozen=True)
 class Energies:
-    """The energies of a state [J].
+    """The energies of a layout [J].
 
     Attributes:
         spring: of the springs, or of the membrane where that is the model.
         guard: of the guard (see `warpflat.model.network`).
-        kinetic: of the motion.
     """
 
     spring: float
     guard: float
-    kinetic: float
 
     @property
     def potential(self) -> float:
         """The energy that is minimised: springs and guard."""
         return self.spring + self.guard
-
-    @property
-    def total(self) -> float:
-        """Potential and kinetic energy."""
-        return self.spring + self.guard + self.kinetic
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ import numpy as np
 from warpflat.core.errors import InputError
 from warpflat.core.text import energy_words
 from warpflat.fabric.library import load_library
+from warpflat.flattening.progress import relaxation_words
 from warpflat.mannequin.ease import EASE_PRESETS
 from warpflat.mannequin.forms import form_names
 from warpflat.mannequin.measurements import size_names
@@ -253,6 +254,10 @@ def _head(session: Session) -> str:
             )
             rows = f"<table style='width:100%;line-height:1.15'>{cells}</table>"
     lines = [" · ".join(words), rows]
+    if solution is not None:
+        lines.append(
+            relaxation_words([stage.as_dict() for stage in piece.stages] for piece in solution.pieces.values())
+        )
     if session.activity:
         lines.append(f"<span style='color:#0a58ca'>{escape(session.activity)} …</span>")
     if session.preview is not None:

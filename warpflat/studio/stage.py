@@ -12,7 +12,7 @@ from trimesh import Trimesh
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
-from warpflat.export.usd_scene import rows_on_table
+from warpflat.export.usd_prims import rows_on_table
 from warpflat.studio.frame import PieceFrame
 from warpflat.studio.glb import coloured_mesh
 from warpflat.studio.maps import Scale, face_values, vertex_values

@@ -90,7 +90,32 @@ def surface_seams(surface: Surface, named: Sequence[NamedSeam]) -> tuple[Surface
     for seam in named:
         try:
             sides = [_side(surface, along, line) for line in seam.sides]
-            found.append(_sewn(surface, seam, sides[0], sides[1]))
+            first, second = sides
+            if len(np.intersect1d(first, second)) > 1:
+                raise InputError(
+                    f"lines {seam.sides[0]!r} and {seam.sides[1]!r} overlap; a side is sewn to another one"
+                )
+            one, other = surface.vertices[first], surface.vertices[second]
+            # Two stretches of one border meet running against each other.
+            second, other = second[::-1].copy(), other[::-1]
+            shared = max(_largest_distance(one, other), _largest_distance(other, one)) <= _SHARED
+            if shared and np.linalg.norm(one[0] - other[-1]) < np.linalg.norm(one[0] - other[0]):
+                raise InputError(
+                    f"{seam.sides[0]!r} and {seam.sides[1]!r} lie on each other the same way round, face to back; sides meet face to face"
+                )
+            arcs = [arc_lengths(points) for points in (one, other)]
+            lengths = [float(arc[-1]) for arc in arcs]
+            unlike = abs(lengths[0] - lengths[1]) / max(lengths)
+            if not shared and unlike > (_AS_MANY if len(first) == len(second) else _ALIKE):
+                raise InputError(
+                    f"{seam.sides[0]!r} is {1e3 * lengths[0]:.1f} mm long and {seam.sides[1]!r} {1e3 * lengths[1]:.1f} mm, and they are "
+                    f"not one curve in space; sides agree within {_ALIKE:.0%}, or {_AS_MANY:.0%} with as many vertices each"
+                )
+            found.append(
+                SurfaceSeam(
+                    named=seam, vertices=(first, second), joints=_joints(arcs[0] / lengths[0], arcs[1] / lengths[1])
+                )
+            )
         except InputError as error:
             raise InputError(f"seam {seam.name!r}: {error}") from None
     return tuple(found)
@@ -103,36 +128,13 @@ def _side(surface: Surface, along: set[tuple[int, int]], line: str) -> IntArray:
     ids = np.asarray(surface.lines[line], dtype=np.int32)
     if ids[0] == ids[-1]:
         raise InputError(f"line {line!r} is closed; a side runs from one place of the border to another")
-    for way in (ids, ids[::-1]):
-        if all(edge in along for edge in pairwise(way.tolist())):
-            return np.ascontiguousarray(way)
+    for run in (ids, ids[::-1]):
+        if all(edge in along for edge in pairwise(run.tolist())):
+            return np.ascontiguousarray(run)
     a, b = next(edge for edge in pairwise(ids.tolist()) if edge not in along)
     raise InputError(
         f"line {line!r} leaves the border between vertices {a} and {b}; a side is one stretch of border that no cut parts"
     )
-
-
-def _sewn(surface: Surface, seam: NamedSeam, first: IntArray, second: IntArray) -> SurfaceSeam:
-    """Check that two sides fit each other, and match their vertices."""
-    if len(np.intersect1d(first, second)) > 1:
-        raise InputError(f"lines {seam.sides[0]!r} and {seam.sides[1]!r} overlap; a side is sewn to another one")
-    one, other = surface.vertices[first], surface.vertices[second]
-    # Two stretches of one border meet running against each other.
-    second, other = second[::-1].copy(), other[::-1]
-    shared = _apart(one, other) <= _SHARED
-    if shared and np.linalg.norm(one[0] - other[-1]) < np.linalg.norm(one[0] - other[0]):
-        raise InputError(
-            f"{seam.sides[0]!r} and {seam.sides[1]!r} lie on each other the same way round, face to back; sides meet face to face"
-        )
-    arcs = [arc_lengths(points) for points in (one, other)]
-    lengths = [float(arc[-1]) for arc in arcs]
-    unlike = abs(lengths[0] - lengths[1]) / max(lengths)
-    if not shared and unlike > (_AS_MANY if len(first) == len(second) else _ALIKE):
-        raise InputError(
-            f"{seam.sides[0]!r} is {1e3 * lengths[0]:.1f} mm long and {seam.sides[1]!r} {1e3 * lengths[1]:.1f} mm, and they are "
-            f"not one curve in space; sides agree within {_ALIKE:.0%}, or {_AS_MANY:.0%} with as many vertices each"
-        )
-    return SurfaceSeam(named=seam, vertices=(first, second), joints=_joints(arcs[0] / lengths[0], arcs[1] / lengths[1]))
 
 
 def _joints(first: FloatArray, second: FloatArray) -> IntArray | None:
@@ -153,11 +155,6 @@ def _joints(first: FloatArray, second: FloatArray) -> IntArray | None:
     # The first joint is kept for good: one that falls onto it again goes.
     pairs = pairs[np.append(True, np.diff(pairs[:, 1]) > 0)]
     return np.asarray(pairs[:, ::-1] if swapped else pairs, dtype=np.int32)
-
-
-def _apart(one: FloatArray, other: FloatArray) -> float:
-    """Return the largest distance [m] of a vertex of either polyline from the other polyline."""
-    return max(_largest_distance(one, other), _largest_distance(other, one))
 
 
 def _largest_distance(points: FloatArray, line: FloatArray) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
@@ -11,9 +9,6 @@ from warpflat.core.launch import launch_each
 from warpflat.kernels.curvature import fit_curvature
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.unfold import vertex_normals
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
 
 __all__ = ["curvature_tensors"]
 
@@ -36,23 +31,20 @@ def curvature_tensors(surface: Surface) -> FloatArray:
     Returns:
         #V by 3 by 3 [1/m], symmetric.
     """
+    from scipy.sparse import coo_matrix
+
     count, normal = len(surface.vertices), vertex_normals(surface)
     normal[~normal.any(axis=1)] = (0.0, 0.0, 1.0)
-    ring, tensors = _ring(surface), np.zeros((count, 3, 3))
+    faces = surface.faces
+    used = faces >= 0
+    face = np.broadcast_to(np.arange(len(faces))[:, None], faces.shape)[used]
+    incidence = coo_matrix((np.ones(len(face), dtype=np.int32), (face, faces[used])), shape=(len(faces), count)).tocsr()
+    # #V by #V, 1 where two vertices share a face.
+    ring = (incidence.T @ incidence).astype(bool).astype(np.int32).tocsr()
+    tensors = np.zeros((count, 3, 3))
     for first in range(0, count, _BLOCK):
         pairs = ring[first : first + _BLOCK] @ ring
         given = [surface.vertices, pairs.indptr.astype(np.int32), pairs.indices.astype(np.int32), normal, first]
         launch_each(fit_curvature, pairs.shape[0], given, [tensors])
     tensors.flags.writeable = False
     return tensors
-
-
-def _ring(surface: Surface) -> csr_matrix:
-    """Return #V by #V, 1 where two vertices share a face."""
-    from scipy.sparse import coo_matrix
-
-    faces, count = surface.faces, len(surface.vertices)
-    used = faces >= 0
-    face = np.broadcast_to(np.arange(len(faces))[:, None], faces.shape)[used]
-    incidence = coo_matrix((np.ones(len(face), dtype=np.int32), (face, faces[used])), shape=(len(faces), count)).tocsr()
-    return (incidence.T @ incidence).astype(bool).astype(np.int32).tocsr()

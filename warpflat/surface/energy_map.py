@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import LinearOperator
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
 from warpflat.core.polyline import nearest_on_polyline, segment_lengths
+from warpflat.core.sparse import factor_symmetric
 from warpflat.kernels.unfold import measure_triangles
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.multilevel_preconditioner import multilevel_preconditioner
 from warpflat.surface.triangles import corner_triangles
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ __all__ = [
     "place_in_words",
     "smooth_to_vertices",
 ]
+
 
 # Relative tolerance of the diffusion, and the number of iterations after which it is solved directly, as slivers may need.
 _TOLERANCE = 1e-9
@@ -181,39 +184,52 @@ def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_l
     Returns:
         #V [J/m2]; 0 at vertices without a face of positive area.
     """
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import cg, spsolve
+
     density = _checked_density(face_density, len(surface.faces), "face")
     if not (np.isfinite(smoothing_length) and smoothing_length >= 0):
         raise InputError(f"smoothing_length is a length in metres, 0 or more, got {smoothing_length!r}")
-    area, energy = _given_to_vertices(surface, density)
-    if smoothing_length > 0:
-        energy = area * _diffused(surface, area, energy, smoothing_length)
-    return np.divide(energy, area, out=np.zeros(len(area)), where=area > 0)
-
-
-def _given_to_vertices(surface: Surface, density: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the area [m2] and the energy [J] of each vertex, #V each."""
+    # Each face gives its vertices equal parts of its area [m2] and its energy [J].
     count = len(surface.vertices)
-    used = surface.faces >= 0
-    part = _face_areas(surface) / used.sum(axis=1)
-    spread = np.broadcast_to(part[:, None], used.shape)[used]
-    corner = surface.faces[used]
-    held = spread * np.broadcast_to(density[:, None], used.shape)[used]
-    area = np.bincount(corner, weights=spread, minlength=count).astype(np.float64)
-    return area, np.bincount(corner, weights=held, minlength=count).astype(np.float64)
+    is_corner = surface.faces >= 0
+    part = _face_areas(surface) / is_corner.sum(axis=1)
+    spread = np.broadcast_to(part[:, None], is_corner.shape)[is_corner]
+    held = spread * np.broadcast_to(density[:, None], is_corner.shape)[is_corner]
+    corner = surface.faces[is_corner]
+    area, energy = (np.bincount(corner, parts, minlength=count).astype(np.float64) for parts in (spread, held))
+    if smoothing_length > 0:
+        system, edge = _diffusion_matrix(surface, area, smoothing_length)
+        used = np.flatnonzero(area > 0)
+        if len(used) < count:
+            system = system[used][:, used]
+        # Heat does not spread far in one step, so a few dozen iterations suffice, where a factorisation would grow faster than the mesh.
+        # Where an edge is a small part of the length, sums over cubes save two thirds of them.
+        first = energy[used] / area[used]
+        inverse = (
+            diags_array(1.0 / system.diagonal())
+            if len(used) < _LARGE
+            else multilevel_preconditioner(system, surface.vertices[used], edge)
+        )
+        solved, left = cg(
+            system,
+            energy[used],
+            x0=first,
+            rtol=_TOLERANCE,
+            maxiter=_MOST_ITERATIONS,
+            M=inverse,
+        )
+        smooth = np.zeros(count)
+        smooth[used] = solved if left == 0 else spsolve(system.tocsc(), energy[used])
+        # Spread evenly, what the iterations leave: the total is kept to rounding.
+        smooth[used] += (energy[used].sum() - area[used] @ smooth[used]) / area[used].sum()
+        energy = area * smooth
+    return np.divide(energy, area, out=np.zeros(len(area)), where=area > 0)
 
 
 def _diffusion_matrix(surface: Surface, area: FloatArray, length: float) -> tuple[csr_array, float]:
     """Return M + l^2/2 L, #V by #V, and the length of a typical edge [m]."""
-    from scipy.sparse import diags_array
-
-    joined, edge = _halves_of_couplings(surface, length)
-    joined = joined + joined.T
-    return (diags_array(area + joined.sum(axis=1)) - joined).tocsr(), edge
-
-
-def _halves_of_couplings(surface: Surface, length: float) -> tuple[csr_array, float]:
-    """Return a matrix, #V by #V, whose sum with its transpose couples neighbours in M + l^2/2 L, and the length of a typical edge [m]."""
-    from scipy.sparse import csr_array
+    from scipy.sparse import csr_array, diags_array
 
     triangles, _, weight = corner_triangles(surface.faces)
     triangle_area, product = _measured(surface, triangles)
@@ -229,39 +245,10 @@ def _halves_of_couplings(surface: Surface, length: float) -> tuple[csr_array, fl
     half *= 0.25 * length**2 * weight[:, None]
     across = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, 1, axis=1).ravel()
     count = len(surface.vertices)
-    return csr_array((half.ravel(), across), shape=(count, count)), float(np.sqrt(triangle_area.mean()))
-
-
-def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: float) -> FloatArray:
-    from scipy.sparse import diags_array
-    from scipy.sparse.linalg import cg, spsolve
-
-    count = len(surface.vertices)
-    system, edge = _diffusion_matrix(surface, area, length)
-    used = np.flatnonzero(area > 0)
-    if len(used) < count:
-        system = system[used][:, used]
-    # Heat does not spread far in one step, so a few dozen iterations suffice, where a factorisation would grow faster than the mesh.
-    # Where an edge is a small part of the length, sums over cubes save two thirds of them.
-    first = energy[used] / area[used]
-    inverse = (
-        diags_array(1.0 / system.diagonal())
-        if len(used) < _LARGE
-        else multilevel_preconditioner(system, surface.vertices[used], edge)
-    )
-    solved, left = cg(
-        system,
-        energy[used],
-        x0=first,
-        rtol=_TOLERANCE,
-        maxiter=_MOST_ITERATIONS,
-        M=inverse,
-    )
-    smooth = np.zeros(count)
-    smooth[used] = solved if left == 0 else spsolve(system.tocsc(), energy[used])
-    # Spread evenly, what the iterations leave: the total is kept to rounding.
-    smooth[used] += (energy[used].sum() - area[used] @ smooth[used]) / area[used].sum()
-    return smooth
+    # The sum of this matrix with its transpose couples neighbours.
+    joined = csr_array((half.ravel(), across), shape=(count, count))
+    joined = joined + joined.T
+    return (diags_array(area + joined.sum(axis=1)) - joined).tocsr(), float(np.sqrt(triangle_area.mean()))
 
 
 def integrate_faces(surface: Surface, face_density: ArrayLike, regions: Mapping[str, ArrayLike]) -> dict[str, float]:
@@ -359,42 +346,31 @@ def _place(
     marks = {name: _landmark(surface, name, place) for name, place in landmarks.items()}
     to_lines = _by_distance({name: float(np.linalg.norm(offset)) for name, offset in offsets.items()})
     to_marks = _by_distance({name: float(np.linalg.norm(mark - here)) for name, mark in marks.items()})
+    # For example "4 mm above bust line, 12 mm from princess front; 13 mm from bust point".
+    phrases = []
+    for name, distance in list(to_lines.items())[:2]:
+        if distance < 1e-3:
+            phrases.append(f"on {name}")
+            continue
+        rise = -float(offsets[name] @ upwards / norm) / distance
+        # Within 45 degrees of the vertical a line lies above or below, else beside.
+        side = "above" if rise > np.sqrt(0.5) else "below" if rise < -np.sqrt(0.5) else "from"
+        phrases.append(f"{distance * 1e3:.0f} mm {side} {name}")
+    words = ", ".join(phrases)
+    if to_marks:
+        name, distance = next(iter(to_marks.items()))
+        mark = f"at {name}" if distance < 1e-3 else f"{distance * 1e3:.0f} mm from {name}"
+        words = f"{words}; {mark}" if words else mark
+    if not words:
+        words = f"vertex {vertex} at ({', '.join(f'{x:.3f}' for x in here)}) m"
     return EnergyPeak(
         vertex=vertex,
         position=here.copy(),
         density=density,
         lines=to_lines,
         landmarks=to_marks,
-        words=_in_words(vertex, here, offsets, to_lines, to_marks, upwards / norm),
+        words=words,
     )
-
-
-def _in_words(
-    vertex: int,
-    here: FloatArray,
-    offsets: Mapping[str, FloatArray],
-    lines: Mapping[str, float],
-    landmarks: Mapping[str, float],
-    up: FloatArray,
-) -> str:
-    """Return words such as "4 mm above bust line, 12 mm from princess front; 13 mm from bust point"."""
-    phrases = []
-    for name, distance in list(lines.items())[:2]:
-        if distance < 1e-3:
-            phrases.append(f"on {name}")
-            continue
-        rise = -float(offsets[name] @ up) / distance
-        # Within 45 degrees of the vertical a line lies above or below, else beside.
-        side = "above" if rise > np.sqrt(0.5) else "below" if rise < -np.sqrt(0.5) else "from"
-        phrases.append(f"{distance * 1e3:.0f} mm {side} {name}")
-    words = ", ".join(phrases)
-    if landmarks:
-        name, distance = next(iter(landmarks.items()))
-        mark = f"at {name}" if distance < 1e-3 else f"{distance * 1e3:.0f} mm from {name}"
-        words = f"{words}; {mark}" if words else mark
-    if not words:
-        words = f"vertex {vertex} at ({', '.join(f'{x:.3f}' for x in here)}) m"
-    return words
 
 
 def _by_distance(distances: Mapping[str, float]) -> dict[str, float]:
@@ -438,3 +414,44 @@ def _checked_density(values: ArrayLike, count: int, what: str) -> FloatArray:
     if len(wrong):
         raise InputError(f"energy density of {what} {int(wrong[0])} is not finite: {density[wrong[0]]}")
     return density
+
+
+# The first cubes are so many edges wide; there are sums down to a level of at most so many cubes, which is solved.
+_FIRST_CUBE = 1.5
+_COARSEST = 3_000
+
+
+def multilevel_preconditioner(matrix: csr_array, places: FloatArray, edge_length: float) -> LinearOperator:
+    """Return an approximate inverse of a symmetric matrix of diffusion, the sum of those on all levels.
+
+    Args:
+        matrix: #V by #V, positive definite.
+        places: #V by 3 [m].
+        edge_length: of a typical edge [m].
+    """
+    cube = np.floor((places - places.min(axis=0)) / (_FIRST_CUBE * edge_length)).astype(np.int64)
+    inverse, into = [1.0 / matrix.diagonal()], []
+    while matrix.shape[0] > _COARSEST:
+        _, sizes_y, sizes_z = (cube.max(axis=0) + 1).tolist()
+        _, first, label = np.unique(
+            (cube[:, 0] * sizes_y + cube[:, 1]) * sizes_z + cube[:, 2], return_index=True, return_inverse=True
+        )
+        rows = np.arange(len(label) + 1, dtype=np.int32)
+        sums = csr_array((np.ones(len(label)), label.astype(np.int32), rows), shape=(len(label), len(first)))
+        matrix = (sums.T @ (matrix @ sums)).tocsr()
+        inverse.append(1.0 / matrix.diagonal())
+        into.append(label)
+        cube = cube[first] // 2
+    solve = factor_symmetric(matrix)
+
+    def apply(residual: FloatArray) -> FloatArray:
+        residuals: list[FloatArray] = [residual]
+        for label, known in zip(into, inverse[1:], strict=True):
+            residuals.append(np.bincount(label, residuals[-1], minlength=len(known)).astype(np.float64, copy=False))
+        result: FloatArray = solve(residuals[-1])
+        for level in range(len(into) - 1, -1, -1):
+            result = result[into[level]]
+            result += inverse[level] * residuals[level]
+        return result
+
+    return LinearOperator((len(places), len(places)), matvec=apply, dtype=np.float64)

@@ -132,15 +132,11 @@ def crossings(
     # Edges on one line touch only where their boxes do.
     meet &= _boxes_meet(np.minimum(a, b), np.maximum(a, b), np.minimum(c, d), np.maximum(c, d))
     i, j = i[meet], j[meet]
-    after = _next_edge(edges)
+    at = np.arange(len(edges.tail))
+    after = edges.first + (at - edges.first + 1) % edges.count
     a, b, c = (positions[end] for end in (edges.tail, edges.head, edges.head[after]))
     back = np.flatnonzero((_side(a, b, c) == 0) & (np.einsum("ij,ij->i", b - a, c - b) < 0))
     return np.concatenate([i, back]), np.concatenate([j, after[back]])
-
-
-def _next_edge(edges: BorderEdges) -> IndexArray:
-    at = np.arange(len(edges.tail))
-    return edges.first + (at - edges.first + 1) % edges.count
 
 
 def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
@@ -216,9 +212,10 @@ def overlap_area(surface: Surface, positions: FloatArray, cut_sides: IntArray) -
 
     See `certify` for the arguments.
     """
+    import shapely
+
     if certify(surface, positions, cut_sides):
         return 0.0
-    import shapely
 
     component, total, overlap = components_of(surface), 0.0, 0.0
     edges, folded = border_edges_of(surface), not _no_face_is_mirrored(surface, positions)
@@ -231,24 +228,20 @@ def overlap_area(surface: Surface, positions: FloatArray, cut_sides: IntArray) -
             cells = cells[shapely.is_valid(cells)]
             overlap += float(shapely.area(cells).sum()) - float(shapely.union_all(cells).area)
         else:
-            own = edges.component == number
-            overlap += _area_beyond_first(positions[edges.tail[own]], positions[edges.head[own]])
+            here = edges.component == number
+            # The area around which the border winds more than once, as often as it does so again [m2].
+            tail = positions[edges.tail[here]]
+            head = positions[edges.head[here]]
+            parts = shapely.get_parts(
+                shapely.polygonize([shapely.union_all(shapely.linestrings(np.stack([tail, head], axis=1)))])
+            )
+            x, y = shapely.get_coordinates(shapely.point_on_surface(parts)).T[:, :, None]
+            along = head - tail
+            left = along[:, 0] * (y - tail[:, 1]) > along[:, 1] * (x - tail[:, 0])
+            upwards, downwards = (tail[:, 1] <= y) & (y < head[:, 1]), (head[:, 1] <= y) & (y < tail[:, 1])
+            winding = (upwards & left).sum(axis=1) - (downwards & ~left).sum(axis=1)
+            overlap += float(shapely.area(parts) @ np.maximum(winding - 1, 0))
     return overlap if overlap > _ROUNDING * total else 0.0
-
-
-def _area_beyond_first(tail: FloatArray, head: FloatArray) -> float:
-    """Return the area around which a border (edges #B by 2 [m]) winds more than once, as often as it does so again [m2]."""
-    import shapely
-
-    parts = shapely.get_parts(
-        shapely.polygonize([shapely.union_all(shapely.linestrings(np.stack([tail, head], axis=1)))])
-    )
-    x, y = shapely.get_coordinates(shapely.point_on_surface(parts)).T[:, :, None]
-    way = head - tail
-    left = way[:, 0] * (y - tail[:, 1]) > way[:, 1] * (x - tail[:, 0])
-    upwards, downwards = (tail[:, 1] <= y) & (y < head[:, 1]), (head[:, 1] <= y) & (y < tail[:, 1])
-    winding = (upwards & left).sum(axis=1) - (downwards & ~left).sum(axis=1)
-    return float(shapely.area(parts) @ np.maximum(winding - 1, 0))
 
 
 def winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:

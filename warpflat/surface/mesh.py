@@ -15,9 +15,6 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = [
     "Surface",
-    "drop_result",
-    "face_results",
-    "is_large",
     "once_per_faces",
     "once_per_surface",
     "read_only",
@@ -105,7 +102,7 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
     def remembered(surface: Surface) -> Result:
         known = surface.of_faces
         if known.get("faces") is not surface.faces:
-            known = face_results(surface.faces)
+            known = {"faces": surface.faces}
             object.__setattr__(surface, "of_faces", known)
         # Read only once, as another thread may drop it.
         result: Result = known.get(name, _UNKNOWN)
@@ -116,14 +113,6 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
     return remembered
 
 
-def drop_result(surface: Surface, measure: Callable[[Surface], Any]) -> None:
-    """Drop the kept result of a function decorated with `once_per_faces`; the next call computes it again."""
-    surface.of_faces.pop(_name(measure), None)
-
-
-def face_results(faces: IntArray, results: Mapping[Callable[[Surface], Any], Any] | None = None) -> dict[str, Any]:
-    """Make `Surface.of_faces` for surfaces with these faces (#F by 4) from results of functions decorated with `once_per_faces`."""
-    return {"faces": faces} | {_name(measure): result for measure, result in (results or {}).items()}
 
 
 def _name(measure: Callable[..., Any]) -> str:
@@ -136,12 +125,3 @@ def read_only(arrays: Result) -> Result:
         if isinstance(value, np.ndarray):
             value.flags.writeable = False
     return arrays
-
-
-# Vertices above which dropping intermediate results before the relaxation is worth the time it takes.
-_LARGE = 50_000
-
-
-def is_large(surface: Surface) -> bool:
-    """Return whether a surface is so large that intermediate results are dropped before its relaxation, to save memory."""
-    return len(surface.vertices) > _LARGE

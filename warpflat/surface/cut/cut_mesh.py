@@ -139,7 +139,34 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
             raise InputError(f"edge {_edge(chain, int(again[0]))} is cut by two paths; leave it out of one of them")
         marked[edge] = True
 
-    vertex, origin, fans = _double(he, marked, on_path, [left for left, _ in sides], vertex_count)
+    # Each fan of faces around a vertex on a path gets a vertex of its own.
+    by_edge = np.argsort(he.edge, kind="stable")
+    same = (he.edge[by_edge[1:]] == he.edge[by_edge[:-1]]) & ~marked[he.edge[by_edge[1:]]]
+    a, b = by_edge[:-1][same], by_edge[1:][same]
+    # Wound consistently, one face's half-edge starts where the other's ends.
+    rows, columns = np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b])
+    fan = join_labels(len(he.tail), rows, columns)
+
+    vertex = he.tail.copy()
+    keep: dict[int, int] = {}
+    for half in np.concatenate([left for left, _ in sides]).tolist():
+        for corner in (half, int(he.next[half])):
+            keep.setdefault(int(he.tail[corner]), int(fan[corner]))
+    at_path = np.flatnonzero(np.isin(he.tail, on_path))
+    copies: list[int] = []
+    given: dict[int, int] = {}
+    fans = dict.fromkeys(on_path.tolist(), 0)
+    for corner in at_path.tolist():
+        old, group = int(he.tail[corner]), int(fan[corner])
+        if group not in given:
+            fans[old] += 1
+            if keep.setdefault(old, group) == group:
+                given[group] = old
+            else:
+                given[group] = vertex_count + len(copies)
+                copies.append(old)
+        vertex[corner] = given[group]
+    origin = np.append(np.arange(vertex_count), copies).astype(np.int32)
     new_faces = faces.copy()
     new_faces[near[he.face], he.slot] = vertex
     seams: list[Seam] = []
@@ -153,9 +180,28 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
                 f"cutting edge {_edge(chain, int(whole[0]))} separates nothing, since both its ends lie inside and "
                 "stay whole; start at the border, end on another cut, or take at least two edges"
             )
-        seams.extend(_seams(chain, left_ends, right_ends))
+        # A seam is a stretch along which both sides run on without a break.
+        count = len(left_ends)
+        joined = (left_ends[:-1, 1] == left_ends[1:, 0]) & (right_ends[:-1, 1] == right_ends[1:, 0])
+        starts = [0, *(np.flatnonzero(~joined) + 1).tolist()]
+        runs = [list(range(a, b)) for a, b in zip(starts, [*starts[1:], count], strict=True)]
+        closes = chain[0] == chain[-1] and left_ends[-1, 1] == left_ends[0, 0] and right_ends[-1, 1] == right_ends[0, 0]
+        if closes and len(runs) > 1:
+            runs[0] = runs.pop() + runs[0]
+        for run in runs:
+            last = run[-1]
+            seams.append(
+                Seam(
+                    path=np.append(chain[run], chain[last + 1]),
+                    left=np.append(left_ends[run, 0], left_ends[last, 1]),
+                    right=np.append(right_ends[run, 0], right_ends[last, 1]),
+                )
+            )
 
-    cut_mesh = _mesh_of(new_faces)
+    nowhere = np.empty((0, 3))
+    cut_mesh = Surface(
+        vertices=nowhere, faces=new_faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
+    )
     labels = components_of(cut_mesh)
     after = int(labels.max(initial=-1)) + 1
     # Joined again across the cut, its components are those before it.
@@ -182,14 +228,6 @@ def faces_at(faces: IntArray, vertices: IntArray) -> NDArray[np.int64]:
     # Column by column: along four values NumPy's `any` takes several times as long.
     first, second, third, fourth = there[faces].T
     return np.flatnonzero(first | second | third | fourth)
-
-
-def _mesh_of(faces: IntArray) -> Surface:
-    """Return a surface of which nothing but the faces is known."""
-    nowhere = np.empty((0, 3))
-    return Surface(
-        vertices=nowhere, faces=faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
-    )
 
 
 def _edge(chain: IntArray, index: int) -> str:
@@ -256,76 +294,6 @@ def _sides(
             "only and nothing to separate; start the path where it leaves the border"
         )
     return left, right
-
-
-def _double(
-    he: HalfEdges,
-    marked: BoolArray,
-    on_path: IntArray,
-    left: Sequence[IndexArray],
-    vertex_count: int,
-) -> tuple[IntArray, IntArray, dict[int, int]]:
-    """Give each fan of faces around a vertex on a path a vertex of its own.
-
-    Args:
-        he: half-edges of all faces that touch a path vertex.
-        marked: #E, the edges to cut.
-        on_path: the path vertices, sorted.
-        left: the half-edges on the left of each path: the left side keeps the old numbers.
-        vertex_count: #V.
-
-    Returns:
-        #H, the new vertex at each corner; #W, vertex_origin; the number of fans at each path vertex.
-    """
-    by_edge = np.argsort(he.edge, kind="stable")
-    same = (he.edge[by_edge[1:]] == he.edge[by_edge[:-1]]) & ~marked[he.edge[by_edge[1:]]]
-    a, b = by_edge[:-1][same], by_edge[1:][same]
-    # Wound consistently, one face's half-edge starts where the other's ends.
-    rows, columns = np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b])
-    fan = join_labels(len(he.tail), rows, columns)
-
-    vertex = he.tail.copy()
-    keep: dict[int, int] = {}
-    for half in np.concatenate(left).tolist():
-        for corner in (half, int(he.next[half])):
-            keep.setdefault(int(he.tail[corner]), int(fan[corner]))
-    at_path = np.flatnonzero(np.isin(he.tail, on_path))
-    copies: list[int] = []
-    given: dict[int, int] = {}
-    fans = dict.fromkeys(on_path.tolist(), 0)
-    for corner in at_path.tolist():
-        old, group = int(he.tail[corner]), int(fan[corner])
-        if group not in given:
-            fans[old] += 1
-            if keep.setdefault(old, group) == group:
-                given[group] = old
-            else:
-                given[group] = vertex_count + len(copies)
-                copies.append(old)
-        vertex[corner] = given[group]
-    return vertex, np.append(np.arange(vertex_count), copies).astype(np.int32), fans
-
-
-def _seams(chain: IntArray, left_ends: IntArray, right_ends: IntArray) -> list[Seam]:
-    """Return the path as stretches along which both sides run on without a break."""
-    count = len(left_ends)
-    joined = (left_ends[:-1, 1] == left_ends[1:, 0]) & (right_ends[:-1, 1] == right_ends[1:, 0])
-    starts = [0, *(np.flatnonzero(~joined) + 1).tolist()]
-    runs = [list(range(a, b)) for a, b in zip(starts, [*starts[1:], count], strict=True)]
-    closes = chain[0] == chain[-1] and left_ends[-1, 1] == left_ends[0, 0] and right_ends[-1, 1] == right_ends[0, 0]
-    if closes and len(runs) > 1:
-        runs[0] = runs.pop() + runs[0]
-    seams = []
-    for run in runs:
-        last = run[-1]
-        seams.append(
-            Seam(
-                path=np.append(chain[run], chain[last + 1]),
-                left=np.append(left_ends[run, 0], left_ends[last, 1]),
-                right=np.append(right_ends[run, 0], right_ends[last, 1]),
-            )
-        )
-    return seams
 
 
 def _kind(

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.surface.cut.dart_legs import check_tip_back
@@ -190,7 +190,14 @@ def shape_dart(
             leaves no dart; if the crack's ends are not on the outline.
     """
     x, a, b = mouth_first(positions, left, right)
-    _check_shape(dart_measure(positions, left, right), int(a[0]), tip_back, blend, fold)
+    measure = dart_measure(positions, left, right)
+    if measure.angle <= 0:
+        raise InputError(f"the cut at vertex {int(a[0])} {overlapping(measure.opening)}")
+    check_tip_back(tip_back, min(measure.left_leg, measure.right_leg) * float(np.cos(measure.angle / 2)))
+    if blend is not None and not (np.isfinite(blend) and blend >= 0):
+        raise InputError(f"blend is a length in metres, 0 or more, got {blend!r}")
+    if fold not in ("left", "right"):
+        raise InputError(f"fold is 'left' or 'right', got {fold!r}")
     crack_tip = x[a[-1]]
     tip = crack_tip + tip_back * _unit(_unit(x[a[0]] - crack_tip) + _unit(x[b[0]] - crack_tip))
     legs = [float(np.linalg.norm(x[side[0]] - tip)) for side in (a, b)]
@@ -202,8 +209,28 @@ def shape_dart(
     moved: dict[int, FloatArray] = {}
     beside = []
     for side, end in zip((a, b), ends, strict=True):
-        run = _outwards(outline, side)
-        points, touched = _with_start_moved(x[run], end, blend)
+        # The outline from the crack's end on the border away from the crack, half way round at most.
+        loop = np.asarray(outline, dtype=np.int32)
+        at = np.flatnonzero(loop == side[0])
+        if len(at) == 0:
+            raise InputError(f"vertex {int(side[0])}, where the cut meets the border, is not on the given outline")
+        rolled = np.roll(loop, -int(at[0]))
+        if rolled[-1] != side[1] and rolled[1 % len(rolled)] != side[1]:
+            raise InputError(f"vertices {int(side[0])} and {int(side[1])} of the cut are no neighbours on the outline")
+        if rolled[1 % len(rolled)] == side[1]:
+            rolled = np.roll(rolled[::-1], 1)
+        run = rolled[: len(rolled) // 2]
+        # The first point moves to `end`, and the next ones less and less over `blend` [m].
+        line = x[run]
+        reach = arc_lengths(line)
+        fade = (
+            np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0)
+            if blend > 0
+            else np.zeros(len(reach))
+        )
+        fade[0] = 1.0
+        points, touched = line + np.multiply.outer(fade, end - line[0]), fade > 0
+        points[0] = end
         beside.append(points)
         moved.update(zip(run[touched].tolist(), points[touched], strict=True))
     folded = 0 if fold == "left" else 1
@@ -220,28 +247,6 @@ def shape_dart(
         moved=np.array(list(moved), dtype=np.int32),
         moved_to=np.array(list(moved.values())).reshape(-1, 2),
     )
-
-
-def _check_shape(measure: DartMeasure, mouth: int, tip_back: float, blend: float | None, fold: str) -> None:
-    if measure.angle <= 0:
-        raise InputError(f"the cut at vertex {mouth} {overlapping(measure.opening)}")
-    check_tip_back(tip_back, min(measure.left_leg, measure.right_leg) * float(np.cos(measure.angle / 2)))
-    if blend is not None and not (np.isfinite(blend) and blend >= 0):
-        raise InputError(f"blend is a length in metres, 0 or more, got {blend!r}")
-    if fold not in ("left", "right"):
-        raise InputError(f"fold is 'left' or 'right', got {fold!r}")
-
-
-def _with_start_moved(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArray, BoolArray]:
-    """Return a line with its first point moved to `end` and the next ones less and less over `blend` [m]; and #P, true for those moved."""
-    reach = arc_lengths(points)
-    fade = (
-        np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0) if blend > 0 else np.zeros(len(reach))
-    )
-    fade[0] = 1.0
-    moved = points + np.multiply.outer(fade, end - points[0])
-    moved[0] = end
-    return moved, fade > 0
 
 
 def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> FishEyeMeasure:
@@ -339,20 +344,6 @@ def _sides(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> tuple[Flo
     if len(outside):
         raise InputError(f"a side of the cut names vertex {int(outside[0])}; the layout has 0 to {len(x) - 1}")
     return x, a, b
-
-
-def _outwards(outline: ArrayLike, side: IntArray) -> IntArray:
-    """Return the outline from a crack's end on the border away from the crack, half way round at most."""
-    loop = np.asarray(outline, dtype=np.int32)
-    at = np.flatnonzero(loop == side[0])
-    if len(at) == 0:
-        raise InputError(f"vertex {int(side[0])}, where the cut meets the border, is not on the given outline")
-    rolled = np.roll(loop, -int(at[0]))
-    if rolled[-1] != side[1] and rolled[1 % len(rolled)] != side[1]:
-        raise InputError(f"vertices {int(side[0])} and {int(side[1])} of the cut are no neighbours on the outline")
-    if rolled[1 % len(rolled)] == side[1]:
-        rolled = np.roll(rolled[::-1], 1)
-    return rolled[: len(rolled) // 2]
 
 
 def _fold_point(

@@ -78,8 +78,32 @@ def lines_after_cut(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) ->
         if len(line) > 1 and on_cut.isdisjoint(line.tolist()):
             renumbered[name] = np.asarray(line, dtype=np.int32)
             continue
-        for suffix, edges in _edges_by_side(name, line, new_side, on_cut).items():
-            runs = _runs(edges)
+        found: dict[str, list[tuple[int, int] | None]] = {"": [], ".left": [], ".right": []}
+        for a, b in pairwise(line.tolist()):
+            left, backward = new_side.get((a, b)), new_side.get((b, a))
+            right = backward[::-1] if backward else None
+            if left is None and right is None:
+                if a in on_cut or b in on_cut:
+                    raise InputError(f"line {name!r} leaves the mesh between vertices {a} and {b}: they share no edge")
+                left = (a, b)
+            along = left is not None and right is not None and left != right
+            found[""].append(None if along else left or right)
+            found[".left"].append(left if along else None)
+            found[".right"].append(right if along else None)
+        for suffix, edges in found.items():
+            # A gap (None) or a doubled vertex ends a chain of vertices.
+            chains: list[list[int]] = []
+            previous: tuple[int, int] | None = None
+            for edge in edges:
+                if edge is not None:
+                    if previous is not None and previous[1] == edge[0]:
+                        chains[-1].append(edge[1])
+                    else:
+                        chains.append(list(edge))
+                previous = edge
+            if len(chains) > 1 and edges[0] is not None and edges[-1] is not None and chains[-1][-1] == chains[0][0]:
+                chains[0] = chains.pop()[:-1] + chains[0]
+            runs = [np.array(chain, dtype=np.int32) for chain in chains]
             for number, run in enumerate(runs, start=1):
                 label = name + suffix + (f".{number}" if len(runs) > 1 else "")
                 while label != name and label in taken:
@@ -87,52 +111,6 @@ def lines_after_cut(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) ->
                 taken.add(label)
                 renumbered[label] = run
     return renumbered
-
-
-def _edges_by_side(
-    name: str, line: IntArray, new_side: Mapping[tuple[int, int], tuple[int, int]], on_cut: set[int]
-) -> dict[str, list[tuple[int, int] | None]]:
-    """Renumber a line edge by edge.
-
-    Args:
-        name: the line's, for messages.
-        line: its vertices before the cut.
-        new_side: the sides of faces near the cut, (tail, head) before it to (tail, head) after it.
-        on_cut: the vertices along the cut.
-
-    Returns:
-        By the suffix of the new name ("" off the cut, ".left" and ".right" along it) an entry for each edge: its ends after the
-        cut, or None where the edge has none under that name.
-    """
-    found: dict[str, list[tuple[int, int] | None]] = {"": [], ".left": [], ".right": []}
-    for a, b in pairwise(line.tolist()):
-        left, backward = new_side.get((a, b)), new_side.get((b, a))
-        right = backward[::-1] if backward else None
-        if left is None and right is None:
-            if a in on_cut or b in on_cut:
-                raise InputError(f"line {name!r} leaves the mesh between vertices {a} and {b}: they share no edge")
-            left = (a, b)
-        along = left is not None and right is not None and left != right
-        found[""].append(None if along else left or right)
-        found[".left"].append(left if along else None)
-        found[".right"].append(right if along else None)
-    return found
-
-
-def _runs(edges: Sequence[tuple[int, int] | None]) -> list[IntArray]:
-    """Join the edges of a line to unbroken chains of vertices; a gap (None) or a doubled vertex ends a chain."""
-    chains: list[list[int]] = []
-    previous: tuple[int, int] | None = None
-    for edge in edges:
-        if edge is not None:
-            if previous is not None and previous[1] == edge[0]:
-                chains[-1].append(edge[1])
-            else:
-                chains.append(list(edge))
-        previous = edge
-    if len(chains) > 1 and edges[0] is not None and edges[-1] is not None and chains[-1][-1] == chains[0][0]:
-        chains[0] = chains.pop()[:-1] + chains[0]
-    return [np.array(chain, dtype=np.int32) for chain in chains]
 
 
 def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = None) -> tuple[Piece, ...]:
@@ -166,11 +144,15 @@ def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = No
         number = np.full(len(whole.vertices) + 1, -1, dtype=np.int32)
         number[used] = np.arange(len(used), dtype=np.int32)
         held = {key: number[line] for key, line in whole.lines.items() if (number[line] >= 0).all()}
+        plain = [name if name in surface.lines else _PART.sub("", name.rstrip("'")) for name in held]
         part = replace(
             whole,
             vertices=whole.vertices[used],
             faces=number[faces],
-            lines=_plain_names(held, surface.lines),
+            lines={
+                short if plain.count(short) == 1 else name: line
+                for (name, line), short in zip(held.items(), plain, strict=True)
+            },
             name=name,
             input_index=whole.input_index[used],
         )
@@ -178,15 +160,6 @@ def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = No
             Piece(surface=part, vertex_index=used, vertex_origin=cut.vertex_origin[used], face_index=face_index)
         )
     return tuple(pieces)
-
-
-def _plain_names(lines: Mapping[str, IntArray], before: Mapping[str, IntArray]) -> dict[str, IntArray]:
-    """Drop .left, .right, .1 ... that the cut has added wherever the plain name is unambiguous."""
-    plain = [name if name in before else _PART.sub("", name.rstrip("'")) for name in lines]
-    return {
-        short if plain.count(short) == 1 else name: line
-        for (name, line), short in zip(lines.items(), plain, strict=True)
-    }
 
 
 def _names_by_place(whole: Surface, cut: Cut) -> list[str]:

@@ -16,13 +16,13 @@ from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, expect, nearest
 from warpflat.core.file_names import check_file_name, make_file_name, plain_label
-from warpflat.core.input_files import listening_to_reads, reading
+from warpflat.core.input_files import listening_to_reads, note_read, reading
 from warpflat.core.text import quote_value
+from warpflat.core.usd_process import read_apart
 from warpflat.surface.io.read_obj import read_obj
 from warpflat.surface.io.read_off import read_off
 from warpflat.surface.io.read_trimesh import GLTF, read_with_trimesh
-from warpflat.surface.io.read_usd import read_usd
-from warpflat.surface.io.usd_stage import ALL_PRIMS
+from warpflat.surface.io.usd_stage import ALL_PRIMS, UsdMesh
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import line_from_curve, with_lines
 from warpflat.surface.repair.polygons import distinct_corners, pad_corners, split_polygons
@@ -39,6 +39,7 @@ __all__ = [
     "read_scan",
     "read_surface",
 ]
+
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
@@ -162,7 +163,16 @@ def read_mesh_file(
             raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
         raw = _read(file, units, prim)
         if raw.scale is None:
-            raise InputError(_ask_for_units(raw))
+            used = np.unique(raw.polygons[raw.polygons >= 0])
+            points = raw.vertices[used[used < len(raw.vertices)]]
+            points = points[np.isfinite(points).all(axis=1)]
+            sides = {unit: (np.ptp(points, axis=0) * METRES_PER_UNIT[unit]).tolist() for unit in ("m", "cm", "mm")}
+            extents = {unit: " x ".join(f"{side:.3g}" for side in extent) for unit, extent in sides.items()}
+            sizes = "; ".join(f'"{unit}": {extent} m' for unit, extent in extents.items())
+            raise InputError(
+                'carries no unit: say which with units = "m" in the scene or --units m on the command line '
+                f"(m, cm, mm, in, ft); the mesh would measure, as {sizes}"
+            )
     report_activity("checking the mesh")
     return file, raw, raw.scale, sources
 
@@ -186,7 +196,11 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
     suffix = file.suffix.lower()
     scale = METRES_PER_UNIT[units] if units else None
     if suffix in _USD:
-        usd = read_usd(file, prim=prim, metres_per_unit=scale)
+        # The modules of `warpflat.surface` would bring Warp with them, which takes a second to load.
+        usd = read_apart("warpflat.surface.io.usd_stage:read_usd_stage", file, prim=prim, metres_per_unit=scale)
+        assert isinstance(usd, UsdMesh)
+        for layer in usd.layers:
+            note_read(layer)
         return RawMesh(
             vertices=usd.vertices,
             polygons=pad_corners(usd.corners, usd.sizes),
@@ -201,7 +215,34 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
     if prim is not None and suffix not in GLTF:
         raise InputError(f"prim = {prim!r} only means something in a USD or GLB file; use component to choose a part")
     if suffix == ".obj":
-        return _from_obj(file, scale)
+        obj = read_obj(file)
+        raw = RawMesh(
+            vertices=obj.vertices,
+            polygons=obj.polygons,
+            scale=scale,
+            split_corners=obj.split_corners,
+            groups=obj.groups,
+        )
+        if not obj.lines:
+            return raw
+        # The sides of all polygons in both directions, each as one number: tail * number of vertices + head.
+        size = (obj.polygons >= 0).sum(axis=1)
+        column = np.arange(obj.polygons.shape[1])
+        follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
+        heads = np.take_along_axis(obj.polygons, follow, axis=1)
+        real = obj.polygons >= 0
+        a, b = obj.polygons[real], heads[real]
+        stride = len(obj.vertices)
+        edges = np.unique(np.concatenate([a * stride + b, b * stride + a]))
+        for name, chains in obj.lines.items():
+            for number, chain in enumerate(chains):
+                key = name if len(chains) == 1 else f"{name}_{number + 1}"
+                line = np.array(chain, dtype=np.int64)
+                if np.isin(line[:-1] * stride + line[1:], edges).all():
+                    raw.chains[key] = line
+                else:
+                    raw.curves[key] = obj.vertices[line]
+        return raw
     if suffix == ".off":
         vertices, polygons = read_off(file)
         return RawMesh(vertices=vertices, polygons=polygons, scale=scale)
@@ -215,42 +256,6 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         split_corners=mesh.split_corners,
         groups=mesh.groups,
     )
-
-
-def _from_obj(file: Path, scale: float | None) -> RawMesh:
-    obj = read_obj(file)
-    raw = RawMesh(
-        vertices=obj.vertices,
-        polygons=obj.polygons,
-        scale=scale,
-        split_corners=obj.split_corners,
-        groups=obj.groups,
-    )
-    if not obj.lines:
-        return raw
-    edges = _directed_edges(obj.polygons)
-    stride = len(obj.vertices)
-    for name, chains in obj.lines.items():
-        for number, chain in enumerate(chains):
-            key = name if len(chains) == 1 else f"{name}_{number + 1}"
-            line = np.array(chain, dtype=np.int64)
-            if np.isin(line[:-1] * stride + line[1:], edges).all():
-                raw.chains[key] = line
-            else:
-                raw.curves[key] = obj.vertices[line]
-    return raw
-
-
-def _directed_edges(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the sides of all polygons in both directions, each as one number: tail times the number of vertices plus head."""
-    size = (polygons >= 0).sum(axis=1)
-    column = np.arange(polygons.shape[1])
-    follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
-    heads = np.take_along_axis(polygons, follow, axis=1)
-    real = polygons >= 0
-    a, b = polygons[real], heads[real]
-    stride = int(polygons.max()) + 1
-    return np.unique(np.concatenate([a * stride + b, b * stride + a]))
 
 
 def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:
@@ -269,21 +274,6 @@ def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:
         stray = stray_vertex(points)
         if stray is not None:
             raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
-
-
-def _extent(points: FloatArray, scale: float) -> str:
-    return " x ".join(f"{side:.3g}" for side in (np.ptp(points, axis=0) * scale).tolist())
-
-
-def _ask_for_units(raw: RawMesh) -> str:
-    used = np.unique(raw.polygons[raw.polygons >= 0])
-    points = raw.vertices[used[used < len(raw.vertices)]]
-    points = points[np.isfinite(points).all(axis=1)]
-    sizes = "; ".join(f'"{unit}": {_extent(points, METRES_PER_UNIT[unit])} m' for unit in ("m", "cm", "mm"))
-    return (
-        'carries no unit: say which with units = "m" in the scene or --units m on the command line '
-        f"(m, cm, mm, in, ft); the mesh would measure, as {sizes}"
-    )
 
 
 def check_size(surface: Surface, file: Path, scale: float) -> None:

@@ -39,16 +39,16 @@ def read_layout(path: Path) -> FloatArray:
                 places.append([x, y])
             elif key == "f":
                 for vertex, corner in ((int(v), int(t)) for v, t in _CORNER.findall(rest)):
-                    own = vertex - 1 if vertex > 0 else count + vertex
+                    index = vertex - 1 if vertex > 0 else count + vertex
                     at = corner - 1 if corner > 0 else len(places) + corner
-                    if not (0 <= own < count and 0 <= at < len(places)):
+                    if not (0 <= index < count and 0 <= at < len(places)):
                         raise InputError(
                             f"line {number}: corner {quote_value(vertex)}/{quote_value(corner)} is not in the file"
                         )
-                    before = of_vertex.setdefault(own, at)
+                    before = of_vertex.setdefault(index, at)
                     if places[before] != places[at]:
                         raise InputError(
-                            f"line {number}: vertex {own} has two texture coordinates; a start must not be cut"
+                            f"line {number}: vertex {index} has two texture coordinates; a start must not be cut"
                         )
     if not of_vertex:
         raise InputError(f"{path}: has no texture coordinates; a start is read from 'vt x y' and faces 'f v/vt'")

@@ -46,33 +46,26 @@ def read_off(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
     if any(header.groups()) or (points > 0 and all(len(row) > 3 for row in rest[:points])):
         vertices, faces_at = [row[:3] for row in rest[:points]], rest[points:]
     else:
-        vertices, faces_at = _by_threes(rest, points)
+        # The vertices are threes of words, wherever lines end.
+        words: list[str] = []
+        taken = 0
+        while taken < len(rest) and len(words) < 3 * points:
+            words += rest[taken]
+            taken += 1
+        after = [words[3 * points :]] if len(words) > 3 * points else []
+        vertices = [words[i : i + 3] for i in range(0, min(len(words), 3 * points) - 2, 3)]
+        faces_at = [*after, *rest[taken:]]
     if min(points, faces) < 0 or len(vertices) < points:
         raise InputError(f"is cut short: it holds {len(vertices):,} of its {points:,} vertices")
     try:
         positions = np.array(vertices, dtype=np.float64).reshape(points, 3)
     except ValueError:
         raise InputError("not a readable OFF file: a vertex is not three numbers") from None
-    return positions, _polygons(faces_at, faces, points)
-
-
-def _by_threes(rows: list[list[str]], count: int) -> tuple[list[list[str]], list[list[str]]]:
-    """Return the first `count` threes of words, wherever lines end, and the rows after them."""
-    words: list[str] = []
-    taken = 0
-    while taken < len(rows) and len(words) < 3 * count:
-        words += rows[taken]
-        taken += 1
-    after = [words[3 * count :]] if len(words) > 3 * count else []
-    return [words[i : i + 3] for i in range(0, min(len(words), 3 * count) - 2, 3)], [*after, *rows[taken:]]
-
-
-def _polygons(rows: list[list[str]], count: int, points: int) -> NDArray[np.int64]:
-    """Return #F by the largest corner count. A face may run over several lines; what follows it on its last one is its colour."""
+    # A face may run over several lines; what follows it on its last one is its colour.
     corners: list[list[str]] = []
-    lines = iter(rows)
+    lines = iter(faces_at)
     for row in lines:
-        if len(corners) == count:
+        if len(corners) == faces:
             break
         size = int(row[0]) if re.fullmatch(r"\d{1,9}", row[0]) else 0
         if size < 3:
@@ -85,8 +78,8 @@ def _polygons(rows: list[list[str]], count: int, points: int) -> NDArray[np.int6
         if len(words) < size:
             break
         corners.append(words[:size])
-    if len(corners) < count:
-        raise InputError(f"is cut short: it holds {len(corners):,} of its {count:,} faces")
+    if len(corners) < faces:
+        raise InputError(f"is cut short: it holds {len(corners):,} of its {faces:,} faces")
     if not corners:
         raise InputError(f"has no faces, only {points:,} points: export it as a mesh")
     sizes = np.array([len(face) for face in corners], dtype=np.int64)
@@ -100,4 +93,4 @@ def _polygons(rows: list[list[str]], count: int, points: int) -> NDArray[np.int6
         raise InputError(
             f"face {face} (counted from 0) refers to vertex {flat[wrong[0]]}, but there are {points:,} (0 to {points - 1})"
         )
-    return pad_corners(flat, sizes)
+    return positions, pad_corners(flat, sizes)

@@ -46,19 +46,19 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
     closed = small = 0
     objects = list(_objects(raw, name or make_file_name(file.stem)))
     for title, first, polygons in objects:
-        own = vertices[first : first + int(polygons.max()) + 1]
+        points = vertices[first : first + int(polygons.max()) + 1]
         source = str(file) if len(objects) == 1 else f"{file}: {title}"
         try:
-            part = parts_of_faces(own, polygons, weld=False)
+            part = parts_of_faces(points, polygons, weld=False)
             # Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
             soup = 2 * int(part.max() + 1) > len(polygons)
             if soup:
-                part = parts_of_faces(own, polygons, weld=True)
+                part = parts_of_faces(points, polygons, weld=True)
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
         for number in range(int(part.max()) + 1):
             try:
-                surface = make_surface(own, polygons[part == number], name=title, weld=soup, source=source)
+                surface = make_surface(points, polygons[part == number], name=title, weld=soup, source=source)
             except ClosedSurfaceError:
                 closed += 1
                 continue
@@ -110,6 +110,6 @@ def _named_apart(surfaces: list[Surface]) -> tuple[Surface, ...]:
     named = []
     for surface in surfaces:
         seen[surface.name] += 1
-        own = f"{surface.name}_{seen[surface.name]}"
-        named.append(replace(surface, name=own) if often[surface.name] > 1 else surface)
+        numbered = f"{surface.name}_{seen[surface.name]}"
+        named.append(replace(surface, name=numbered) if often[surface.name] > 1 else surface)
     return tuple(named)

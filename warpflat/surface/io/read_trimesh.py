@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.input_files import noting_resolver
-from warpflat.surface.io.read_checks import check_ply, check_stl
 
 __all__ = ["GLTF", "read_with_trimesh"]
+
 
 GLTF = (".glb", ".gltf")
 
@@ -60,17 +60,15 @@ def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
     if not any(len(faces) for _, _, faces in meshes):
         raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
     start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)]).tolist()
+    textured = suffix == ".ply" and any(
+        getattr(getattr(geometry, "visual", None), "kind", None) == "texture" for geometry in scene.geometry.values()
+    )
     return TrimeshMesh(
         vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
         faces=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
-        split_corners=suffix in (".stl", *GLTF) or (suffix == ".ply" and _is_textured(scene)),
+        split_corners=suffix in (".stl", *GLTF) or textured,
         groups=[(at, name) for (name, _, _), at in zip(meshes, start, strict=False)] if suffix in GLTF else [],
     )
-
-
-def _is_textured(scene: Any) -> bool:
-    geometries = [m for m in scene.geometry.values() if hasattr(m, "visual")]
-    return any(getattr(m.visual, "kind", None) == "texture" for m in geometries)
 
 
 def _load_scene(file: Path) -> Any:
@@ -116,3 +114,64 @@ def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
         yield node, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
+
+
+def check_ply(path: Path) -> None:
+    """Check that an ASCII file has all rows that its header announces, each with all numbers of its lists.
+
+    Trimesh checks the length of binary files, and refuses what is no header.
+
+    Raises:
+        InputError: without the file's name, but with the line's number.
+    """
+    head, found, body = path.read_bytes().partition(b"end_header")
+    # Each element's name, its count, and which of its properties are lists.
+    elements: list[tuple[str, int, list[bool]]] = []
+    for line in head.decode("ascii", errors="replace").splitlines():
+        words = line.split()
+        if len(words) == 3 and words[0] == "element" and words[2].isdigit() and len(words[2]) < 12:
+            elements.append((words[1], int(words[2]), []))
+        elif len(words) > 1 and words[0] == "property" and elements:
+            elements[-1][2].append(words[1] == "list")
+    if not found or not elements or b"ascii" not in head:
+        return
+    rows = body.decode("ascii", errors="replace").splitlines()[1:]
+    above = head.count(b"\n") + 2
+    at = 0
+    for name, count, properties in elements:
+        if at + count > len(rows):
+            raise InputError(
+                f"is cut short: it holds {max(len(rows) - at, 0):,} of its {count:,} rows of element {name!r}"
+            )
+        for number in range(at, at + count):
+            if (reason := _fault(rows[number].split(), properties)) is not None:
+                raise InputError(f"line {above + number}: {rows[number].strip()[:40]!r} is no {name!r}: {reason}")
+        at += count
+
+
+def check_stl(path: Path) -> None:
+    """Check that a binary file is as long as its number of triangles requires; trimesh checks the end of text files.
+
+    Raises:
+        InputError: without the file's name.
+    """
+    with path.open("rb") as file:
+        head = file.read(1000)
+    size = path.stat().st_size
+    count = int.from_bytes(head[80:84], "little")
+    if b"facet" not in head.lower() and size != 84 + 50 * count:
+        raise InputError(
+            f"not a readable STL file: {size:,} bytes long, but its header tells of {count:,} triangles of 50 bytes each"
+        )
+
+
+def _fault(words: list[str], properties: list[bool]) -> str | None:
+    """Return what is wrong with a row, or None."""
+    at = 0
+    for is_list in properties:
+        if at >= len(words):
+            return f"{len(words)} numbers are too few"
+        if is_list and not (words[at].isdigit() and len(words[at]) < 9):
+            return f"{words[at][:20]!r} is not the length of a list"
+        at += 1 + (int(words[at]) if is_list else 0)
+    return None if at <= len(words) else f"its list is cut short, {at} numbers are needed"

@@ -1,6 +1,6 @@
 """A mesh of a USD stage, in metres and Y up, with the curves that are drawn beside it.
 
-The process that reads a file loads this module only: see :mod:`warpflat.surface.io.read_usd`.
+The process that reads a file loads this module only: see :mod:`warpflat.surface.io.read`.
 """
 
 from __future__ import annotations
@@ -93,7 +93,19 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
     stage = Usd.Stage.Open(str(path))
     if not stage:
         raise InputError(UNREADABLE)
-    chosen = _choose(stage, prim)
+    meshes = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
+    paths = [str(p.GetPath()) for p in meshes]
+    if not meshes:
+        raise InputError("holds no mesh prim")
+    chosen = meshes
+    if prim is None and len(meshes) > 1:
+        some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
+        raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
+    if prim is not None and prim != ALL_PRIMS:
+        chosen = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
+        if len(chosen) != 1:
+            what = "names several mesh prims" if chosen else "is not a mesh prim"
+            raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
     notes: list[str] = []
     if metres_per_unit is None:
         metres_per_unit = float(UsdGeom.GetStageMetersPerUnit(stage))
@@ -117,10 +129,36 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
     parts = []
     for one in chosen:
         mesh = UsdGeom.Mesh(one)
-        sizes, corners = _faces(mesh)
-        vertices, mirrored = to_metres(_value(mesh.GetPointsAttr()), one)
+        counts, flat = _value(mesh.GetFaceVertexCountsAttr()), _value(mesh.GetFaceVertexIndicesAttr())
+        points = _value(mesh.GetPointsAttr())
+        at = mesh.GetPath()
+        if points is None or len(points) == 0 or counts is None or flat is None or len(counts) == 0:
+            raise InputError(f"mesh {at} has no faces")
+        all_sizes, all_corners = np.asarray(counts, dtype=np.int64), np.asarray(flat, dtype=np.int64)
+        holes = np.asarray(_value(mesh.GetHoleIndicesAttr()) or [], dtype=np.int64)
+        if all_sizes.sum() != len(all_corners) or all_sizes.min() < 0:
+            raise InputError(
+                f"mesh {at} is broken: its face sizes add up to {all_sizes.sum()}, but it lists {len(all_corners)} corners"
+            )
+        if len(all_corners) and (all_corners.min() < 0 or all_corners.max() >= len(points)):
+            raise InputError(f"mesh {at} is broken: its faces refer to vertices beyond its {len(points):,} points")
+        short = np.flatnonzero(all_sizes < 3)
+        if len(short):
+            raise InputError(f"mesh {at}: face {short[0]} has {all_sizes[short[0]]} corners; a face needs at least 3")
+        if len(holes) and (holes.min() < 0 or holes.max() >= len(all_sizes)):
+            raise InputError(f"mesh {at} is broken: its holes refer to faces beyond its {len(all_sizes):,} faces")
+        kept = np.ones(len(all_sizes), dtype=bool)
+        kept[holes] = False
+        if not kept.any():
+            raise InputError(f"mesh {at} has no faces: all are holes")
+        sizes, corners = all_sizes[kept], all_corners[np.repeat(kept, all_sizes)]
+        vertices, mirrored = to_metres(points, one)
         left_handed = _value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
-        parts.append((vertices, sizes, _turned(sizes, corners) if left_handed != mirrored else corners))
+        if left_handed != mirrored:
+            # Faces are wound the other way, from the same first corner.
+            first, size = np.repeat(np.cumsum(sizes) - sizes, sizes), np.repeat(sizes, sizes)
+            corners = corners[first + (size - np.arange(len(corners)) + first) % size]
+        parts.append((vertices, sizes, corners))
     start = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)]).tolist()
     out = UsdMesh(
         name=chosen[0].GetName(),
@@ -132,7 +170,27 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
         groups=[(at, one.GetName()) for one, at in zip(chosen, start, strict=False)],
     )
     for curves in _curve_prims(chosen[0]) if len(chosen) == 1 else []:
-        _add_curves(out, UsdGeom.BasisCurves(curves), to_metres)
+        lines = UsdGeom.BasisCurves(curves)
+        name = lines.GetPrim().GetName()
+        points, counts = _value(lines.GetPointsAttr()), _value(lines.GetCurveVertexCountsAttr())
+        if points is None or counts is None or len(points) != sum(counts):
+            out.notes.append(f"curves {quote_value(name)} have no points and were left out")
+            continue
+        if _value(lines.GetTypeAttr()) != UsdGeom.Tokens.linear:
+            out.notes.append(f"curves {quote_value(name)} are not linear and were left out: convert them to polylines")
+            continue
+        periodic = _value(lines.GetWrapAttr()) == UsdGeom.Tokens.periodic
+        place, _ = to_metres(points, lines.GetPrim())
+        start = 0
+        for number, count in enumerate(counts):
+            part = place[start : start + count]
+            start += count
+            if periodic:
+                part = np.concatenate([part, part[:1]])
+            key = name if len(counts) == 1 else f"{name}_{number + 1}"
+            while key in out.curves:
+                key += "_"
+            out.curves[key] = part
     return out
 
 
@@ -142,69 +200,6 @@ def _value(attribute: Any) -> Any:
 
     value = attribute.Get()
     return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
-
-
-def _choose(stage: Any, prim: str | None) -> list[Any]:
-    from pxr import Usd, UsdGeom
-
-    meshes = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
-    paths = [str(p.GetPath()) for p in meshes]
-    if not meshes:
-        raise InputError("holds no mesh prim")
-    if prim == ALL_PRIMS:
-        return meshes
-    if prim is None:
-        if len(meshes) > 1:
-            some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
-            raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
-        return meshes
-    found = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
-    if len(found) != 1:
-        what = "is not a mesh prim" if not found else "names several mesh prims"
-        raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
-    return found
-
-
-def _faces(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the number of corners of each face and the vertices of all corners, without the faces that are holes."""
-    counts, flat = _value(mesh.GetFaceVertexCountsAttr()), _value(mesh.GetFaceVertexIndicesAttr())
-    points = _value(mesh.GetPointsAttr())
-    at = mesh.GetPath()
-    if points is None or len(points) == 0 or counts is None or flat is None or len(counts) == 0:
-        raise InputError(f"mesh {at} has no faces")
-    sizes, corners = np.asarray(counts, dtype=np.int64), np.asarray(flat, dtype=np.int64)
-    holes = np.asarray(_value(mesh.GetHoleIndicesAttr()) or [], dtype=np.int64)
-    _check_faces(at, sizes, corners, len(points), holes)
-    kept = np.ones(len(sizes), dtype=bool)
-    kept[holes] = False
-    if not kept.any():
-        raise InputError(f"mesh {at} has no faces: all are holes")
-    return sizes[kept], corners[np.repeat(kept, sizes)]
-
-
-def _check_faces(
-    at: Any, sizes: NDArray[np.int64], corners: NDArray[np.int64], points: int, holes: NDArray[np.int64]
-) -> None:
-    """See that the face sizes, corners and holes of the mesh at a prim path agree with each other and with the number of points."""
-    if sizes.sum() != len(corners) or sizes.min() < 0:
-        raise InputError(
-            f"mesh {at} is broken: its face sizes add up to {sizes.sum()}, but it lists {len(corners)} corners"
-        )
-    if len(corners) and (corners.min() < 0 or corners.max() >= points):
-        raise InputError(f"mesh {at} is broken: its faces refer to vertices beyond its {points:,} points")
-    short = np.flatnonzero(sizes < 3)
-    if len(short):
-        raise InputError(f"mesh {at}: face {short[0]} has {sizes[short[0]]} corners; a face needs at least 3")
-    if len(holes) and (holes.min() < 0 or holes.max() >= len(sizes)):
-        raise InputError(f"mesh {at} is broken: its holes refer to faces beyond its {len(sizes):,} faces")
-
-
-def _turned(sizes: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the corners of faces wound the other way, from the same first corner."""
-    start = np.repeat(np.cumsum(sizes) - sizes, sizes)
-    size = np.repeat(sizes, sizes)
-    place = np.arange(len(corners)) - start
-    return corners[start + (size - place) % size]
 
 
 def _curve_prims(mesh: Any) -> list[Any]:
@@ -218,28 +213,3 @@ def _curve_prims(mesh: Any) -> list[Any]:
     # The curves of other groups are drawn on other meshes: a film has those of the pattern beside those of the surface.
     group = next((p for p in beside if p.GetName() == f"{mesh.GetName()}_lines"), None)
     return [p for p in beside + below + children(group) if p.IsA(UsdGeom.BasisCurves)]
-
-
-def _add_curves(out: UsdMesh, curves: Any, to_metres: Any) -> None:
-    from pxr import UsdGeom
-
-    name = curves.GetPrim().GetName()
-    points, counts = _value(curves.GetPointsAttr()), _value(curves.GetCurveVertexCountsAttr())
-    if points is None or counts is None or len(points) != sum(counts):
-        out.notes.append(f"curves {quote_value(name)} have no points and were left out")
-        return
-    if _value(curves.GetTypeAttr()) != UsdGeom.Tokens.linear:
-        out.notes.append(f"curves {quote_value(name)} are not linear and were left out: convert them to polylines")
-        return
-    periodic = _value(curves.GetWrapAttr()) == UsdGeom.Tokens.periodic
-    place, _ = to_metres(points, curves.GetPrim())
-    start = 0
-    for number, count in enumerate(counts):
-        part = place[start : start + count]
-        start += count
-        if periodic:
-            part = np.concatenate([part, part[:1]])
-        key = name if len(counts) == 1 else f"{name}_{number + 1}"
-        while key in out.curves:
-            key += "_"
-        out.curves[key] = part

@@ -44,7 +44,10 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
     # No place is further from another than half of the border is long.
     length, graph = path_length(surface, [line]), EdgeGraph(surface)
     on_border = half_edges_of(surface).count == 1
-    around, area = float(graph.length[on_border].sum()), _area(surface)
+    triangles, _, share = corner_triangles(surface.faces)
+    p = surface.vertices[triangles]
+    area = float(0.5 * share @ np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))
+    around = float(graph.length[on_border].sum())
     # Nor, then, is it many widths long, the area being that way times the mean width.
     if 4 * length >= around or around**2 < 4 * _NARROW * area:
         return None
@@ -67,12 +70,6 @@ def _furthest(surface: Surface, border: IntArray, place: int) -> tuple[int, floa
     """Return the vertex of the border furthest from a vertex, and its distance [m]."""
     away = distance_from(surface, [place])[border]
     return int(border[away.argmax()]), float(away.max())
-
-
-def _area(surface: Surface) -> float:
-    triangles, _, share = corner_triangles(surface.faces)
-    p = surface.vertices[triangles]
-    return float(0.5 * share @ np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))
 
 
 def _end_at(surface: Surface, border: IntArray, tip: int, most: float) -> IntArray:

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IndexArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
 from warpflat.surface.connectivity import border_loops
@@ -92,27 +92,37 @@ def line_on_border(
     if side is not None:
         if start is not None or end is not None:
             raise InputError("a stretch of the border is a side, or from start to end, not both")
-        return _side(surface, loops[0], side)
+        loop = loops[0]
+        if side not in SIDES:
+            raise InputError(f"unknown side {side!r} of the border; {nearest(str(side), SIDES)}")
+        at = _corners(surface, loop, side)
+        # Seen from outside the border runs counter-clockwise.
+        sides = {"left": ("tl", "bl"), "bottom": ("bl", "br"), "right": ("br", "tr"), "top": ("tr", "tl")}
+        line = _between(loop, at[sides[side][0]], at[sides[side][1]])
+        return line[::-1].copy() if side in ("left", "top") else line
     if start is None or end is None:
         raise InputError(f"a stretch of the border needs a side ({', '.join(SIDES)}), or both start and end")
     if direction not in DIRECTIONS:
         raise InputError(f"unknown direction {direction!r} along the border; {nearest(str(direction), DIRECTIONS)}")
-    return _stretch(surface, loops, start, end, direction, as_read)
+    border = np.unique(np.concatenate(loops))
+    a, b = (as_vertex(surface, place, as_read=as_read, among=border) for place in (start, end))
+    for vertex in (a, b):
+        if vertex not in border:
+            raise InputError(f"vertex {vertex} of {surface.name!r} does not lie on its border")
+    loop = next(loop for loop in loops if a in loop)
+    if b not in loop:
+        raise InputError(f"vertices {a} and {b} of {surface.name!r} lie on different border loops")
+    i, j = int(np.flatnonzero(loop == a)[0]), int(np.flatnonzero(loop == b)[0])
+    along, back = _between(loop, i, j), _between(loop, j, i)[::-1].copy()
+    if direction == "shortest":
+        length = [polyline_length(surface.vertices[path]) for path in (along, back)]
+        direction = "with" if length[0] <= length[1] else "against"
+    return along if direction == "with" else back
 
 
 def _between(loop: IntArray, i: int, j: int) -> IntArray:
     """Return the loop from position i to position j, both included; the whole loop, closed, if they are one."""
     return np.roll(loop, -i)[np.arange((j - i - 1) % len(loop) + 2) % len(loop)]
-
-
-def _side(surface: Surface, loop: IntArray, side: str) -> IntArray:
-    if side not in SIDES:
-        raise InputError(f"unknown side {side!r} of the border; {nearest(str(side), SIDES)}")
-    at = _corners(surface, loop, side)
-    # Seen from outside the border runs counter-clockwise.
-    ways = {"left": ("tl", "bl"), "bottom": ("bl", "br"), "right": ("br", "tr"), "top": ("tr", "tl")}
-    line = _between(loop, at[ways[side][0]], at[ways[side][1]])
-    return line[::-1].copy() if side in ("left", "top") else line
 
 
 def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
@@ -127,13 +137,51 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
     y = (y - y.min()) / max(float(np.ptp(y)), np.finfo(float).tiny)
     corner = {"bl": -x - y, "br": x - y, "tr": x + y, "tl": y - x}
     at = {key: int(np.argmax(value)) for key, value in corner.items()}
-    turn = _turns(surface, loop)
+    # The border turns at each of its vertices by pi less the angles of the faces there.
+    sides = half_edges_of(surface)
+    x, ahead, before = surface.vertices, sides.head, np.empty_like(sides.tail)
+    before[sides.next] = sides.tail
+    u, v = x[ahead] - x[sides.tail], x[before] - x[sides.tail]
+    angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
+    turn = np.asarray(np.pi - np.bincount(sides.tail, angle, minlength=len(x))[loop])
     if len(set(at.values())) == 4 and turn[list(at.values())].min() > _CORNER:
         return at
-    sharp = _four_sharpest(turn)
-    if sharp is not None:
-        return _named(surface, loop, sharp, side)
-    if _turned_away(surface, towards) > _AWAY_SHARE:
+    order = np.argsort(-turn, kind="stable")
+    least = float(turn[order[3]]) if len(turn) > 3 else 0.0
+    if least >= _CORNER and not (len(turn) > 4 and turn[order[4]] > _SHARPER * least):
+        # There are four corners, and the border hardly turns anywhere else.
+        sharp = np.sort(order[:4])
+        # The sides between four corners lie where their names say. Of each the mean place, weighed by length.
+        middle = np.empty((4, 3))
+        for k in range(4):
+            points = surface.vertices[_between(loop, int(sharp[k]), int(sharp[(k + 1) % 4]))]
+            length = segment_lengths(points)
+            middle[k] = np.average(0.5 * (points[1:] + points[:-1]), axis=0, weights=length)
+        size = float(np.linalg.norm(np.ptp(surface.vertices[loop], axis=0)))
+        # As it is seen by somebody who stands before the piece, also if it faces up or down; then as it faces.
+        towards, upright = viewing_frame(surface)[2] * [1.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0])
+        level = float(np.linalg.norm(towards))
+        standing = np.cross(upright, towards / level) if level > _FACING else np.array([1.0, 0.0, 0.0])
+        for right, up in ((standing, upright), viewing_frame(surface)[:2]):
+            x, y = middle @ right, middle @ up
+            # Beginning with each side in turn: bottom, right, top, left.
+            fits = np.array([x[(k + 1) % 4] - x[(k + 3) % 4] + y[(k + 2) % 4] - y[k] for k in range(4)])
+            first = int(np.argmax(fits))
+            if fits[first] > _APART * size and np.delete(fits, first).max() < _PLAINLY * fits[first]:
+                return {key: int(sharp[(first + k) % 4]) for k, key in enumerate(("bl", "br", "tr", "tl"))}
+        raise InputError(
+            f"which of the four sides of {surface.name!r} is {side!r} cannot be told from the front; give start and end instead"
+        )
+    # How much of the border's length has the surface beside it turned away from the viewer?
+    triangles, face = triangulate(surface.faces)
+    p = surface.vertices[triangles]
+    vector = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal = np.stack([np.bincount(face, vector[:, k], minlength=len(surface.faces)) for k in range(3)], axis=1)
+    away = normal @ towards < -_AWAY * np.linalg.norm(normal, axis=1)
+    sides = half_edges_of(surface)
+    border = sides.count[sides.edge] == 1
+    length = np.linalg.norm(surface.vertices[sides.head[border]] - surface.vertices[sides.tail[border]], axis=1)
+    if float(length[away[sides.face[border]]].sum() / length.sum()) > _AWAY_SHARE:
         near = {key: _corner_near(surface, loop, turn, place) for key, place in at.items()}
         if len(set(near.values())) == 4 and turn[list(near.values())].min() > _CORNER:
             return near
@@ -155,95 +203,6 @@ def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int)
     Where a side curls a little out of sight, the outermost point that is seen lies beside the corner.
     """
     station = arc_lengths(surface.vertices[loop], closed=True)
-    way = np.abs(station[:-1] - station[place])
-    near = np.minimum(way, station[-1] - way) < _NEAR * station[-1]
+    distance = np.abs(station[:-1] - station[place])
+    near = np.minimum(distance, station[-1] - distance) < _NEAR * station[-1]
     return int(np.argmax(np.where(near, turn, -np.inf)))
-
-
-def _four_sharpest(turn: FloatArray) -> IndexArray | None:
-    """Return the positions of four corners, in order, of a border that hardly turns anywhere else; None for any other border."""
-    order = np.argsort(-turn, kind="stable")
-    least = float(turn[order[3]]) if len(turn) > 3 else 0.0
-    if least < _CORNER or (len(turn) > 4 and turn[order[4]] > _SHARPER * least):
-        return None
-    return np.sort(order[:4])
-
-
-def _named(surface: Surface, loop: IntArray, at: IndexArray, side: str) -> dict[str, int]:
-    """Name four corners so that the sides between them lie where their names say.
-
-    Raises:
-        InputError: two ways of naming them fit.
-    """
-    # Sides from each corner to the next; the mean place of each, weighed by length.
-    middle = np.empty((4, 3))
-    for k in range(4):
-        points = surface.vertices[_between(loop, int(at[k]), int(at[(k + 1) % 4]))]
-        length = segment_lengths(points)
-        middle[k] = np.average(0.5 * (points[1:] + points[:-1]), axis=0, weights=length)
-    size = float(np.linalg.norm(np.ptp(surface.vertices[loop], axis=0)))
-    for right, up in (_standing(surface), viewing_frame(surface)[:2]):
-        x, y = middle @ right, middle @ up
-        # Beginning with each side in turn: bottom, right, top, left.
-        fits = np.array([x[(k + 1) % 4] - x[(k + 3) % 4] + y[(k + 2) % 4] - y[k] for k in range(4)])
-        first = int(np.argmax(fits))
-        if fits[first] > _APART * size and np.delete(fits, first).max() < _PLAINLY * fits[first]:
-            return {key: int(at[(first + k) % 4]) for k, key in enumerate(("bl", "br", "tr", "tl"))}
-    raise InputError(
-        f"which of the four sides of {surface.name!r} is {side!r} cannot be told from the front; give start and end instead"
-    )
-
-
-def _standing(surface: Surface) -> tuple[FloatArray, FloatArray]:
-    """Return right and up for somebody who stands before the piece, also if it faces up or down."""
-    towards, up = viewing_frame(surface)[2] * [1.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0])
-    size = float(np.linalg.norm(towards))
-    right = np.cross(up, towards / size) if size > _FACING else np.array([1.0, 0.0, 0.0])
-    return right, up
-
-
-def _turned_away(surface: Surface, towards: FloatArray) -> float:
-    """Return the share of the border's length beside which the surface turns away from the viewer."""
-    triangles, face = triangulate(surface.faces)
-    p = surface.vertices[triangles]
-    vector = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normal = np.stack([np.bincount(face, vector[:, k], minlength=len(surface.faces)) for k in range(3)], axis=1)
-    away = normal @ towards < -_AWAY * np.linalg.norm(normal, axis=1)
-    sides = half_edges_of(surface)
-    border = sides.count[sides.edge] == 1
-    length = np.linalg.norm(surface.vertices[sides.head[border]] - surface.vertices[sides.tail[border]], axis=1)
-    return float(length[away[sides.face[border]]].sum() / length.sum())
-
-
-def _turns(surface: Surface, loop: IntArray) -> FloatArray:
-    """Return the angle [rad] by which the border turns at each of its vertices on the surface: pi less the angles of the faces there."""
-    sides = half_edges_of(surface)
-    x, ahead, before = surface.vertices, sides.head, np.empty_like(sides.tail)
-    before[sides.next] = sides.tail
-    u, v = x[ahead] - x[sides.tail], x[before] - x[sides.tail]
-    angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
-    return np.asarray(np.pi - np.bincount(sides.tail, angle, minlength=len(x))[loop])
-
-
-def _stretch(
-    surface: Surface,
-    loops: list[IntArray],
-    start: int | ArrayLike,
-    end: int | ArrayLike,
-    direction: str,
-    as_read: bool,
-) -> IntArray:
-    border = np.unique(np.concatenate(loops))
-    a, b = (as_vertex(surface, place, as_read=as_read, among=border) for place in (start, end))
-    for vertex in (a, b):
-        if vertex not in border:
-            raise InputError(f"vertex {vertex} of {surface.name!r} does not lie on its border")
-    loop = next(loop for loop in loops if a in loop)
-    if b not in loop:
-        raise InputError(f"vertices {a} and {b} of {surface.name!r} lie on different border loops")
-    i, j = int(np.flatnonzero(loop == a)[0]), int(np.flatnonzero(loop == b)[0])
-    along, back = _between(loop, i, j), _between(loop, j, i)[::-1].copy()
-    if direction == "shortest":
-        length = [polyline_length(surface.vertices[way]) for way in (along, back)]
-        direction = "with" if length[0] <= length[1] else "against"
-    return along if direction == "with" else back

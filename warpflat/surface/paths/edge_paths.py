@@ -103,7 +103,23 @@ def as_vertex(surface: Surface, place: int | ArrayLike, *, as_read: bool = False
         InputError: if the index does not exist or the point is off the piece.
     """
     if np.ndim(place) == 0:
-        return _by_index(surface, place, as_read)
+        if isinstance(place, (bool, np.bool_)) or not isinstance(place, (int, np.integer)):
+            raise InputError(f"a place is a vertex index or a point of three numbers [m], got {place!r}")
+        index = int(place)
+        total = len(surface.input_vertices) if as_read else len(surface.vertices)
+        if not 0 <= index < total:
+            raise InputError(f"vertex {index} does not exist in {surface.name!r}: valid are 0 to {total - 1}")
+        if not as_read:
+            return index
+        at = np.flatnonzero(surface.input_index == index)
+        if len(at) == 0:
+            # It was welded or merged away: the vertex now at its place stands for it.
+            point = surface.input_vertices[index]
+            distance = np.linalg.norm(surface.vertices - point, axis=1)
+            if distance.min() > 1e-4 * np.linalg.norm(np.ptp(surface.vertices, axis=0)):
+                raise InputError(f"vertex {index} of the input is not part of the piece {surface.name!r}")
+            return int(np.argmin(distance))
+        return int(at[0])
     point = np.asarray(place, dtype=np.float64)
     if point.shape != (3,) or not np.isfinite(point).all():
         raise InputError(f"a place is a vertex index or a point of three numbers [m], got {place!r}")
@@ -120,26 +136,6 @@ def as_vertex(surface: Surface, place: int | ArrayLike, *, as_read: bool = False
             f"{surface.name!r}; its nearest vertex is {vertex} at ({x:.4g}, {y:.4g}, {z:.4g})"
         )
     return vertex
-
-
-def _by_index(surface: Surface, place: object, as_read: bool) -> int:
-    if isinstance(place, (bool, np.bool_)) or not isinstance(place, (int, np.integer)):
-        raise InputError(f"a place is a vertex index or a point of three numbers [m], got {place!r}")
-    index = int(place)
-    total = len(surface.input_vertices) if as_read else len(surface.vertices)
-    if not 0 <= index < total:
-        raise InputError(f"vertex {index} does not exist in {surface.name!r}: valid are 0 to {total - 1}")
-    if not as_read:
-        return index
-    at = np.flatnonzero(surface.input_index == index)
-    if len(at) == 0:
-        # It was welded or merged away: the vertex now at its place stands for it.
-        point = surface.input_vertices[index]
-        distance = np.linalg.norm(surface.vertices - point, axis=1)
-        if distance.min() > 1e-4 * np.linalg.norm(np.ptp(surface.vertices, axis=0)):
-            raise InputError(f"vertex {index} of the input is not part of the piece {surface.name!r}")
-        return int(np.argmin(distance))
-    return int(at[0])
 
 
 def path_length(surface: Surface, paths: Sequence[ArrayLike]) -> float:

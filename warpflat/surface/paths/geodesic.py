@@ -171,8 +171,19 @@ class _GeodesicField:
     """
 
     def __init__(self, surface: Surface, triangles: IntArray, line: NDArray[np.int64]) -> None:
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import connected_components, dijkstra
+
         # Paths along edges are no shorter, and nearly in the right order: inside this class vertices are numbered by their lengths.
-        along_edges = _along_edges(surface, line)
+        edges, size = half_edges_of(surface).edges, len(surface.vertices)
+        ends = points_at(surface.vertices, edges.T)
+        # A length of zero would be read as "no edge".
+        length = np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny)
+        # Edges are sorted by their first vertex.
+        offset = np.searchsorted(edges[:, 0], np.arange(size + 1)).astype(np.int32)
+        # Copies: SciPy 1.12 takes no read-only arrays here.
+        graph = csr_array((length, edges[:, 1].copy(), offset), shape=(size, size))
+        along_edges = np.asarray(dijkstra(graph, directed=False, indices=line.copy(), min_only=True))
         order = np.argsort(along_edges, kind="stable").astype(np.int32)
         self._here = np.arange(len(order), dtype=np.int32)
         self._rank = np.empty_like(order)
@@ -202,14 +213,7 @@ class _GeodesicField:
                 break
         # These arrays are the largest, and are not needed any more.
         del corner, slot, offset, ends, seen
-        self._order, self._straight = self._order_of_paths()
-        self.distance = self._solve(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
-
-    def _order_of_paths(self) -> tuple[IntArray, bool]:
-        """Return the vertices, each after those that its path leads to, as far as paths run in no circles; and whether none does."""
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import connected_components
-
+        # The vertices stand in an order, each after those that its path leads to, as far as paths run in no circles.
         first, second, share, _ = self._paths
         count = len(self._here)
         ends = np.stack(
@@ -219,8 +223,9 @@ class _GeodesicField:
         graph = csr_array((np.ones(len(ends), dtype=np.int8), ends, offset), shape=(count, count))
         # Strongly connected components are numbered in such an order. Only the number of rounds depends on it.
         parts, label = connected_components(graph, connection="strong")
-        straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
-        return counting_sort(label, parts)[0], straight
+        self._straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
+        self._order = counting_sort(label, parts)[0]
+        self.distance = self._solve(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
 
     def _solve(self, fixed: IntArray, value: FloatArray, *, grows: float) -> FloatArray:
         """Solve for values along the paths.
@@ -254,22 +259,6 @@ class _GeodesicField:
         start = np.zeros((len(fixed), *values.shape[1:]))
         start[at] = values
         return self._solve(fixed, start.reshape(len(fixed), -1), grows=0.0).reshape(start.shape)[self._rank]
-
-
-def _along_edges(surface: Surface, line: NDArray[np.int64]) -> FloatArray:
-    """Return #V, the distance [m] from the line along edges."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import dijkstra
-
-    edges, size = half_edges_of(surface).edges, len(surface.vertices)
-    ends = points_at(surface.vertices, edges.T)
-    # A length of zero would be read as "no edge".
-    length = np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny)
-    # Edges are sorted by their first vertex.
-    offset = np.searchsorted(edges[:, 0], np.arange(size + 1)).astype(np.int32)
-    # Copies: SciPy 1.12 takes no read-only arrays here.
-    graph = csr_array((length, edges[:, 1].copy(), offset), shape=(size, size))
-    return np.asarray(dijkstra(graph, directed=False, indices=line.copy(), min_only=True))
 
 
 def _directions_at_line(

@@ -56,7 +56,7 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
     line, given = line[~same], given[~same]
     if len(line) < 2:
         raise InputError("a line needs at least two different vertices")
-    broken = np.flatnonzero(~_are_neighbors(surface, line[:-1], line[1:]))
+    broken = np.flatnonzero(~are_joined(half_edges_of(surface).edges, line[:-1], line[1:]))
     if len(broken):
         a, b = given[broken[0]], given[broken[0] + 1]
         raise InputError(
@@ -64,11 +64,6 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
             "list every vertex along the edges, or give its two ends as a shortest path"
         )
     return line
-
-
-def _are_neighbors(surface: Surface, a: IntArray, b: IntArray) -> BoolArray:
-    """Return #N, true where an edge joins `a` and `b` (#N each)."""
-    return are_joined(half_edges_of(surface).edges, a, b)
 
 
 def line_between(surface: Surface, start: int | ArrayLike, end: int | ArrayLike, *, as_read: bool = False) -> IntArray:
@@ -104,6 +99,8 @@ def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntA
     Raises:
         InputError: if the plane misses the piece.
     """
+    from scipy.sparse import coo_matrix
+
     base, direction = np.asarray(point, dtype=np.float64), np.asarray(normal, dtype=np.float64)
     if base.shape != (3,) or direction.shape != (3,) or not np.isfinite([base, direction]).all():
         raise InputError(f"a plane is a point and a normal of three numbers each, got {point!r} and {normal!r}")
@@ -130,7 +127,24 @@ def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntA
     off = np.abs(height)[graph.edges].mean(axis=1) / mean
     weight = graph.length * (1 + _FOLLOW * off**2)
     if closed:
-        line = _path_around(graph, crossing, station, inside, weight, height)
+        # A closed path goes around once with the section, on two copies of the graph.
+        turn = np.zeros(graph.size)
+        turn[graph.edges[crossing]] = (station / max(station[-1], np.finfo(float).tiny))[:, None]
+        turn[graph.edges[crossing[0]]] = 0.0
+        rows = np.flatnonzero(inside)
+        a, b = np.concatenate([graph.edges[rows], graph.edges[rows][:, ::-1]]).T.astype(np.int64)
+        cost = np.maximum(np.tile(weight[rows], 2), np.finfo(float).tiny)
+        step = turn[b] - turn[a]
+        forward, backward = step < -0.5, step > 0.5
+        same = ~forward & ~backward
+        first = np.concatenate([a[same], a[same] + graph.size, a[forward], a[backward] + graph.size])
+        second = np.concatenate([b[same], b[same] + graph.size, b[forward] + graph.size, b[backward]])
+        costs = np.concatenate([cost[same], cost[same], cost[forward], cost[backward]])
+        matrix = coo_matrix((costs, (first, second)), shape=(2 * graph.size, 2 * graph.size)).tocsr()
+        band = np.unique(graph.edges[rows])
+        start = int(band[np.argmin(np.abs(height[band]))])
+        path = path_in(matrix, start, start + graph.size)
+        line = (path % graph.size).astype(np.int32)
     else:
         ends = [edge[np.argmin(np.abs(height[edge]))] for edge in graph.edges[crossing[[0, -1]]]]
         if ends[0] == ends[1]:
@@ -177,40 +191,6 @@ def _longest_section(
     return np.array(chain, dtype=np.int64), station, best[2]
 
 
-def _path_around(
-    graph: EdgeGraph,
-    crossing: NDArray[np.int64],
-    station: FloatArray,
-    inside: BoolArray,
-    weight: FloatArray,
-    height: FloatArray,
-) -> IntArray:
-    """Return the closed path that goes around once with a closed section.
-
-    The band of edges along the section is laid out twice, one turn after the other; the path runs from a vertex to its
-    own copy one turn later.
-    """
-    from scipy.sparse import coo_matrix
-
-    turn = np.zeros(graph.size)
-    turn[graph.edges[crossing]] = (station / max(station[-1], np.finfo(float).tiny))[:, None]
-    turn[graph.edges[crossing[0]]] = 0.0
-    rows = np.flatnonzero(inside)
-    a, b = np.concatenate([graph.edges[rows], graph.edges[rows][:, ::-1]]).T.astype(np.int64)
-    cost = np.maximum(np.tile(weight[rows], 2), np.finfo(float).tiny)
-    step = turn[b] - turn[a]
-    forward, backward = step < -0.5, step > 0.5
-    same = ~forward & ~backward
-    first = np.concatenate([a[same], a[same] + graph.size, a[forward], a[backward] + graph.size])
-    second = np.concatenate([b[same], b[same] + graph.size, b[forward] + graph.size, b[backward]])
-    costs = np.concatenate([cost[same], cost[same], cost[forward], cost[backward]])
-    matrix = coo_matrix((costs, (first, second)), shape=(2 * graph.size, 2 * graph.size)).tocsr()
-    band = np.unique(graph.edges[rows])
-    start = int(band[np.argmin(np.abs(height[band]))])
-    path = path_in(matrix, start, start + graph.size)
-    return (path % graph.size).astype(np.int32)
-
-
 def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") -> IntArray:
     """Return the path along edges that follows a drawn curve most closely.
 
@@ -250,7 +230,14 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
             line.append(end)
             continue
         line += _path_along(surface, graph, curve[i : j + 1], start, end, edge)
-    line = _without_detours(line)
+    # Steps that are taken straight back fall away.
+    out: list[int] = []
+    for vertex in line:
+        if len(out) > 1 and out[-2] == vertex:
+            out.pop()
+        elif not out or out[-1] != vertex:
+            out.append(vertex)
+    line = out
     if len(line) < 2:
         raise InputError(f"curve {quote_value(name)} is shorter than the edges of {surface.name!r} around it")
     return np.array(line, dtype=np.int32)
@@ -272,17 +259,6 @@ def _path_along(surface: Surface, graph: EdgeGraph, curve: FloatArray, start: in
     off, _ = cKDTree(np.concatenate([*fine, curve[-1:]])).query(surface.vertices[graph.edges].mean(axis=1))
     weight = graph.length * (1 + _FOLLOW * (off / edge) ** 2)
     return graph.path(start, end, weight).tolist()[1:]
-
-
-def _without_detours(line: list[int]) -> list[int]:
-    """Return a path without steps that are taken straight back."""
-    out: list[int] = []
-    for vertex in line:
-        if len(out) > 1 and out[-2] == vertex:
-            out.pop()
-        elif not out or out[-1] != vertex:
-            out.append(vertex)
-    return out
 
 
 def with_lines(surface: Surface, lines: Mapping[str, ArrayLike]) -> Surface:

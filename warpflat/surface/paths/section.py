@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -81,7 +79,31 @@ def plane_path(
         return make_path(surface, places, closed=closed)
     if closed:
         raise InputError("the plane's curve is closed and reaches no border; leave `towards` out to cut all round")
-    return make_path(surface, _inwards(surface, places, start, origin, _direction(towards, "`towards`"), triangles))
+    # The half of the row that leaves `start` towards the direction, reversed, so that it ends at `start`.
+    inwards = _direction(towards, "`towards`")
+    segment = int(np.argmin(_distances(surface, places, False, origin)))
+    points = make_path(surface, places).points
+    # A start on a vertex or edge is itself one of the places, up to rounding.
+    near = [i for i in (segment, segment + 1) if places[i].keys() == start.keys()]
+    before = places[: near[0] if near else segment + 1]
+    after = places[near[0] + 1 :] if near else places[segment + 1 :]
+    options = [side for side in (before, after[::-1]) if side]
+    if not options:
+        raise InputError(f"the plane's curve has no part beside {describe_place(start)}")
+
+    def lead(side: list[Place]) -> float:
+        step = np.sum([weight * surface.vertices[v] for v, weight in side[-1].items()], axis=0) - origin
+        return float(step @ inwards / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
+
+    chosen = max(options, key=lead)
+    if lead(chosen) <= 0 or len(points) < 2:
+        raise InputError(
+            f"from {describe_place(start)} the plane's curve does not lead towards {inwards.round(3).tolist()}"
+        )
+    path = simplify_places([*chosen, start])
+    if not VertexStar(triangles).sharing([*path[-2], *path[-1]]):
+        raise InputError(f"the plane's curve passes {describe_place(start)} without meeting it; choose another point")
+    return make_path(surface, path)
 
 
 def _nearest_curve(
@@ -145,27 +167,17 @@ def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int,
     ends = [edge for edge, found in triangles_at.items() if len(found) == 1]
     for seed in [*ends, *triangles_at]:
         if seed in left:
-            chains.append((_chain_from(seed, edges_of, triangles_at, left), len(triangles_at[seed]) > 1))
+            chain, here, came = [seed], seed, -1
+            left.discard(seed)
+            while onward := [t for t in triangles_at[here] if t != came]:
+                came = onward[0]
+                here = next(edge for edge in edges_of[came] if edge != here)
+                if here not in left:
+                    break
+                left.discard(here)
+                chain.append(here)
+            chains.append((chain, len(triangles_at[seed]) > 1))
     return chains
-
-
-def _chain_from(
-    seed: tuple[int, int],
-    edges_of: list[list[tuple[int, int]]],
-    triangles_at: Mapping[tuple[int, int], list[int]],
-    left: set[tuple[int, int]],
-) -> list[tuple[int, int]]:
-    """Follow the crossed edges from one of them, triangle by triangle, and remove them from those `left`."""
-    chain, here, came = [seed], seed, -1
-    left.discard(seed)
-    while onward := [t for t in triangles_at[here] if t != came]:
-        came = onward[0]
-        here = next(edge for edge in edges_of[came] if edge != here)
-        if here not in left:
-            break
-        left.discard(here)
-        chain.append(here)
-    return chain
 
 
 def _distances(surface: Surface, places: list[Place], closed: bool, origin: FloatArray) -> FloatArray:
@@ -173,37 +185,3 @@ def _distances(surface: Surface, places: list[Place], closed: bool, origin: Floa
     points = make_path(surface, places).points
     ends = np.roll(points, -1, axis=0) if closed else points[1:]
     return project_on_segments(origin, points[: len(ends)], ends)[1]
-
-
-def _inwards(
-    surface: Surface,
-    places: list[Place],
-    start: Place,
-    origin: FloatArray,
-    towards: FloatArray,
-    triangles: IntArray,
-) -> list[Place]:
-    """Return the half of an open row of places that leaves `start` in a direction, reversed, so that it ends at `start`."""
-    segment = int(np.argmin(_distances(surface, places, False, origin)))
-    points = make_path(surface, places).points
-    # A start on a vertex or edge is itself one of the places, up to rounding.
-    near = [i for i in (segment, segment + 1) if places[i].keys() == start.keys()]
-    before = places[: near[0] if near else segment + 1]
-    after = places[near[0] + 1 :] if near else places[segment + 1 :]
-    options = [side for side in (before, after[::-1]) if side]
-    if not options:
-        raise InputError(f"the plane's curve has no part beside {describe_place(start)}")
-
-    def lead(side: list[Place]) -> float:
-        step = np.sum([weight * surface.vertices[v] for v, weight in side[-1].items()], axis=0) - origin
-        return float(step @ towards / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
-
-    chosen = max(options, key=lead)
-    if lead(chosen) <= 0 or len(points) < 2:
-        raise InputError(
-            f"from {describe_place(start)} the plane's curve does not lead towards {towards.round(3).tolist()}"
-        )
-    path = simplify_places([*chosen, start])
-    if not VertexStar(triangles).sharing([*path[-2], *path[-1]]):
-        raise InputError(f"the plane's curve passes {describe_place(start)} without meeting it; choose another point")
-    return path

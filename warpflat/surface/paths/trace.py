@@ -186,7 +186,16 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
         if len(end) > 1:
             stop = size + len(inserted)
             inserted[stop] = end
-            triangles = _insert(triangles, stop, end)
+            # A vertex inside a triangle or on an edge divides the triangles at its place.
+            hit = np.isin(triangles, list(end)).sum(axis=1) == len(end)
+            parts = []
+            for corner in range(3):
+                # A part for each corner that the point has a share in: that corner gives way to the new vertex.
+                shares = hit & np.isin(triangles[:, corner], list(end))
+                piece = triangles[shares]
+                piece[:, corner] = stop
+                parts.append(piece)
+            triangles = np.concatenate([triangles[~hit], *parts])
         stops.append(stop)
     extra = [sum(w * surface.vertices[v] for v, w in place.items()) for place in inserted.values()]
     positions = np.concatenate([surface.vertices, np.reshape(extra, (-1, 3))])
@@ -201,7 +210,23 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
             f"no straight path can be drawn from {describe_place(ends[0])} to {describe_place(ends[1])}: faces of the part meet in more "
             "than an edge; give triangles there"
         ) from None
-    walked = _retrace(positions, triangles, np.asarray(drawn), stops[0], stops[1])
+    # The vertex or edge on which each point of the path lies is found from triangle to triangle.
+    star = VertexStar(triangles)
+    walked: list[Place] = [{stops[0]: 1.0}]
+    for target in np.asarray(drawn)[1:-1]:
+        around = star.triangles[star.sharing(list(walked[-1]))]
+        edges = np.concatenate([around[:, [0, 1]], around[:, [1, 2]], around[:, [2, 0]]])
+        tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
+        share, distance = project_on_segments(target, tails, heads)
+        best = int(np.argmin(distance))
+        if distance[best] > 1e-6 * float(np.linalg.norm(heads - tails, axis=1).max()):
+            raise InputError(f"no straight path found near {describe_place(walked[-1])}: repair the triangles there")
+        walked.append(_tidy(edges[best].tolist(), [1.0 - share[best], share[best]]))
+    if not star.sharing([*walked[-1], stops[1]]):
+        raise InputError(
+            f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there"
+        )
+    walked.append({stops[1]: 1.0})
     return make_path(surface, simplify_places([_in_old_vertices(place, inserted) for place in walked]))
 
 
@@ -240,16 +265,14 @@ def simplify_places(places: Sequence[Place]) -> list[Place]:
     kept: list[Place] = []
     for index, place in enumerate(places):
         inner = 0 < index < len(places) - 1
-        if (inner and len(place) == 3) or (kept and kept[-1].keys() == place.keys() and _same(kept[-1], place)):
+        before = kept[-1] if kept else {}
+        same = before.keys() == place.keys() and all(abs(before[v] - place[v]) < _AT_CORNER for v in place)
+        if (inner and len(place) == 3) or same:
             continue
         if len(kept) > 1 and len(kept[-2].keys() | kept[-1].keys() | place.keys()) <= 2:
             kept.pop()
         kept.append(place)
     return kept
-
-
-def _same(a: Place, b: Place) -> bool:
-    return all(abs(a[v] - b[v]) < _AT_CORNER for v in a)
 
 
 class VertexStar:
@@ -276,63 +299,12 @@ class VertexStar:
         return [int(t) for t in found]
 
 
-def _insert(triangles: IntArray, new: int, place: Place) -> IntArray:
-    """Insert a vertex inside a triangle or on an edge, and return the triangles, of which those at that place are divided."""
-    hit = np.isin(triangles, list(place)).sum(axis=1) == len(place)
-    parts = []
-    for corner in range(3):
-        # A part for each corner that the point has a share in: that corner gives way to the new vertex.
-        shares = hit & np.isin(triangles[:, corner], list(place))
-        part = triangles[shares]
-        part[:, corner] = new
-        parts.append(part)
-    return np.concatenate([triangles[~hit], *parts])
-
-
 def _in_old_vertices(place: Place, inserted: dict[int, Place]) -> Place:
     old: Place = {}
     for vertex, weight in place.items():
         for v, w in inserted.get(vertex, {vertex: 1.0}).items():
             old[v] = old.get(v, 0.0) + weight * w
     return _tidy(list(old), list(old.values()))
-
-
-def _retrace(
-    positions: FloatArray,
-    triangles: IntArray,
-    drawn: FloatArray,
-    start: int,
-    stop: int,
-) -> list[Place]:
-    """Find the vertex or edge on which each point of a path lies, from triangle to triangle.
-
-    The solver gives positions only. Each point lies on the border of the triangles around the one before.
-    """
-    star = VertexStar(triangles)
-    walked: list[Place] = [{start: 1.0}]
-    for target in drawn[1:-1]:
-        place, distance, size = _nearest_on_edges(positions, star, walked[-1], target)
-        if distance > 1e-6 * size:
-            raise InputError(f"no straight path found near {describe_place(walked[-1])}: repair the triangles there")
-        walked.append(place)
-    if not star.sharing([*walked[-1], stop]):
-        raise InputError(
-            f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there"
-        )
-    return [*walked, {stop: 1.0}]
-
-
-def _nearest_on_edges(
-    positions: FloatArray, star: VertexStar, here: Place, target: FloatArray
-) -> tuple[Place, float, float]:
-    """Return the nearest place on the edges of the triangles at `here`, its distance [m], and their longest edge [m]."""
-    around = star.triangles[star.sharing(list(here))]
-    edges = np.concatenate([around[:, [0, 1]], around[:, [1, 2]], around[:, [2, 0]]])
-    starts, ends = positions[edges[:, 0]], positions[edges[:, 1]]
-    share, distance = project_on_segments(target, starts, ends)
-    best = int(np.argmin(distance))
-    place = _tidy(edges[best].tolist(), [1.0 - share[best], share[best]])
-    return place, float(distance[best]), float(np.linalg.norm(ends - starts, axis=1).max())
 
 
 def describe_place(place: Place) -> str:

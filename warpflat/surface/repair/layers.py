@@ -104,8 +104,8 @@ def _has_faces(whole: Layer, part: Layer) -> bool:
     place, near = whole.vertices_at(part.vertices, SAME_LAYER)
     if not near.all():
         return False
-    own = {tuple(sorted(face)) for face in whole.faces.tolist()}
-    return all(tuple(sorted(face)) in own for face in np.where(part.faces >= 0, place[part.faces], -1).tolist())
+    known = {tuple(sorted(face)) for face in whole.faces.tolist()}
+    return all(tuple(sorted(face)) in known for face in np.where(part.faces >= 0, place[part.faces], -1).tolist())
 
 
 def _cover_each_other(one: Layer, other: Layer) -> bool:

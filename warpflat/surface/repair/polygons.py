@@ -46,11 +46,6 @@ def pad_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.in
         if not np.issubdtype(polygons.dtype, np.integer):
             raise InputError(f"faces must be integers (vertex indices), got {polygons.dtype}")
         return polygons.astype(np.int64)
-    return pad_corners(*_from_lists(polygons))
-
-
-def _from_lists(polygons: ArrayLike | Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the corners of polygons, one polygon after the other, and #F, the number of corners of each."""
     try:
         rows: list[Any] = list(polygons)  # type: ignore[arg-type]
         count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
@@ -68,7 +63,7 @@ def _from_lists(polygons: ArrayLike | Sequence[Sequence[int]]) -> tuple[NDArray[
     short = np.flatnonzero(count < 3)
     if len(short):
         raise InputError(f"face {short[0]} has {count[short[0]]} corners; a face needs at least 3")
-    return flat, count
+    return pad_corners(flat, count)
 
 
 def pad_corners(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -148,7 +143,12 @@ def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
     import shapely
 
     centred = points - points.mean(axis=0)
-    flat = centred @ _plane_axes(_newell(centred)).T
+    # The polygon's plane, by two vectors that make a right-handed orthogonal frame with its normal.
+    normal = _newell(centred)
+    axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first = np.cross(axis, normal)
+    second = np.cross(normal, first)
+    flat = centred @ np.array([v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in (first, second)]).T
     outline = shapely.Polygon(flat)
     number = {corner: n for n, corner in enumerate(map(tuple, flat.tolist()))}
     if not outline.is_valid or len(number) < len(flat):
@@ -161,14 +161,6 @@ def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
     clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     triangles[clockwise] = triangles[clockwise, ::-1]
     return triangles
-
-
-def _plane_axes(normal: FloatArray) -> FloatArray:
-    """Return 2 by 3, two unit vectors that make a right-handed orthogonal frame with `normal`."""
-    axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    first = np.cross(axis, normal)
-    second = np.cross(normal, first)
-    return np.array([v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in (first, second)])
 
 
 def split_quads(
@@ -204,7 +196,21 @@ def split_quads(
         return faces, origin, {}
     rows, corner = quads[cut], np.argmin(height[cut], axis=1)
     folded, paired = crossed[cut], doublet[cut]
-    corner[folded] = _flatter_diagonals(vertices[faces[rows[folded]]], tolerance)
+    # A folded quad is cut along the diagonal (0 for corners 0-2, 1 for 1-3) at which its halves lie flatter, or along
+    # the shorter of two alike.
+    p = vertices[faces[rows[folded]]]
+    side = np.roll(p, -1, axis=1) - p
+    # The normal of each corner triangle; corners 1 and 3 are the halves along 0-2.
+    normal = np.cross(np.roll(side, 1, axis=1), side)
+    size = np.linalg.norm(normal, axis=2)
+    unit = normal / np.maximum(size, np.finfo(float).tiny)[..., None]
+    bent = np.stack([np.einsum("qi,qi->q", unit[:, k], unit[:, k + 2]) for k in (1, 0)], axis=1)
+    thin = np.stack([np.minimum(size[:, k], size[:, k + 2]) for k in (1, 0)], axis=1)
+    mean = np.linalg.norm(side, axis=2).mean(axis=1, keepdims=True)
+    flatness = np.where(thin > tolerance * mean**2, bent.round(6), -2.0)
+    first, second = (np.linalg.norm(p[:, k + 2] - p[:, k], axis=1) for k in (0, 1))
+    better, equal = flatness[:, 1] > flatness[:, 0], flatness[:, 1] == flatness[:, 0]
+    corner[folded] = (better | (equal & (second < first))).astype(np.intp)
     corner[paired] = np.argmax(lonely[doublet], axis=1)
     turned = faces[rows][np.arange(len(rows))[:, None], (corner[:, None] + np.arange(4)) % 4]
     none = np.full(len(rows), -1, dtype=np.int32)
@@ -221,42 +227,17 @@ def split_quads(
     return faces, of, {what: origin[rows[which]] for what, which in kinds.items() if which.any()}
 
 
-def _flatter_diagonals(p: FloatArray, tolerance: float) -> IndexArray:
-    """Return #Q, the diagonal (0 for corners 0-2, 1 for 1-3) at which the halves of a quad lie flatter; of two alike the shorter.
-
-    Args:
-        p: #Q by 4 by 3, their corners [m].
-        tolerance: a half is a sliver below this share of the quad's mean edge, squared.
-    """
-    side = np.roll(p, -1, axis=1) - p
-    # The normal of each corner triangle; corners 1 and 3 are the halves along 0-2.
-    normal = np.cross(np.roll(side, 1, axis=1), side)
-    size = np.linalg.norm(normal, axis=2)
-    unit = normal / np.maximum(size, np.finfo(float).tiny)[..., None]
-    bent = np.stack([np.einsum("qi,qi->q", unit[:, k], unit[:, k + 2]) for k in (1, 0)], axis=1)
-    thin = np.stack([np.minimum(size[:, k], size[:, k + 2]) for k in (1, 0)], axis=1)
-    mean = np.linalg.norm(side, axis=2).mean(axis=1, keepdims=True)
-    flatness = np.where(thin > tolerance * mean**2, bent.round(6), -2.0)
-    first, second = (np.linalg.norm(p[:, k + 2] - p[:, k], axis=1) for k in (0, 1))
-    better, equal = flatness[:, 1] > flatness[:, 0], flatness[:, 1] == flatness[:, 0]
-    return (better | (equal & (second < first))).astype(np.intp)
-
-
 def find_crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
     """Return the faces (of #F by 4) that are quads whose sides cross, or that are folded by more than 90 degrees."""
     quads = np.flatnonzero(faces[:, 3] >= 0)
-    doubtful = quads[_may_cross(vertices, faces[quads], tolerance)]
-    return doubtful[_quad_corners(vertices[faces[doubtful]], tolerance)[3]]
-
-
-def _may_cross(vertices: FloatArray, quads: IntArray, tolerance: float) -> BoolArray:
-    """Return #Q, which quads have a corner that turns the other way, or next to no area: all that cross are among these."""
-    p = points_at(vertices, quads.T)
+    # All that cross are among the quads that have a corner that turns the other way, or next to no area.
+    p = points_at(vertices, faces[quads].T)
     side, diagonal = np.roll(p, -1, axis=1) - p, p[:, 2:] - p[:, :2]
     normal = cross(diagonal[:, 0], diagonal[:, 1])
     turning = dot(cross(np.roll(side, 1, axis=1), side), normal[:, None])
     longest = dot(side, side).max(axis=0) * dot(diagonal, diagonal).max(axis=0)
-    return np.asarray((turning.min(axis=0) < 0.0) | (dot(normal, normal) <= tolerance**2 * longest))
+    doubtful = quads[np.asarray((turning.min(axis=0) < 0.0) | (dot(normal, normal) <= tolerance**2 * longest))]
+    return doubtful[_quad_corners(vertices[faces[doubtful]], tolerance)[3]]
 
 
 def _quad_corners(p: FloatArray, tolerance: float) -> tuple[NDArray[Any], ...]:

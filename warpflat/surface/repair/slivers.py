@@ -100,37 +100,27 @@ def merge_degenerate_faces(
         if len(found) > max(_TOO_MANY, _TOO_LARGE_A_SHARE * len(faces)):
             left = of[found]
             break
-        faces, origin, lines, left = _merge_once(vertices, faces, lines, found, tolerance)
-        merged, left = np.union1d(merged, np.setdiff1d(of[found], of[left])), of[left]
+        # One round, with fixed edge lengths around.
+        patch = _Patch(vertices, faces, lines, tolerance)
+        waiting = sorted(found.tolist(), key=patch.width)
+        # Edges only get shorter and fewer, so this ends; the limit is for what rounding may do to that.
+        steps_left = 100 + 20 * len(waiting)
+        progress = True
+        while waiting and progress and steps_left > 0:
+            progress = False
+            for face in waiting:
+                if patch.is_degenerate(face) and patch.remove_degenerate(face):
+                    progress = True
+                    steps_left -= 1
+            waiting = sorted((f for f in patch.touched | set(waiting) if patch.is_degenerate(f)), key=patch.width)
+            patch.touched.clear()
+        remaining = np.unique([patch.origin.get(f, f) for f in waiting]).astype(np.int32)
+        (faces, origin), lines = patch.result(), patch.lines
+        merged, left = np.union1d(merged, np.setdiff1d(of[found], of[remaining])), of[remaining]
         of = of[origin]
         if len(left):
             break
     return faces, of, lines, merged.astype(np.int32), left
-
-
-def _merge_once(
-    vertices: FloatArray,
-    faces: IntArray,
-    lines: dict[str, list[int]],
-    found: IntArray,
-    tolerance: float,
-) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray]:
-    """Run one round with fixed edge lengths around: faces, the face that each was before, lines, and the degenerate faces that remain."""
-    patch = _Patch(vertices, faces, lines, tolerance)
-    waiting = sorted(found.tolist(), key=patch.width)
-    # Edges only get shorter and fewer, so this ends; the limit is for what rounding may do to that.
-    steps_left = 100 + 20 * len(waiting)
-    progress = True
-    while waiting and progress and steps_left > 0:
-        progress = False
-        for face in waiting:
-            if patch.is_degenerate(face) and patch.remove_degenerate(face):
-                progress = True
-                steps_left -= 1
-        waiting = sorted((f for f in patch.touched | set(waiting) if patch.is_degenerate(f)), key=patch.width)
-        patch.touched.clear()
-    left = np.unique([patch.origin.get(f, f) for f in waiting]).astype(np.int32)
-    return *patch.result(), patch.lines, left
 
 
 class _Patch:
@@ -256,16 +246,13 @@ class _Patch:
                 continue
             if edge and self.neighbours(gone)[kept] != 1:
                 continue
-            if line and not self._consecutive(gone, kept):
+            # Every line through `gone` must also run through `kept` next to it.
+            through = [row for row in self.lines.values() if gone in row] if line else []
+            if not all(any({x, y} == {gone, kept} for x, y in pairwise(row)) for row in through):
                 continue
             if self._collapse(gone, kept):
                 return True
         return False
-
-    def _consecutive(self, gone: int, kept: int) -> bool:
-        """Return whether every line through `gone` also runs through `kept` next to it."""
-        pairs = {gone, kept}
-        return all(gone not in line or any({x, y} == pairs for x, y in pairwise(line)) for line in self.lines.values())
 
     def _collapse(self, gone: int, kept: int) -> bool:
         """Merge the vertex `gone` into `kept`; false, and nothing is changed, where that would spoil the surface."""
@@ -399,11 +386,11 @@ class _Patch:
 
     def _across(self, face: int, p: int, q: int) -> int | None:
         """Return the face beside `face` at its side p-q."""
-        return next((f for f in self.around(p) & self.around(q) if f != face and self._has_edge(f, q, p)), None)
-
-    def _has_edge(self, face: int, a: int, b: int) -> bool:
-        ring = self.corners(face)
-        return ring[(ring.index(a) + 1) % len(ring)] == b
+        for other in self.around(p) & self.around(q) - {face}:
+            ring = self.corners(other)
+            if ring[(ring.index(q) + 1) % len(ring)] == p:
+                return other
+        return None
 
     def result(self) -> tuple[IntArray, IntArray]:
         """Return all faces, in the order of the faces they come from, and these."""

@@ -16,12 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import check_file_name
-from warpflat.core.text import format_count
+from warpflat.core.file_names import check_file_name, check_label
+from warpflat.core.text import format_count, quote_value
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.mesh_lines import checked_line, renumber_lines
 from warpflat.surface.repair.polygons import (
     distinct_corners,
     list_some,
@@ -33,6 +32,7 @@ from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
 
 __all__ = ["ClosedSurfaceError", "check_positions", "make_surface", "parts_of_faces"]
+
 
 # Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
 _SMALLEST, _LARGEST = 1e-20, 1e20
@@ -120,15 +120,59 @@ def make_surface(
     """
     check_file_name(name)
     try:
-        return _checked_surface(
-            vertices,
-            polygons,
+        positions = check_positions(vertices)
+        mesh = _checked_faces(positions, polygons)
+        paths = {key: checked_line(key, line, len(positions)) for key, line in (lines or {}).items()}
+        place = _weld(mesh, weld, split_corners, component is not None)
+        _drop_double_faces(mesh)
+        _drop_double_layers(mesh)
+        _choose_component(mesh, component)
+        _refuse_crowded_edges(mesh)
+        faces, turned = orient(mesh.half_edges)
+        if turned:
+            mesh.faces = faces
+            mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
+        _separate_touching_fans(mesh)
+        _drop_unused(mesh)
+        kept_lines, off = renumber_lines(
+            mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
+        )
+        mesh.notes += off
+        _check_border(mesh.half_edges)
+        mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, sliver_tolerance)
+        for what, which in cut.items():
+            mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")
+        before = len(mesh.vertices)
+        faces, of, kept_lines, merged, left = merge_degenerate_faces(
+            mesh.vertices, mesh.half_edges, kept_lines, sliver_tolerance
+        )
+        if len(left):
+            raise InputError(
+                f"{format_count(len(left), 'degenerate face')} (narrower than {sliver_tolerance:g} of the edges around) cannot be "
+                f"merged without changing the piece: {list_some(np.unique(mesh.origin[left]))} (counted from 0); delete or "
+                "redraw them"
+            )
+        if len(merged):
+            names = list_some(np.unique(mesh.origin[merged]))
+            used = len(np.unique(faces[faces >= 0]))
+            mesh.notes.append(
+                f"{format_count(len(merged), 'degenerate face')} (narrower than {sliver_tolerance:g} of the edges around) merged into "
+                f"neighbours, {before - used} of their vertices fell away: {names}"
+            )
+            mesh.faces, mesh.origin = faces, mesh.origin[of]
+            keep = _used_vertices(faces)
+            new = np.full(before + 1, -1, dtype=np.int32)
+            new[keep] = np.arange(len(keep), dtype=np.int32)
+            kept_lines = {key: new[line].tolist() for key, line in kept_lines.items()}
+            mesh.faces, mesh.vertices, mesh.index = new[faces], mesh.vertices[keep], mesh.index[keep]
+        return Surface(
+            vertices=np.ascontiguousarray(mesh.vertices),
+            faces=np.ascontiguousarray(mesh.faces, dtype=np.int32),
+            lines={key: np.array(line, dtype=np.int32) for key, line in kept_lines.items() if len(line) > 1},
             name=name,
-            lines=lines or {},
-            component=component,
-            weld=weld,
-            split_corners=split_corners,
-            tolerance=sliver_tolerance,
+            input_vertices=positions,
+            input_index=mesh.index.astype(np.int32),
+            notes=tuple(mesh.notes),
         )
     except InputError as error:
         raise type(error)(f"{source or name}: {error}") from error
@@ -149,39 +193,6 @@ def parts_of_faces(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool) -> I
     part = np.full(len(np.asarray(polygons)), -1, dtype=np.int32)
     part[mesh.origin] = mesh.part
     return part
-
-
-def _checked_surface(
-    vertices: ArrayLike,
-    polygons: ArrayLike | Sequence[Sequence[int]],
-    *,
-    name: str,
-    lines: Mapping[str, ArrayLike],
-    component: int | Literal["largest"] | None,
-    weld: bool | None,
-    split_corners: bool,
-    tolerance: float,
-) -> Surface:
-    positions = check_positions(vertices)
-    mesh = _checked_faces(positions, polygons)
-    paths = {key: checked_line(key, line, len(positions)) for key, line in lines.items()}
-    place = _weld(mesh, weld, split_corners, component is not None)
-    _drop_double_faces(mesh)
-    _drop_double_layers(mesh)
-    _choose_component(mesh, component)
-    _refuse_crowded_edges(mesh)
-    faces, turned = orient(mesh.half_edges)
-    if turned:
-        mesh.faces = faces
-        mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
-    _separate_touching_fans(mesh)
-    _drop_unused(mesh)
-    kept_lines, off = renumber_lines(
-        mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
-    )
-    mesh.notes += off
-    _check_border(mesh.half_edges)
-    return _finish(mesh, kept_lines, name, positions, tolerance)
 
 
 def check_positions(vertices: ArrayLike) -> FloatArray:
@@ -431,38 +442,66 @@ def _check_border(he: HalfEdges) -> None:
         )
 
 
-def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: FloatArray, tolerance: float) -> Surface:
-    """Merge slivers, drop the vertices that this leaves over, and put the surface together."""
-    mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, tolerance)
-    for what, which in cut.items():
-        mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")
-    before = len(mesh.vertices)
-    faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.half_edges, lines, tolerance)
-    if len(left):
+def checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
+    """Return a line of a file of `size` vertices as an array.
+
+    Raises:
+        InputError: it is no row of its vertices.
+    """
+    check_label(name, "lines")
+    path = np.asarray(line)
+    if path.ndim != 1 or len(path) < 2 or not np.issubdtype(path.dtype, np.integer):
+        raise InputError(f"line {quote_value(name)} must be a list of at least two vertex indices")
+    wrong = path[(path < 0) | (path >= size)]
+    if len(wrong):
         raise InputError(
-            f"{format_count(len(left), 'degenerate face')} (narrower than {tolerance:g} of the edges around) cannot be "
-            f"merged without changing the piece: {list_some(np.unique(mesh.origin[left]))} (counted from 0); delete or "
-            "redraw them"
+            f"line {quote_value(name)} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})"
         )
-    if len(merged):
-        names = list_some(np.unique(mesh.origin[merged]))
-        used = len(np.unique(faces[faces >= 0]))
-        mesh.notes.append(
-            f"{format_count(len(merged), 'degenerate face')} (narrower than {tolerance:g} of the edges around) merged into "
-            f"neighbours, {before - used} of their vertices fell away: {names}"
-        )
-        mesh.faces, mesh.origin = faces, mesh.origin[of]
-        keep = _used_vertices(faces)
-        new = np.full(before + 1, -1, dtype=np.int32)
-        new[keep] = np.arange(len(keep), dtype=np.int32)
-        lines = {key: new[line].tolist() for key, line in lines.items()}
-        mesh.faces, mesh.vertices, mesh.index = new[faces], mesh.vertices[keep], mesh.index[keep]
-    return Surface(
-        vertices=np.ascontiguousarray(mesh.vertices),
-        faces=np.ascontiguousarray(mesh.faces, dtype=np.int32),
-        lines={key: np.array(line, dtype=np.int32) for key, line in lines.items() if len(line) > 1},
-        name=name,
-        input_vertices=positions,
-        input_index=mesh.index.astype(np.int32),
-        notes=tuple(mesh.notes),
-    )
+    return path.astype(np.int64)
+
+
+def renumber_lines(
+    index: IntArray, edges: IntArray, paths: Mapping[str, IntArray]
+) -> tuple[dict[str, list[int]], list[str]]:
+    """Return lines given in input rows, in the mesh's own vertices, and a note for each that is off it and left out.
+
+    Args:
+        index: #V, the input row of each vertex.
+        edges: #E by 2, of the mesh.
+        paths: input rows by name.
+
+    Raises:
+        InputError: a line leaves the mesh.
+    """
+    lines: dict[str, list[int]] = {}
+    if not paths:
+        return lines, []
+    notes = []
+    places: dict[int, list[int]] = {}
+    wanted = np.isin(index, np.concatenate(list(paths.values())))
+    for vertex in np.flatnonzero(wanted).tolist():
+        places.setdefault(int(index[vertex]), []).append(vertex)
+    joined = {tuple(edge) for edge in edges.tolist()}
+    for name, path in paths.items():
+        rows = [row for i, row in enumerate(path.tolist()) if i == 0 or row != path[i - 1]]
+        if not any(row in places for row in rows):
+            notes.append(f"line {quote_value(name)} does not lie on the piece and was left out")
+            continue
+        missing = [row for row in rows if row not in places]
+        if missing:
+            raise InputError(f"line {quote_value(name)} leaves the piece at vertex {missing[0]} (counted from 0)")
+        line: list[int] = []
+        for i, row in enumerate(rows):
+            choice = places[row]
+            if i > 0:
+                choice = [v for v in choice if (min(v, line[-1]), max(v, line[-1])) in joined]
+                if not choice:
+                    raise InputError(
+                        f"line {quote_value(name)} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
+                    )
+            elif len(choice) > 1 and len(rows) > 1:
+                follow = places[rows[1]]
+                choice = [v for v in choice if any((min(v, w), max(v, w)) in joined for w in follow)] or choice
+            line.append(choice[0])
+        lines[name] = line
+    return lines, notes

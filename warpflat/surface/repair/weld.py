@@ -103,19 +103,19 @@ def t_junction(vertices: FloatArray, faces: IntArray, part: NDArray[np.integer])
 
     he = half_edges(faces)
     border = np.flatnonzero(he.count[he.edge] == 1)
-    ends, own = he.edges[he.edge[border]], part[he.face[border]]
-    start, way = vertices[ends[:, 0]], vertices[ends[:, 1]] - vertices[ends[:, 0]]
-    length = np.linalg.norm(way, axis=1)
+    ends, component = he.edges[he.edge[border]], part[he.face[border]]
+    start, vector = vertices[ends[:, 0]], vertices[ends[:, 1]] - vertices[ends[:, 0]]
+    length = np.linalg.norm(vector, axis=1)
     if not length.any():
         return None
     places, first = np.unique(he.tail[border], return_index=True)
-    near = cKDTree(vertices[places]).query_ball_point(start + 0.5 * way, (0.5 + _ON_EDGE) * length)
+    near = cKDTree(vertices[places]).query_ball_point(start + 0.5 * vector, (0.5 + _ON_EDGE) * length)
     for edge, found in enumerate(near):
         found = np.asarray(found, dtype=np.int64)
-        found = found[own[first[found]] != own[edge]]
+        found = found[component[first[found]] != component[edge]]
         to = vertices[places[found]] - start[edge]
-        along = to @ way[edge] / max(length[edge] ** 2, np.finfo(float).tiny)
-        off = np.linalg.norm(to - along[:, None] * way[edge], axis=1)
+        along = to @ vector[edge] / max(length[edge] ** 2, np.finfo(float).tiny)
+        off = np.linalg.norm(to - along[:, None] * vector[edge], axis=1)
         on = (off < _ON_EDGE * length[edge]) & (along > _OFF_ENDS) & (along < 1.0 - _OFF_ENDS)
         if on.any():
             return int(places[found[np.argmax(on)]]), int(ends[edge, 0]), int(ends[edge, 1])

@@ -1,4 +1,4 @@
-"""Plain OBJ files are read by arrays, and all others by lines, with the same result."""
+"""OBJ files as other programs write them: corners, line ends, numbers, continued lines, negative indices."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.surface.io import read_obj
-from warpflat.surface.io.obj_arrays import read_arrays
+from warpflat.surface.io.read_obj import ObjMesh, read_obj
 
 GRID = 12
 
@@ -31,21 +30,18 @@ def plain(corner: str, *, position: str = "v {x!r} {y!r} {z!r}", end: str = "\n"
     return end.join([*lines, ""])
 
 
-def read_both(text: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[read_obj.ObjMesh, read_obj.ObjMesh]:
+def expected() -> tuple[np.ndarray, np.ndarray]:
+    """The positions and polygons of :func:`plain`."""
+    positions = np.random.default_rng(4).normal(size=(GRID * GRID, 3))
+    first = (GRID * np.arange(GRID - 1)[:, None] + np.arange(GRID - 1)).ravel()
+    polygons = first[:, None] + [0, 1, GRID + 1, GRID]
+    polygons[first % GRID % 3 == 0, 3] = -1
+    return positions, polygons
+
+
+def read(text: str, path: Path) -> ObjMesh:
     path.write_bytes(text.encode())
-    quick = read_obj.read_obj(path)
-    with monkeypatch.context() as patch:
-        patch.setattr(read_obj, "read_arrays", lambda raw: None)
-        return quick, read_obj.read_obj(path)
-
-
-def same(one: read_obj.ObjMesh, other: read_obj.ObjMesh) -> bool:
-    return (
-        np.array_equal(one.vertices, other.vertices)
-        and np.array_equal(one.polygons, other.polygons)
-        and one.lines == other.lines
-        and one.split_corners == other.split_corners
-    )
+    return read_obj(path)
 
 
 PLAIN = {
@@ -70,25 +66,43 @@ OTHER = {
     "fourth number of some": plain("{v}").replace("\nvt", " 1.0\nvt", 1),
 }
 WRONG = {
-    "f 14 15": ("f 14 x", "f 14 1_5 a", "f 14 0", "f 14 999", "f 14 #", "f 14 1.5", "f 14 99999999999999999999 2"),
-    "\nvt": ("\nv 1 2\nvt", "\nv 1 2 x\nvt", "\nv 1 2 3,5\nvt"),
+    "f 14 15": (
+        "f 14 x",
+        "f 14 1_5 16",
+        "f 14 /5 16",
+        "f 14 0",
+        "f 14 999",
+        "f 14 #",
+        "f 14 1.5",
+        "f 14 99999999999999999999 2",
+    ),
+    "\nvt": ("\nv 1 2\nvt", "\nv 1 2 x\nvt", "\nv 1 2 3,5\nvt", "\nv 1 2 1_0\nvt"),
 }
 
 
 @pytest.mark.parametrize("name", PLAIN)
-def test_plain_file_is_read_by_arrays(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert read_arrays(PLAIN[name].removeprefix("\ufeff").encode()) is not None
-    quick, slow = read_both(PLAIN[name], tmp_path / "a.obj", monkeypatch)
-    assert same(quick, slow)
-    assert len(quick.vertices) == GRID * GRID
-    assert quick.lines == {"side": [[0, 1, 2]]}
-    assert quick.split_corners == (name in ("texture", "texture and normal", "Windows"))
+def test_file_is_read_whole(name: str, tmp_path: Path) -> None:
+    mesh = read(PLAIN[name], tmp_path / "a.obj")
+    positions, polygons = expected()
+    np.testing.assert_allclose(mesh.vertices, positions, rtol=0, atol=0.06 if name == "short numbers" else 0)
+    np.testing.assert_array_equal(mesh.polygons, polygons)
+    assert mesh.lines == {"side": [[0, 1, 2]]}
+    assert mesh.groups == [(0, "piece"), (GRID * GRID, "side")]
+    assert mesh.split_corners == (name in ("texture", "texture and normal", "Windows"))
 
 
 @pytest.mark.parametrize("name", OTHER)
-def test_other_file_is_read_by_lines(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    quick, slow = read_both(OTHER[name], tmp_path / "a.obj", monkeypatch)
-    assert same(quick, slow)
+def test_other_spelling_is_the_same_mesh(name: str, tmp_path: Path) -> None:
+    mesh = read(OTHER[name], tmp_path / "a.obj")
+    positions, polygons = expected()
+    more = {"comment behind": 1, "interleaved": 40}.get(name, 0)
+    np.testing.assert_array_equal(mesh.vertices[: len(positions)], positions)
+    np.testing.assert_array_equal(
+        np.unique(mesh.vertices[len(positions) :], axis=0),
+        [[1, 2, 3]] * (len(mesh.vertices) > len(positions)) or np.empty((0, 3)),
+    )
+    np.testing.assert_array_equal(mesh.polygons[more:], polygons)
+    np.testing.assert_array_equal(mesh.polygons[:more], [[0, 1, 2, -1]] * more or np.empty((0, 4)))
 
 
 @pytest.mark.parametrize(("text", "wrong"), [(text, each) for text, all_of in WRONG.items() for each in all_of])
@@ -98,11 +112,11 @@ def test_mistake_is_named_with_its_line(text: str, wrong: str, tmp_path: Path) -
     path.write_text(good.replace(text, wrong, 1), encoding="utf-8")
     number = good[: good.index(text)].count("\n") + 1 + wrong.startswith("\n")
     with pytest.raises(InputError, match=f"^line {number}: "):
-        read_obj.read_obj(path)
+        read_obj(path)
 
 
 def test_file_that_is_cut_short_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.obj"
     path.write_text(plain("{v}/{v}").rstrip("\n").rpartition("/")[0])
     with pytest.raises(InputError, match="is cut short"):
-        read_obj.read_obj(path)
+        read_obj(path)
