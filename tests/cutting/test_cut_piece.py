@@ -23,8 +23,8 @@ from warpflat.cutting.separate_pieces import separate
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
-from warpflat.scene.cut_tables import CutTable
 from warpflat.scene.cuts import plan_cuts
+from warpflat.scene.schema import CutTable
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation
 from warpflat.surface import half_edges as mesh_half_edges

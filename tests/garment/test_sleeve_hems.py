@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.polyline import segment_lengths
-from warpflat.garment.constraints import Straight
+from warpflat.garment.constraints import Straight, straight_hems
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.garment.hems import straight_hems
 from warpflat.mannequin.forms import FormResult, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form

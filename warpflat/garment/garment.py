@@ -19,14 +19,13 @@ from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening, run_metrics, write_files
-from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
+from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric, straight_hems
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
-from warpflat.garment.hems import straight_hems
 from warpflat.garment.openings import Opening, opened_rings
 from warpflat.garment.pockets import Pocket
 from warpflat.garment.rings import GarmentRing, measure_rings

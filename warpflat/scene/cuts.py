@@ -13,8 +13,8 @@ from warpflat.mannequin.darts import FormDart
 from warpflat.mannequin.forms import Form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.part_pieces import part_pieces, taken_over
-from warpflat.scene.cut_tables import AutoCutTable, CutTable
 from warpflat.scene.load import Scene, errors_named, make_scene
+from warpflat.scene.schema import AutoCutTable, CutTable
 
 if TYPE_CHECKING:
     from warpflat.cutting.cut_plan import CutPlan

@@ -11,7 +11,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.finishing import FINISHES, Finishing
 from warpflat.garment.openings import CENTRES, Buttons, Opening
 from warpflat.garment.pockets import Pocket
-from warpflat.scene.making_up_tables import FinishingTable, OpeningTable, PocketTable
+from warpflat.scene.schema import FinishingTable, OpeningTable, PocketTable
 
 if TYPE_CHECKING:
     from warpflat.garment.constraints import Constraint

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from warpflat.garment.edge_rules import EdgeRules
 
 if TYPE_CHECKING:
-    from warpflat.scene.making_up_tables import ClothTable, MarkerTable
-    from warpflat.scene.schema import PatternTable
+    from warpflat.scene.schema import ClothTable, MarkerTable, PatternTable
 from warpflat.garment.pattern_files import PatternOptions
 from warpflat.pattern.shrinkage import Shrinkage
 from warpflat.pattern.words import language_words

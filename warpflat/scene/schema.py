@@ -23,23 +23,160 @@ from warpflat.core.toml_file import Table
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.file import FabricTable
 from warpflat.mannequin.table import MannequinTable
-from warpflat.scene.cut_tables import AutoCutTable, CutTable, PlaneTable, Point, PointOrVertex, Vertex
-from warpflat.scene.making_up_tables import ClothTable, FinishingTable, MarkerTable, OpeningTable, PocketTable
 from warpflat.solver.options import FORMER_SOLVERS, RelaxOptions, Solver
 
 __all__ = [
+    "AutoCutTable",
     "BorderTable",
+    "ClothTable",
     "ConstraintTable",
+    "CutTable",
     "FileSurface",
+    "FinishingTable",
     "LineTable",
+    "MarkerTable",
+    "OpeningTable",
     "OutputTable",
     "PatternTable",
+    "PocketTable",
     "SceneTable",
     "SeamTable",
     "ShapeSurface",
     "kind_of_surface",
     "text_or_table",
 ]
+
+
+# The square of a much larger coordinate overflows.
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Vertex = Annotated[int, Field(ge=0)]
+PointOrVertex = Annotated[
+    Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
+    Discriminator(lambda value: "point" if isinstance(value, list) else "vertex"),
+]
+
+
+class PlaneTable(Table):
+    """A plane by a point on it [m] and its normal (any length)."""
+
+    point: Point
+    normal: Point
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class CutPlane(PlaneTable):
+    """A plane through a point [m], as given and all through; of several curves the nearest to the point.
+
+    With `towards` only the part from the point, which then lies on the piece, in that direction to the border.
+    """
+
+    towards: Point | None = None
+
+
+class CutTable(Table):
+    """A cut, given in one of three ways. Vertices count those of the file, from 0; points are in metres.
+
+    `line` names a feature line, of which `part` takes a part by shares of its length; `from` and `to` are the ends of the
+    straightest path on the surface, `through` places on its way; `plane` cuts as a ruler lies. The faces that a path
+    between points or along a plane runs through are divided. Tables with one `name` are one cut.
+
+    On a form a cut is a dart in one `piece`, along a `line` of it, from the border to its tip. Lines of a book's darts ("bust",
+    "princess front left" and the like from the waist) need no `part`: `tip_mm` is how far before the bust point, or below
+    the waist in a skirt, the dart ends. `at` names the line on which its mouth lies, as "shoulder left". `towards` puts it
+    between two lines, `between` at that share of the way. `mouth_mm` is how wide it opens, or `like` another dart of its
+    piece; the energy that this costs is told. With `pleat_mm` it is a pleat: folded, sewn this far from its mouth, and open
+    below. It is `mirrored` unless that is false. A `part` of [0, 1] is a seam, which parts the piece; one with both shares
+    inside is a dart with two tips, and `mouth_mm` its width half-way between them. `omit` leaves out the dart that the form's
+    `shape` has there.
+    """
+
+    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
+    line: str | None = None
+    part: Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
+    from_: PointOrVertex | None = Field(default=None, alias="from")
+    to: PointOrVertex | None = None
+    through: list[PointOrVertex] = Field(default_factory=list)
+    plane: CutPlane | None = None
+    tip_back: Annotated[float, Field(ge=0.0)] = 0.0
+    """How far the tips of its darts are drawn back, [m]."""
+    piece: str | None = None
+    towards: str | None = None
+    between: Share = 0.5
+    tip_mm: Annotated[float, Field(ge=0.0, le=500.0)] | None = None
+    mouth_mm: Annotated[float, Field(ge=1.0, le=300.0)] | None = None
+    like: str | None = None
+    pleat_mm: Annotated[float, Field(ge=1.0, le=500.0)] | None = None
+    at: str | None = None
+    omit: bool = False
+    mirrored: bool = True
+
+    @property
+    def parts_piece(self) -> bool:
+        """Whether it cuts a whole line."""
+        return self.part is not None and set(self.part) == {0.0, 1.0}
+
+    def check_for_form(self, where: str) -> None:
+        """Refuse what a dart in a form does not have."""
+        if self.line is None or self.piece is None:
+            raise ValueError(
+                f"{where}: on a form a dart needs its piece and a line of it, as "
+                'piece = "front_bodice", line = "princess front left"'
+            )
+        if self.tip_back:
+            raise ValueError(f"{where}: tip_back belongs to a [surface]; on a form give tip_mm")
+        if self.part is not None and (self.tip_mm is not None or self.towards is not None or self.at is not None):
+            raise ValueError(f"{where}: give part, or tip_mm, towards and at")
+        if self.mouth_mm is not None and self.like is not None:
+            raise ValueError(f"{where}: give mouth_mm or like")
+        if self.parts_piece and (self.mouth_mm or self.like or self.pleat_mm):
+            raise ValueError(
+                f"{where}: a cut along the whole line is a seam, which has no mouth; leave out mouth_mm, like and pleat_mm"
+            )
+
+    def check_for_surface(self, where: str) -> None:
+        """Refuse what only a dart in a form has."""
+        given = self.model_fields_set & {
+            "piece",
+            "towards",
+            "between",
+            "tip_mm",
+            "mouth_mm",
+            "like",
+            "pleat_mm",
+            "at",
+            "omit",
+            "mirrored",
+        }
+        if given:
+            raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> CutTable:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("a path needs both from and to")
+        if sum(way is not None for way in (self.line, self.from_, self.plane)) != 1:
+            raise ValueError("give the cut in one way: line, from and to, or plane")
+        if self.part is not None and self.line is None:
+            raise ValueError("part takes a part of a line; give line")
+        if self.through and self.from_ is None:
+            raise ValueError("through lists places between from and to; give both")
+        return self
+
+
+class AutoCutTable(Table):
+    """Cutting by itself: the best of all candidates, again and again until it is enough (see `warpflat cuts`)."""
+
+    max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
+    """At most so many; a mirrored pair counts as one."""
+    stop_below: Annotated[float, Field(ge=0.0)] = 0.0
+    """A piece of at most this model energy needs no further cut [J]."""
+    stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
+    """A piece of which 98 % is strained by at most this share along warp and weft, as worn, needs no further cut."""
+    by: Literal["released", "per_cm"] = "released"
+    """What makes a cut the best: the energy it releases in all, or per centimetre."""
 
 
 def _as_component(value: Any) -> Any:
@@ -241,6 +378,119 @@ class PatternTable(Table):
     """How far a drawn curve may lie from the mesh's border; 0.1 mm, or more on a ragged one, if not given."""
     sizes: list[str] = Field(default_factory=list)
     """More sizes of a mannequin's garment, flattened too and laid upon each other as a graded nest."""
+
+
+class OpeningTable(Table):
+    """An opening along a line of a form. A piece that runs across a centre line is parted there, with a seam below the opening.
+
+    A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit` or `vent` from the lower one. Buttons
+    run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing.
+    """
+
+    kind: Literal["zip", "buttons", "slit", "vent", "keyhole"]
+    seam: Annotated[str, Field(min_length=1, max_length=100)]
+    length_mm: Annotated[float, Field(ge=10, le=2000)] | None = None
+    start_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    style: Literal["invisible", "lapped"] = "invisible"
+    width_mm: Annotated[float, Field(ge=5, le=200)] | None = None
+    """Of a slit's hem (15 mm if not given), a vent's flap (40), a button stand beyond the line (20), a keyhole's round end (12)."""
+    button_mm: Annotated[float, Field(ge=5, le=60)] = 18.0
+    spacing_mm: Annotated[float, Field(ge=20, le=300)] = 85.0
+    """About how far buttons are apart; one lies on the bust line."""
+    count: Annotated[int, Field(ge=2, le=60)] | None = None
+    """How many buttons; as many as the spacing gives, if not given."""
+    facing: Literal["grown-on", "separate"] = "grown-on"
+    """Of a button stand."""
+    facing_mm: Annotated[float, Field(ge=20, le=200)] = 60.0
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> OpeningTable:
+        if self.kind == "zip" and self.width_mm is not None:
+            raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
+        if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
+            raise ValueError("start_mm and style belong to a zip; a slit or a vent begins at the lower end of its seam")
+        if self.kind != "buttons" and self.length_mm is None:
+            raise ValueError("length_mm is missing; only buttons run all along their line without one")
+        own = {"button_mm", "spacing_mm", "count", "facing", "facing_mm"} & self.model_fields_set
+        if self.kind != "buttons" and own:
+            raise ValueError(f"{sorted(own)[0]} belongs to buttons; leave it out for a {self.kind}")
+        return self
+
+
+class FinishingTable(Table):
+    """Pieces that finish free edges of a form: a facing of each piece, or one straight strip along the whole edge."""
+
+    kind: Literal["facing", "band", "waistband", "binding"]
+    edge: Annotated[str, Field(min_length=1, max_length=100)]
+    width_mm: Annotated[float, Field(ge=5, le=300)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=1)] = 1.0
+    overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
+    shaped: bool = False
+    """A waistband that is cut from the upper strip of the pieces, as curved as they are."""
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> FinishingTable:
+        if self.kind != "band" and self.share != 1.0:
+            raise ValueError("share belongs to a band, which is stretched as it is sewn; leave it out")
+        if self.kind != "waistband" and self.overlap_mm:
+            raise ValueError("overlap_mm belongs to a waistband; leave it out")
+        if self.shaped and (self.kind != "waistband" or self.overlap_mm):
+            raise ValueError("shaped belongs to a waistband without an overlap; leave one of them out")
+        return self
+
+
+class PocketTable(Table):
+    """A pocket: a `patch` on a piece, its place marked, or bags in a seam (`inseam`), on both sides of the body.
+
+    A patch lies `below_mm` under a line across its piece, its inner side `from_centre_mm` from the centre line. An opening begins
+    `below_mm` under the upper end of its seam, and is `height_mm` long.
+    """
+
+    kind: Literal["patch", "inseam"]
+    piece: Annotated[str, Field(max_length=100)] = ""
+    line: Annotated[str, Field(max_length=100)] = "hip"
+    seam: Annotated[str, Field(max_length=100)] = ""
+    width_mm: Annotated[float, Field(ge=30, le=400)] = 140.0
+    height_mm: Annotated[float, Field(ge=30, le=400)] = 160.0
+    below_mm: Annotated[float, Field(ge=-500, le=1000)] = 60.0
+    from_centre_mm: Annotated[float, Field(ge=0, le=500)] = 70.0
+
+    @model_validator(mode="after")
+    def _has_its_place(self) -> PocketTable:
+        if self.kind == "patch" and not self.piece:
+            raise ValueError('a patch pocket needs its piece: piece = "front"')
+        if self.kind == "inseam" and (not self.seam or self.below_mm < 0):
+            raise ValueError('an inseam pocket needs its seam, seam = "side left", and below_mm from 0')
+        return self
+
+
+class ClothTable(Table):
+    """Cloth beside its fabric: what it loses in the wash, and what else the garment is cut from."""
+
+    shrinkage_warp: Annotated[float, Field(ge=0, le=0.25)] = 0.0
+    """Share of its length that the cloth loses along the warp; pieces are drawn larger by it."""
+    shrinkage_weft: Annotated[float, Field(ge=0, le=0.25)] = 0.0
+    lining: Annotated[str, Field(max_length=40)] = ""
+    """What the lining is called; with a name the shell's pieces are lined."""
+    repeat_warp_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """Repeat of stripes or checks along the warp; 0 where there is none."""
+    repeat_weft_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    match: list[str] = Field(default_factory=list)
+    """Seams at whose first notch both sides lie on the same stripe in the marker."""
+    interfacing: Annotated[str, Field(max_length=40)] = ""
+    """What the interfacing is called; with a name facings and waistbands are cut from it too."""
+
+
+class MarkerTable(Table):
+    """The lay plan on a cloth (see `warpflat.Cloth`); one garment of each size. Lengths in metres."""
+
+    width: Annotated[float, Field(ge=0.1, le=10)]
+    one_way: bool = False
+    reversible: bool = False
+    gap: Annotated[float, Field(ge=0, le=0.1)] = 0.002
+    seconds: Annotated[int, Field(ge=1, le=600)] = 5
+    folded: bool = False
+    """The cloth is folded lengthwise: halves lie against its fold, pairs are cut at once."""
 
 
 def _as_solver(value: object) -> object:

@@ -113,8 +113,6 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
     return remembered
 
 
-
-
 def _name(measure: Callable[..., Any]) -> str:
     return f"{measure.__module__}.{measure.__qualname__}"
 
