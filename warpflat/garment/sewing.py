@@ -22,10 +22,11 @@ import warp as wp
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.flattening.progress import CONTACT
+from warpflat.core.sums import range_offsets
+from warpflat.flattening.applied_cut import cut_sides
+from warpflat.flattening.progress import CONTACT, STEPS, Stage
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, DrawnLine, KeptGirth, equations_of_constraint, find_piece
-from warpflat.garment.sewing_network import SewingNetwork
 from warpflat.garment.sewn import ConstraintResult, SeamPair, Sewn
 from warpflat.model.constraint_equations import (
     ConstraintEquations,
@@ -37,18 +38,92 @@ from warpflat.model.constraint_equations import (
     smooth_equations,
     stretch_equations,
 )
+from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
+from warpflat.model.strain import strain_energy
 from warpflat.solver.equations import ConstrainedOutcome, factor_pays, relax_under_equations
+from warpflat.solver.grain import grain_alignments
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.steps import Relaxation
+from warpflat.solver.stop import Outcome
 from warpflat.surface.falloff import falloff_weights
-from warpflat.surface.injective import is_injective
+from warpflat.surface.injective import is_injective, overlap_area
 
 __all__ = ["sew"]
 
 
 # Stiffness of an equation over the median spring of the cloth: with a factor of all stiffnesses, and for plain steps.
 _RELATIVE_STIFFNESS, _STIFFNESS_FOR_STEPS = 100.0, 4.0
+
+
+class SewingNetwork:
+    """Several pieces as one mesh, each with its own range of vertices.
+
+    Attributes:
+        pieces: by name.
+        first: by piece, the number of its first vertex.
+        surface: all pieces as one mesh.
+        alignments: by piece, the chords that keep their direction: one, or one for each part of a piece that has been cut apart.
+    """
+
+    def __init__(self, pieces: Mapping[str, Flattening]) -> None:
+        """Put the pieces, of one fabric, side by side."""
+        self.pieces = pieces
+        first = range_offsets([len(piece.positions) for piece in pieces.values()])
+        self.first: dict[str, int] = dict(zip(pieces, first.tolist(), strict=False))
+        self.surface = join_surfaces([piece.network.surface for piece in pieces.values()])
+        self.alignments = {
+            name: grain_alignments(piece.network.surface, piece.datum, piece.positions, first=self.first[name])
+            for name, piece in pieces.items()
+        }
+
+    def numbers(self, name: str, vertices: IntArray) -> IntArray:
+        """Return the numbers of a piece's vertices in the joined mesh."""
+        return np.asarray(vertices, dtype=np.int32) + np.int32(self.first[name])
+
+    def network(self) -> SpringNetwork:
+        """Return the springs and cells of all pieces as one network on their device, not sewn yet.
+
+        All pieces come to rest together.
+        """
+        # A copy: a single piece's own network must not stay sewn.
+        return replace(join_networks([piece.network for piece in self.pieces.values()]))
+
+    def overlaps(self, layout: FloatArray) -> dict[str, float]:
+        """Return by name the area that each piece that lies over itself in a layout (#V by 2 [m]) covers more than once [m2]."""
+        areas = {
+            name: overlap_area(piece.network.surface, layout[own], cut_sides(piece.cuts))
+            for name, piece in self.pieces.items()
+            for own in [slice(self.first[name], self.first[name] + len(piece.positions))]
+        }
+        return {name: area for name, area in areas.items() if area}
+
+    def split(self, state: Relaxation, outcome: Outcome, *, stage_name: str = "sew") -> dict[str, Flattening]:
+        """Return each piece with its part of the layout, and in its history the stages of a relaxation with this outcome."""
+        first, layout, sewn = outcome.first_steps, state.positions(), {}
+        ends = [(stage_name, layout, outcome)]
+        if first is not None and outcome.first_layout is not None:
+            ends.insert(0, (STEPS, outcome.first_layout, first))
+        for name, piece in self.pieces.items():
+            own = slice(self.first[name], self.first[name] + len(piece.positions))
+            stages = list(piece.stages)
+            for stage, place, end in ends:
+                energies = Relaxation(piece.network, state.options, start=place[own]).energies()
+                stages.append(
+                    Stage(
+                        name=stage,
+                        model_energy_j=energies.potential,
+                        guard_energy_j=energies.guard,
+                        strain_energy_j=strain_energy(piece.network, place[own]),
+                        steps=end.steps,
+                        work_units=end.work_units,
+                        seconds=end.seconds,
+                        converged=end.converged,
+                        residual=None if np.isnan(end.residual) else end.residual,
+                    )
+                )
+            sewn[name] = replace(piece, positions=layout[own], stages=tuple(stages), unsewn=piece.unsewn or piece)
+        return sewn
 
 
 def sew(
@@ -118,7 +193,13 @@ def sew(
             state, ended = parted
             apart = SewingNetwork(sewn).split(state, replace(ended.outcome, converged=True), stage_name=CONTACT)
             sewn, converged, seconds = apart, True, time.perf_counter() - start_time
-        sewn = {name: _with_overlap_note(piece, overlaps.get(name, 0.0)) for name, piece in sewn.items()}
+        for name, overlap in overlaps.items():
+            piece, note = sewn[name], f"sewn, the piece lies over itself by {1e6 * overlap:.3g} mm2"
+            if piece.stages[-1].name == CONTACT:
+                note += f"; contact has parted it, at a price of {1e3 * piece.contact_energy:.3g} mJ"
+            else:
+                note += ", and contact could not part it: cut it apart there"
+            sewn[name] = replace(piece, notes=(*piece.notes, note))
     return Sewn(
         pieces=sewn,
         converged=converged,
@@ -242,18 +323,6 @@ def _part(
     return None
 
 
-def _with_overlap_note(piece: Flattening, overlap: float) -> Flattening:
-    """Return a sewn piece with a note on the area by which it lay over itself [m2], if it did."""
-    if not overlap:
-        return piece
-    words = f"sewn, the piece lies over itself by {1e6 * overlap:.3g} mm2"
-    if piece.stages[-1].name == CONTACT:
-        words += f"; contact has parted it, at a price of {1e3 * piece.contact_energy:.3g} mJ"
-    else:
-        words += ", and contact could not part it: cut it apart there"
-    return replace(piece, notes=(*piece.notes, words))
-
-
 def _relax(state: Relaxation, equations: ConstraintEquations, gap: float = 0.0) -> ConstrainedOutcome:
     """Relax until all is at rest and the equations hold; with contact, if a gap is given [m]."""
     report_activity("sewing")
@@ -278,7 +347,8 @@ def _constraint_results(
     if seams is None:
         return []
     force = seams.stiffness.numpy() * (seams.offset.numpy() + residuals)
-    cost = equations.group_sums(0.5 * force * _residuals(state, unsewn))
+    before = state.network.seam_residuals(wp.array(unsewn, dtype=wp.vec2d, device=state.network.device))
+    cost = equations.group_sums(0.5 * force * before)
     largest = np.zeros(len(kinds))
     np.maximum.at(largest, equations.group, np.where(equations.soft > 0, 0.0, np.abs(residuals)))
     summed = np.isfinite(equations.sum_tolerance)
@@ -340,10 +410,3 @@ def _straighten_fold(piece: Flattening, vertices: IntArray | None) -> FloatArray
 def _potential(network: SpringNetwork, positions: FloatArray) -> float:
     """Return the potential energy of a layout [J]."""
     return Relaxation(network, RelaxOptions(), start=positions).energies().potential
-
-
-def _residuals(state: Relaxation, positions: FloatArray | None = None) -> FloatArray:
-    """Return the residual c of each equation (#P [m]), in the present layout or another one."""
-    network = state.network
-    at = state.position if positions is None else wp.array(positions, dtype=wp.vec2d, device=network.device)
-    return network.seam_residuals(at)
