@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from devices import DEVICE
 
 from warpflat.flattening.flatten_piece import flatten
+from warpflat.flattening.progress import relaxation_words
 from warpflat.solver import collapse, metric
 from warpflat.solver.metric import laplacian_solution
 from warpflat.surface import laplacian
@@ -51,6 +54,14 @@ def test_the_minimum_is_that_of_the_factor(triangles: bool, fabric: str, monkeyp
     found = flatten(make_shape("bodice", resolution=57, triangles=triangles), **given)
     assert found.converged
     assert found.flipped_faces == 0
+    assert [stage.name for stage in found.stages] == ["develop", "coarse", "steps", "relax"]
+    words = relaxation_words([[stage.as_dict() for stage in found.stages]])
+    assert re.fullmatch(
+        r"coarser meshes released [^,]+, \d+ steps released [^,]+, \d+ iterations released [^,]+", words
+    )
+    # The coarser mesh releases nearly all that there is to release.
+    energies = [stage.model_energy_j for stage in found.stages]
+    assert energies[0] - energies[1] > 0.9 * (energies[0] - energies[-1])
     assert found.stages[-1].model_energy_j == pytest.approx(expected.stages[-1].model_energy_j, rel=1e-3)
     chord = found.positions[found.datum[[0, -1]]]
     assert abs(chord[1, 0] - chord[0, 0]) < 1e-9

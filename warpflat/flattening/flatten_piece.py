@@ -238,7 +238,7 @@ def relax_developed(piece: DevelopedPiece) -> Flattening:
         network=end.network,
         development=development,
         positions=positions,
-        stages=(developed, *stages),
+        stages=(developed, *([] if end.coarse is None else [end.coarse]), *stages),
         history=np.array(task.history),
         notes=(*task.surface.notes, *piece.notes, *development.notes, *task.notes),
         wear=task.wear,

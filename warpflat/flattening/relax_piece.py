@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.flattening.progress import STEPS
+from warpflat.flattening.progress import COARSE, STEPS, Stage
 from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
 from warpflat.model.network import SpringNetwork
+from warpflat.model.strain import strain_energy
 from warpflat.solver.coarse import coarse_minimum
 from warpflat.solver.grain import grain_alignments
 from warpflat.solver.minimise import relax
@@ -67,21 +68,22 @@ def relax_piece(
         outcome = piece.relax(direction_updates, needs_isotropic_start, from_coarse)
     except _Stopped:
         outcome = piece.outcome_of_stop(started)
-    if outcome.first_steps is not None:
-        outcome = replace(outcome, seconds=time.perf_counter() - started - outcome.first_steps.seconds)
-    else:
-        outcome = replace(outcome, seconds=time.perf_counter() - started)
+    before = sum(each.seconds for each in (piece.coarse, outcome.first_steps) if each is not None)
+    outcome = replace(outcome, seconds=time.perf_counter() - started - before)
     state = piece.state
     task.notes += [note for note in outcome.notes if note not in task.notes]
     task.notes += _grain_notes(state.network)
-    return RelaxedPiece(network=state.network, positions=state.positions(), begin=begin, outcome=outcome)
+    return RelaxedPiece(
+        network=state.network, positions=state.positions(), begin=begin, outcome=outcome, coarse=piece.coarse
+    )
 
 
 class _Piece:
     """A piece on its way, whose network is measured anew."""
 
     def __init__(self, task: RelaxationTask, network: SpringNetwork, start: FloatArray) -> None:
-        self._task, self._stage = task, task.stage_name
+        self._task = task
+        self.coarse: Stage | None = None
         self._put(network, start)
 
     def _put(self, network: SpringNetwork, start: FloatArray) -> Relaxation:
@@ -102,7 +104,20 @@ class _Piece:
                     break
             return self._relax()
         if from_coarse and not factor_pays(task.surface):
+            began = time.perf_counter()
             layout = coarse_minimum(self.state)
+            energies, seconds = self.state.energies(), time.perf_counter() - began
+            self.coarse = Stage(
+                name=COARSE,
+                model_energy_j=energies.potential,
+                guard_energy_j=energies.guard,
+                strain_energy_j=strain_energy(self.state.network, layout),
+                steps=0,
+                work_units=0.0,
+                seconds=seconds,
+                converged=True,
+                residual=None,
+            )
             self._measure(layout, layout)
         follows = task.follows_layout(self.state.network)
         return self._relax(measure=self._measure if follows else None)

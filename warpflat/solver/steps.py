@@ -60,8 +60,9 @@ IMPLICIT_STEP, IMPLICIT_STEP_AT_REST = (1.0, 1.0, 1.0), (0.0, 1.0, 1.0)
 _TURNS = 4
 # Steps between two updates of a membrane's tangent stiffness.
 _MATRIX_INTERVAL = 100
-# The first steps are looked at after so many of them, and are at most so many: an iteration of L-BFGS takes as long as two to four.
-_FIRST_STEPS_PER_CHECK, _MOST_FIRST_STEPS = 3, 12
+# The first steps are looked at after so many of them, and are at most so many. In woven cloth an iteration of L-BFGS takes as long as one
+# or two.
+_FIRST_STEPS_PER_CHECK, _MOST_FIRST_STEPS = 3, 10
 
 
 class Relaxation:
