@@ -13,12 +13,12 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.pattern.piece_parts import Dart, Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["sample_dress"]
 
 
-def sample_dress(sizes: tuple[str, ...] = ("38",)) -> Garment:
+def sample_dress(sizes: tuple[str, ...] = ("38",)) -> Pattern:
     """A bodice (front on the fold with two darts, back with one), a sleeve and a skirt in EU sizes 32 to 54.
 
     Raises:
@@ -39,7 +39,7 @@ def sample_dress(sizes: tuple[str, ...] = ("38",)) -> Garment:
             _skirt(size, grow, "front"),
             _skirt(size, grow, "back"),
         )
-    return Garment(name="Sample dress", pieces=pieces, seams=_seams())
+    return Pattern(name="Sample dress", pieces=pieces, seams=_seams())
 
 
 def _curve(*control: tuple[float, float], count: int = 24) -> FloatArray:

@@ -12,7 +12,7 @@ from warpflat.cli.main import main
 from warpflat.export.svg import write_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def tube(tmp_path: Path) -> Path:
         for a, b in sides
     ]
     pieces = [Piece(name=name, edges=edges) for name in ("front", "back")]
-    write_svg(draft_garment(Garment(name="tube", pieces={"": pieces}, seams=seams)), tmp_path / "tube.svg")
+    write_svg(draft_garment(Pattern(name="tube", pieces={"": pieces}, seams=seams)), tmp_path / "tube.svg")
     return tmp_path / "tube.svg"
 
 

@@ -26,7 +26,7 @@ from warpflat.export.svg import SvgPage
 from warpflat.fabric.file import read_fabrics
 from warpflat.pattern.draft import draft_garment, draft_piece
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.surface.paths.lines import with_lines
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -121,7 +121,7 @@ def test_an_svg_is_xml_whatever_is_written_into_it(tmp_path: Path, control: str)
 
 def test_a_dxf_has_every_text_in_one_line(tmp_path: Path, pattern: dict[str, Any]):
     piece = square(fabric="a\r\nb\x01\u202ec")
-    write_dxf(draft_garment(Garment(name="p", pieces={"": [piece]})), tmp_path / "p.dxf")
+    write_dxf(draft_garment(Pattern(name="p", pieces={"": [piece]})), tmp_path / "p.dxf")
     assert b"FABRIC: a??b??c" in (tmp_path / "p.dxf").read_bytes()
     assert ezdxf.readfile(tmp_path / "p.dxf").blocks.get("P")
 
@@ -208,7 +208,7 @@ def square(name: str = "p", **more: Any) -> Piece:
 def pattern() -> dict[str, Any]:
     """What a `pattern.json` holds that has something under each of its keys."""
     sides = ((SeamSide(piece="p", edge="e1"),), (SeamSide(piece="q", edge="e3", reversed=True),))
-    garment = Garment(
+    garment = Pattern(
         name="trial", pieces={"": [square("p"), square("q")]}, seams=[Seam(name="side", sides=sides, notches=(0.5,))]
     )
     return json.loads(json.dumps(pattern_json(draft_garment(garment))))

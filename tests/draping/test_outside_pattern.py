@@ -25,7 +25,7 @@ from warpflat.export.read_svg import read_svg
 from warpflat.export.svg import write_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Dart, Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.scene.outside_pattern import OutsideJob
 
 
@@ -45,12 +45,12 @@ def seam(name: str, first: str, second: str, ease: float = 0.0) -> Seam:
     return Seam(name=name, sides=(sides[0], sides[1]), ease=ease)
 
 
-def tube(width: float, height: float, **more: object) -> Garment:
+def tube(width: float, height: float, **more: object) -> Pattern:
     """Two rectangles and their side seams."""
     corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
     pieces = [polygon(name, corners, **more) for name in ("front", "back")]
     seams = [seam("side left", "front.e2", "back.e4"), seam("side right", "back.e2", "front.e4")]
-    return Garment(name="tube", pieces={"": pieces}, seams=seams)
+    return Pattern(name="tube", pieces={"": pieces}, seams=seams)
 
 
 def darted(legs: str = "dart") -> Piece:
@@ -121,7 +121,7 @@ def test_halves_and_pairs_are_made_whole():
 @pytest.mark.parametrize("ending", ["dxf", "svg"])
 def test_a_file_of_the_package_names_its_seams(ending: str, tmp_path: Path):
     other = polygon("yoke", [(0.0, 0.0), (0.33, 0.0), (0.33, 0.1), (0.0, 0.1)])
-    given = Garment(
+    given = Pattern(
         name="trial", pieces={"": [darted(), other]},
         seams=[seam("yoke", "yoke.e1", "front.e6 + front.e3", ease=0.36 / 0.33 - 1.0)],
     )  # fmt: skip
@@ -259,7 +259,7 @@ def test_a_tube_is_put_around_the_body():
     assert back[:, 2].mean() < -0.03
     assert abs(measures["strain_weft"]["p95"]) < 0.03
     with pytest.raises(InputError, match="has no seams"):
-        drape_pattern(Garment(name="rag", pieces={"": list(pattern.pieces[""])}), body, fabric=worn.cloth.fabric)
+        drape_pattern(Pattern(name="rag", pieces={"": list(pattern.pieces[""])}), body, fabric=worn.cloth.fabric)
     with pytest.raises(InputError, match=r"has no designed surface; name a body"):
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
 

@@ -21,7 +21,7 @@ from warpflat.core.errors import InputError
 from warpflat.export.dxf import block_name, write_dxf
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.seam_words import seam_words
 
 SIZES = ("36", "38", "40")
@@ -160,7 +160,7 @@ def test_names_in_any_script_give_ascii_blocks_that_differ(tmp_path):
     edges = [Edge(name=f"é{i}", points=corners[i : i + 2]) for i in range(3)]
     names = ("Rückenteil links", "Ruckenteil links", "前身頃", "後身頃")
     pieces = [Piece(name=n, edges=edges) for n in names]
-    write_dxf(draft_garment(Garment(name="x", pieces={"": pieces})), tmp_path / "p.dxf", created=CREATED)
+    write_dxf(draft_garment(Pattern(name="x", pieces={"": pieces})), tmp_path / "p.dxf", created=CREATED)
     blocks = [b.name for b in ezdxf.readfile(tmp_path / "p.dxf").blocks if not b.name.startswith("*")]
     assert blocks == ["RUCKENTEIL_LINKS", "RUCKENTEIL_LINKS_2", "PIECE", "PIECE_2"]
 
@@ -169,7 +169,7 @@ def test_pieces_that_ascii_cannot_name_go_by_their_number_in_every_size(tmp_path
     corners = np.array([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0)])
     edges = [Edge(name=f"{i}", points=corners[i : i + 2]) for i in range(3)]
     sizes = {s: [Piece(name=n, edges=edges, size=s) for n in ("前身頃", "front", "後身頃")] for s in ("EU 36", "EU 38")}
-    write_dxf(draft_garment(Garment(name="x", pieces=sizes)), tmp_path / "p.dxf", created=CREATED)
+    write_dxf(draft_garment(Pattern(name="x", pieces=sizes)), tmp_path / "p.dxf", created=CREATED)
     document = ezdxf.readfile(tmp_path / "p.dxf")
     told = {
         block.name: next(t.dxf.text for t in block.query("TEXT") if t.dxf.text.startswith("PIECE NAME"))
@@ -196,7 +196,7 @@ def test_another_cad_program_draws_the_outline_in_true_size(tmp_path):
     corners = np.array([(0.05, 0.17), (0, 0.17), (0, 0), (0.1, 0), (0.1, 0.12)])
     lines = [arc, *(np.stack(pair) for pair in pairwise(corners))]
     piece = Piece(name="cuff", edges=[Edge(name=f"e{i}", points=line) for i, line in enumerate(lines)])
-    drafted = draft_garment(Garment(name="cuff", pieces={"": [piece]}))
+    drafted = draft_garment(Pattern(name="cuff", pieces={"": [piece]}))
     write_dxf(drafted, tmp_path / "cuff.dxf", created=CREATED)
     environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
     printing = ["librecad", "dxf2pdf", "-c", "-s", "1", "cuff.dxf"]

@@ -18,7 +18,7 @@ from warpflat.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 
 needs_poppler = pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="pdftoppm (poppler) is not installed")
 MM = 1 / 25.4
@@ -204,7 +204,7 @@ def test_names_on_the_first_page_stay_on_it_and_on_their_pieces(tmp_path):
         for name, size in shapes.items()
     ]
     name = "a_garment_with_a_name_that_is_far_too_long_for_the_width_of_the_page"
-    write_pdf(draft_garment(Garment(name=name, pieces={"": pieces})), tmp_path / "p.pdf")
+    write_pdf(draft_garment(Pattern(name=name, pieces={"": pieces})), tmp_path / "p.pdf")
     told = subprocess.run(
         ["pdftotext", "-f", "1", "-l", "1", "-bbox", str(tmp_path / "p.pdf"), "-"],
         check=True,

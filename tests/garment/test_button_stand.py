@@ -19,7 +19,7 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Garment as Pattern
+from warpflat.pattern.pieces import Pattern
 
 BUTTONED = Opening(kind="buttons", line="centre front", length=np.inf, width=0.02, buttons=Buttons())
 FACING = Finishing(kind="facing", edge="neck", width=0.055)

@@ -15,7 +15,7 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.pieces import Garment as Pattern
+from warpflat.pattern.pieces import Pattern
 
 ZIP = Opening(kind="zip", line="centre back", length=0.4)
 FACING = Finishing(kind="facing", edge="neck", width=0.055)

@@ -13,11 +13,11 @@ from warpflat.garment.linings import add_interfacing, add_lining
 from warpflat.pattern.cut_list import cut_list
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.shrinkage import Shrinkage, enlarged
 
 
-def bodice() -> Garment:
+def bodice() -> Pattern:
     """A front and a back of a plain top, 40 by 50 cm, with a neck 20 cm wide."""
     across = np.linspace(0.0, np.pi, 21)
     neck = np.column_stack([0.1 * np.cos(across), 0.5 - 0.08 * np.sin(across)])
@@ -42,7 +42,7 @@ def bodice() -> Garment:
         for name in ("side left", "shoulder left", "side right", "shoulder right")
     ]
     return with_facings(
-        Garment(name="top", pieces={"": pieces}, seams=seams), [("front", "neck"), ("back", "neck")], 0.05
+        Pattern(name="top", pieces={"": pieces}, seams=seams), [("front", "neck"), ("back", "neck")], 0.05
     )
 
 
@@ -68,7 +68,7 @@ def test_lining_and_facing_together_are_as_large_as_the_shell():
 def test_lining_of_facings_that_meet_is_refused():
     pattern = bodice()
     wide = with_facings(
-        Garment(name="top", pieces={"": [p for p in pattern.pieces[""] if p.role == "shell"]}),
+        Pattern(name="top", pieces={"": [p for p in pattern.pieces[""] if p.role == "shell"]}),
         [("front", "neck")],
         0.098,
     )

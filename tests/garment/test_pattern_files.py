@@ -25,7 +25,7 @@ from warpflat.export.pdf import write_pdf
 from warpflat.export.svg import write_svg
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules
-from warpflat.garment.garment import Garment as Flattened
+from warpflat.garment.garment import Pattern as Flattened
 from warpflat.garment.garment import flatten_form
 from warpflat.garment.pattern_files import PatternOptions, export_patterns, surface_files
 from warpflat.garment.to_pattern import check_edge_names, pattern_of_surface
@@ -35,7 +35,7 @@ from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.repair.validate import make_surface
@@ -335,7 +335,7 @@ def test_holes_have_both_lines_in_every_file(tmp_path: Path):
     corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
     border = [Edge(name=f"e{i}", points=0.3 * corners[i : i + 2]) for i in range(4)]
     vent = Hole(name="vent", points=0.1 + 0.05 * corners[:4])
-    garment = Garment(name="p", pieces={"": [Piece(name="p", edges=border, holes=[vent])]})
+    garment = Pattern(name="p", pieces={"": [Piece(name="p", edges=border, holes=[vent])]})
     drafted = draft_garment(garment)
     read = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
     assert pattern_json(read) == pattern_json(drafted)
@@ -388,7 +388,7 @@ def test_a_label_beside_its_piece_is_in_every_file(tmp_path: Path):
 
 
 def as_garment(piece: Piece) -> DraftedGarment:
-    return draft_garment(Garment(name="p", pieces={"": [piece]}))
+    return draft_garment(Pattern(name="p", pieces={"": [piece]}))
 
 
 def test_rules_name_holes():

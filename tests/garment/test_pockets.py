@@ -11,13 +11,13 @@ from warpflat.garment.pockets import Pocket, add_pockets
 from warpflat.garment.shaped_band import with_shaped_waistband
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 PATCH = Pocket(kind="patch", where="front", width=0.12, height=0.14, line="hip", below=0.02, from_centre=0.05)
 BAGS = Pocket(kind="inseam", where="side left", width=0.15, height=0.16, below=0.06)
 
 
-def skirt() -> Garment:
+def skirt() -> Pattern:
     """A flared skirt of two equal pieces with a curved waist."""
     across = np.linspace(0.18, -0.18, 21)
     waist = np.column_stack([across, 0.6 - 0.03 * np.cos(np.pi * across / 0.36)])
@@ -39,7 +39,7 @@ def skirt() -> Garment:
         )
         for name in ("side left", "side right")
     ]
-    return Garment(name="skirt", pieces={"": pieces}, seams=seams)
+    return Pattern(name="skirt", pieces={"": pieces}, seams=seams)
 
 
 def test_patch_lies_below_its_line_on_both_sides_of_the_centre():

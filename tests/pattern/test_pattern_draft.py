@@ -18,7 +18,7 @@ from warpflat.pattern.draft import draft_garment, draft_piece, nest_label
 from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 SIZES = ("36", "38", "40", "42", "44")
 
@@ -62,7 +62,7 @@ def test_seam_sides_agree_within_half_a_millimetre(dress):
 def test_a_seam_that_does_not_match_is_reported():
     a, b = square("a"), square("b", edges=square().edges)
     taller = [Edge(name=e.name, points=e.points * [1, 1.01]) for e in b.edges]
-    garment = Garment(
+    garment = Pattern(
         name="two",
         pieces={"": [a, square("b", edges=taller)]},
         seams=[
@@ -164,7 +164,7 @@ def test_curves_leave_their_points_only_where_the_seam_demands_it():
             others = [Edge(name=f"e{k}", points=np.stack(corners[k : k + 2])) for k in range(3)]
             pieces.append(Piece(name=name, edges=[Edge(name="sewn", points=points, vertices=ids), *others]))
         sides = ((SeamSide(piece="round", edge="sewn"),), (SeamSide(piece="straight", edge="sewn"),))
-        garment = Garment(name="two", pieces={"": pieces}, seams=[Seam(name="s", sides=sides)])
+        garment = Pattern(name="two", pieces={"": pieces}, seams=[Seam(name="s", sides=sides)])
         drafted = draft_garment(garment)
         assert drafted.seams[0].matches, step
         assert (drafted.pieces[""][0].edge("sewn").fit_error <= 1e-4) == near, step
@@ -277,7 +277,7 @@ def curved_dart(mouth, bends=(0.08, 0.08), length=0.1):
     edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right[::-1], kind="dart")]
     edges += [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(5)]
     return draft_garment(
-        Garment(
+        Pattern(
             name="g", pieces={"": [Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)])]}
         )
     ).pieces[""][0]
@@ -441,7 +441,7 @@ def test_a_label_beside_a_piece_has_its_room_on_the_sheet_and_stands_beside_all_
     small = frame(0.004, size="38")[0]
     edges = [Edge(name=e.name, points=e.points * [1.1, 1]) for e in small.edges]
     wide = square("frame", "40", edges=edges, holes=small.holes)
-    drafted = draft_garment(Garment(name="frames", pieces={"40": [wide], "38": [small]}, seams=[]))
+    drafted = draft_garment(Pattern(name="frames", pieces={"40": [wide], "38": [small]}, seams=[]))
     (placed,) = lay_out(nests(drafted), width=1.0).placed
     label = nest_label(placed.pieces)
     assert all(not shapely.Polygon(p.cut_line).intersects(shapely.Polygon(label.box)) for p in placed.pieces)
@@ -503,8 +503,8 @@ def test_drafting_twice_gives_the_same_to_the_bit():
             "occurs twice",
         ),
         (lambda: Seam(name="s", sides=((), ())), "at least one edge"),
-        (lambda: Garment(name="g", pieces={}), "no pieces"),
-        (lambda: Garment(name="g", pieces={"38": [square()]}), "listed under"),
+        (lambda: Pattern(name="g", pieces={}), "no pieces"),
+        (lambda: Pattern(name="g", pieces={"38": [square()]}), "listed under"),
         (lambda: sample_dress(("39",)), "even numbers"),
     ],
 )
@@ -517,4 +517,4 @@ def test_bad_input_is_one_line_that_says_what_is_right(make, message):
 def test_a_seam_that_names_a_wrong_edge_says_the_nearest():
     side = (SeamSide(piece="square", edge="botom"),)
     with pytest.raises(InputError, match="did you mean 'bottom'"):
-        Garment(name="g", pieces={"": [square()]}, seams=[Seam(name="s", sides=(side, side))])
+        Pattern(name="g", pieces={"": [square()]}, seams=[Seam(name="s", sides=(side, side))])

@@ -15,7 +15,7 @@ from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Cloth, make_marker, unfold_piece
 from warpflat.pattern.piece_parts import Edge, Hole
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def frame(name, width, height, rim, *, fold=False):
 
 @pytest.mark.parametrize("fold", [False, True])
 def test_what_is_cut_out_is_drawn_and_is_not_used(fold, tmp_path):
-    garment = Garment(name="g", pieces={"": [frame("rim", 0.4, 0.5, 0.08, fold=fold)]})
+    garment = Pattern(name="g", pieces={"": [frame("rim", 0.4, 0.5, 0.08, fold=fold)]})
     plan = make_marker(draft_garment(garment), Cloth(width=1.4), seconds=1)
     (copy,) = plan.placements
     halves = 1 + fold
@@ -101,7 +101,7 @@ def test_what_is_cut_out_is_drawn_and_is_not_used(fold, tmp_path):
 def test_names_stay_on_their_pieces():
     long = frame("front_facing_of_the_placket", 0.3, 0.2, 0.03)
     narrow = Piece(name="side panel.left", edges=frame("n", 0.04, 0.5, 0.01).edges)
-    plan = make_marker(draft_garment(Garment(name="g", pieces={"": [long, narrow]})), Cloth(width=1.0), seconds=1)
+    plan = make_marker(draft_garment(Pattern(name="g", pieces={"": [long, narrow]})), Cloth(width=1.0), seconds=1)
     for copy in plan.placements:
         cloth = shapely.Polygon(copy.cut_line, copy.cutouts)
         assert cloth.covers(shapely.Polygon(copy.name.box))
@@ -126,7 +126,7 @@ def test_bad_cloth_and_names_are_refused(dress):
     with pytest.raises(InputError, match=r"'front bodice' size 36 is \d+ mm wide, the cloth"):
         make_marker(dress, Cloth(width=0.3), seconds=1)
     (first, *_) = sample_dress(("38",)).pieces["38"]
-    plain = draft_garment(Garment(name="plain", pieces={"": [replace(first, size="")]}))
+    plain = draft_garment(Pattern(name="plain", pieces={"": [replace(first, size="")]}))
     with pytest.raises(InputError, match=r"'front bodice' is \d+ mm wide, the cloth"):
         make_marker(plain, Cloth(width=0.3), seconds=1)
     with pytest.raises(InputError, match="no size"):

@@ -8,7 +8,7 @@ import pytest
 from warpflat.pattern.curves import chords, fit_curve
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.truing import true_corners, turned_end
 from warpflat.pattern.walked import walk_seams
 
@@ -27,12 +27,12 @@ def quad(name: str, corners: list[tuple[float, float]], fold: bool = False) -> P
     )
 
 
-def flared(hem_drop: float, length: float = 0.4) -> Garment:
+def flared(hem_drop: float, length: float = 0.4) -> Pattern:
     """Return half a front on the fold sewn at the side to a like back; both sides' hems drop by `hem_drop` [m]."""
     front = quad("front", [(0.0, 0.0), (0.2, -hem_drop), (0.2, length - hem_drop), (0.0, length)], fold=True)
     back = replace(front, name="back")
     seam = Seam(name="side", sides=((SeamSide(piece="front", edge="side"),), (SeamSide(piece="back", edge="side"),)))
-    return Garment(name="skirt", pieces={"": [front, back]}, seams=[seam])
+    return Pattern(name="skirt", pieces={"": [front, back]}, seams=[seam])
 
 
 def test_hems_run_on_across_the_side_and_meet_the_fold_squarely() -> None:

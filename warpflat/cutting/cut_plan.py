@@ -17,7 +17,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.applied_cut import AppliedCut
-from warpflat.surface.cut.cut_mesh import Cut, Seam, cut_along_many
+from warpflat.surface.cut.cut_mesh import Crack, Cut, cut_along_many
 from warpflat.surface.cut.pieces import apply_cut
 from warpflat.surface.cut.split_faces import split_faces_along
 from warpflat.surface.mesh import Surface
@@ -111,7 +111,7 @@ def make_cuts(surface: Surface, plans: Sequence[CutPlan]) -> CutSurface:
         surface.faces, [path for plan in plans for path in plan.paths], vertex_count=len(surface.vertices)
     )
     owner = {edge: number for number, plan in enumerate(plans) for path in plan.paths for edge in _edges(path)}
-    seams: list[list[Seam]] = [[] for _ in plans]
+    seams: list[list[Crack]] = [[] for _ in plans]
     for seam in topology.seams:
         seams[owner[_edges(seam.path)[0]]].append(seam)
     applied = [

@@ -17,7 +17,7 @@ from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.solver.options import RelaxOptions, given_options
-from warpflat.surface.cut.cut_mesh import Seam
+from warpflat.surface.cut.cut_mesh import Crack
 from warpflat.surface.cut.dart import dart_measure
 from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface
@@ -107,7 +107,7 @@ def move_dart(
     )
 
 
-def _close_cracks(surface: Surface, positions: FloatArray, seams: Sequence[Seam]) -> FloatArray:
+def _close_cracks(surface: Surface, positions: FloatArray, seams: Sequence[Crack]) -> FloatArray:
     """Move both sides of cracks to the middle between them, and everything else along harmonically; return the layout."""
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import spsolve

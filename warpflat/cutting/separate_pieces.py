@@ -16,8 +16,8 @@ from warpflat.flattening.result import Flattening
 from warpflat.model.strain import strain_energy
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation
-from warpflat.surface.cut.cut_mesh import Seam
-from warpflat.surface.cut.pieces import Piece, split_pieces
+from warpflat.surface.cut.cut_mesh import Crack
+from warpflat.surface.cut.pieces import CutPart, split_pieces
 from warpflat.surface.mesh import Surface
 
 __all__ = ["cut_surfaces", "separate"]
@@ -44,7 +44,7 @@ def cut_surfaces(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface, .
     return tuple(piece.surface for piece in _split(surface, made)) or (made.surface,)
 
 
-def _split(surface: Surface, made: CutSurface) -> tuple[Piece, ...]:
+def _split(surface: Surface, made: CutSurface) -> tuple[CutPart, ...]:
     """Return the pieces that cuts leave; none if it is still one."""
     if made.cut is None or made.cut.component_count == made.cut.components_before == 1:
         return ()
@@ -53,7 +53,7 @@ def _split(surface: Surface, made: CutSurface) -> tuple[Piece, ...]:
     return split_pieces(surface, replace(made.cut, kind=kind))
 
 
-def _part(result: Flattening, piece: Piece) -> Flattening:
+def _part(result: Flattening, piece: CutPart) -> Flattening:
     used = np.unique(piece.vertex_origin)
     number = np.full(len(result.surface.vertices), -1, dtype=np.int32)
     number[used] = np.arange(len(used), dtype=np.int32)
@@ -109,7 +109,7 @@ def _part(result: Flattening, piece: Piece) -> Flattening:
 def _cut_within(made: AppliedCut, in_piece: IntArray, number: IntArray) -> AppliedCut:
     """Return the part of a cut whose sides both lie in one piece, in that piece's numbering."""
     seams = tuple(
-        Seam(path=number[seam.path], left=in_piece[seam.left], right=in_piece[seam.right])
+        Crack(path=number[seam.path], left=in_piece[seam.left], right=in_piece[seam.right])
         for seam in made.seams
         if (in_piece[seam.left] >= 0).all() and (in_piece[seam.right] >= 0).all()
     )

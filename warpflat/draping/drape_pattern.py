@@ -24,7 +24,7 @@ from warpflat.draping.whole_pieces import whole_pieces
 from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["Placement", "drape_pattern"]
@@ -55,7 +55,7 @@ class Placement:
 
 
 def drape_pattern(
-    pattern: Garment,
+    pattern: Pattern,
     body: Mannequin | None,
     *,
     fabric: Fabric,

@@ -38,7 +38,7 @@ from warpflat.pattern.drafted import (
 )
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = [
     "SCHEMA",
@@ -439,7 +439,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
             size: tuple(_read_piece(name, size, piece) for name, piece in pieces.items())
             for size, pieces in data.sizes.items()
         }
-        garment = Garment(
+        garment = Pattern(
             name=data.name,
             pieces={size: tuple(piece.piece for piece in pieces) for size, pieces in drafted.items()},
             seams=[

@@ -19,7 +19,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, Place, reading
 from warpflat.core.text import quote_value
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.seam_words import seams_of_words
 
 __all__ = ["MOST_POINTS", "check_closed", "outermost", "read_dxf", "read_quantity"]
@@ -70,7 +70,7 @@ class _Block:
         return next((value.strip() for name, _, value in found if name.strip().upper() == key), "")
 
 
-def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) -> Garment:
+def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) -> Pattern:
     """Read the pieces of a pattern; the seams too, where the file names them as the package does.
 
     A block is a piece. Its sewing line is on layer 14, its boundary on layer 1, its grain on layer 7. In a file without such
@@ -126,7 +126,7 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         first = next(iter(sizes))
         seams = seams_of_words(entry for (size, _), rows in words.items() if size == first for entry in rows)
         sample = style.value("SAMPLE SIZE")
-        return Garment(
+        return Pattern(
             name=style.value("STYLE NAME") or path.stem, pieces=sizes, seams=seams,
             sample_size=sample if sample in sizes else None,
         )  # fmt: skip

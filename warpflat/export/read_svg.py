@@ -20,7 +20,7 @@ from warpflat.core.input_files import FARTHEST, reading
 from warpflat.core.text import quote_value
 from warpflat.export.read_dxf import MOST_POINTS, check_closed, outermost, read_quantity
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.seam_words import seams_of_words
 
 __all__ = ["read_svg"]
@@ -36,7 +36,7 @@ _TOO_MANY = f"the drawing has more than {MOST_POINTS:,} points; leave out all bu
 _LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
-def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) -> Garment:
+def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) -> Pattern:
     """Read the pieces of a drawing in true size; the seams too, where the file names them as the package does.
 
     In other files every closed path that lies in no other is a piece, called by its label or id. Its size is that of `width` and
@@ -131,7 +131,7 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         sizes: dict[str, list[Piece]] = {}
         for piece in pieces:
             sizes.setdefault(piece.size, []).append(piece)
-        return Garment(name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])))
+        return Pattern(name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])))
 
 
 def _parse(path: Path) -> ET.Element:

@@ -13,7 +13,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.surface.connectivity import border_loops
-from warpflat.surface.cut.cut_mesh import Seam
+from warpflat.surface.cut.cut_mesh import Crack
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
 from warpflat.surface.cut.dart_legs import are_curved, pull_back
 from warpflat.surface.mesh import Surface
@@ -35,7 +35,7 @@ class AppliedCut:
 
     name: str
     paths: tuple[IntArray, ...]
-    seams: tuple[Seam, ...]
+    seams: tuple[Crack, ...]
     length: float
     tip_back: float = 0.0
 
@@ -46,7 +46,7 @@ def cut_sides(cuts: Sequence[AppliedCut]) -> IntArray:
     return np.unique(np.concatenate(sides)) if sides else np.empty(0, dtype=np.int32)
 
 
-def seam_kind(seam: Seam) -> str:
+def seam_kind(seam: Crack) -> str:
     """Return the kind of a seam: "dart" (one tip), "fish-eye" (two), or "parting" (none, from border to border or closed)."""
     tips = int(seam.left[0] == seam.right[0]) + int(seam.left[-1] == seam.right[-1])
     return ("parting", "dart", "fish-eye")[tips]
@@ -71,7 +71,7 @@ def measure_cut(surface: Surface, positions: FloatArray, cut: AppliedCut) -> dic
 def _measure_seam(
     surface: Surface,
     positions: FloatArray,
-    seam: Seam,
+    seam: Crack,
     tip_back: float,
     loops: list[IntArray],
 ) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def _measure_seam(
     return found
 
 
-def _drawn(positions: FloatArray, seam: Seam, kind: str, tip_back: float, loops: list[IntArray]) -> dict[str, Any]:
+def _drawn(positions: FloatArray, seam: Crack, kind: str, tip_back: float, loops: list[IntArray]) -> dict[str, Any]:
     """Measure the dart as it is drawn: its tip moved back, straight legs made equal, curved ones as they run."""
     try:
         if kind == "fish-eye":

@@ -14,7 +14,7 @@ from warpflat.surface.connectivity import join_labels
 if TYPE_CHECKING:
     from warpflat.flattening.applied_cut import AppliedCut
     from warpflat.flattening.result import Flattening
-    from warpflat.surface.cut.cut_mesh import Seam
+    from warpflat.surface.cut.cut_mesh import Crack
 
 __all__ = ["CLOSED", "are_closed", "close_cuts", "seams_of_cuts"]
 
@@ -23,7 +23,7 @@ __all__ = ["CLOSED", "are_closed", "close_cuts", "seams_of_cuts"]
 CLOSED = 1e-4
 
 
-def seams_of_cuts(result: Flattening) -> list[tuple[str, AppliedCut, Seam]]:
+def seams_of_cuts(result: Flattening) -> list[tuple[str, AppliedCut, Crack]]:
     """Return the seams of all cuts of a piece, each with its name in the pattern and its cut."""
     return [
         (cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}", cut, seam)
@@ -32,7 +32,7 @@ def seams_of_cuts(result: Flattening) -> list[tuple[str, AppliedCut, Seam]]:
     ]
 
 
-def are_closed(positions: FloatArray, seam: Seam) -> bool:
+def are_closed(positions: FloatArray, seam: Crack) -> bool:
     """Return whether a dart or a fish-eye dart lies closed in the plane (#P by 2 [m]); a seam between pieces never does."""
     if seam_kind(seam) == "parting":
         return False
@@ -40,7 +40,7 @@ def are_closed(positions: FloatArray, seam: Seam) -> bool:
 
 
 def close_cuts(
-    faces: IntArray, lines: Mapping[str, IntArray], seams: Mapping[str, Seam], *, count: int
+    faces: IntArray, lines: Mapping[str, IntArray], seams: Mapping[str, Crack], *, count: int
 ) -> tuple[IntArray, dict[str, IntArray]]:
     """Return the faces (#F by 4) with the two sides of cuts joined, and the lines with one of each cut's name.
 

@@ -17,7 +17,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name, without_side
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["INNER", "STAND", "STAND_END", "Stand", "centre_notch", "with_facings", "with_stand_facings"]
 
@@ -48,13 +48,13 @@ _Parts = dict[tuple[str, str], tuple[str, str, bool]]
 
 
 def with_facings(
-    pattern: Garment,
+    pattern: Pattern,
     places: Sequence[tuple[str, str]],
     width: float,
     *,
     gaps: Collection[str] = (),
     stands: Sequence[Stand] = (),
-) -> Garment:
+) -> Pattern:
     """Return a pattern with a facing along each of some free edges, joined as the pieces themselves are.
 
     A button stand beside one of the edges is faced by the same piece, and so is a keyhole.
@@ -103,7 +103,7 @@ def with_facings(
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def with_stand_facings(pattern: Garment, stands: Sequence[Stand]) -> Garment:
+def with_stand_facings(pattern: Pattern, stands: Sequence[Stand]) -> Pattern:
     """Return a pattern with a straight facing along each button stand, which ends raw at its upper and lower end."""
     pieces = {size: list(row) for size, row in pattern.pieces.items()}
     seams, called = list(pattern.seams), {seam.name for seam in pattern.seams}
@@ -133,7 +133,7 @@ def centre_notch(piece: Piece) -> tuple[float, ...] | None:
     return (0.5,) if whole else None
 
 
-def _touch(pattern: Garment, stand: Stand, edge: str) -> bool:
+def _touch(pattern: Pattern, stand: Stand, edge: str) -> bool:
     return stand.edge in _ends(pattern.piece(stand.piece, pattern.sample), (edge,))
 
 
@@ -156,7 +156,7 @@ def _part(side: SeamSide, parts: _Parts) -> SeamSide:
     return replace(side, piece=piece, edge=edge, reversed=side.reversed != flipped)
 
 
-def _joined(pattern: Garment, parts: _Parts, gaps: Collection[str], edge: str, called: set[str]) -> list[Seam]:
+def _joined(pattern: Pattern, parts: _Parts, gaps: Collection[str], edge: str, called: set[str]) -> list[Seam]:
     """Return the seams between facings, where their pieces have one."""
     seams = []
     for seam in pattern.seams:

@@ -13,7 +13,7 @@ from warpflat.garment.facings import Stand, centre_notch, with_facings, with_sta
 from warpflat.garment.free_edges import FreeChain, free_chain, free_edges
 from warpflat.garment.shaped_band import with_shaped_waistband
 from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges"]
 
@@ -48,8 +48,8 @@ class Finishing:
 
 
 def finish_edges(
-    pattern: Garment, finishing: Sequence[Finishing], *, gaps: Collection[str] = (), stands: Sequence[Stand] = ()
-) -> Garment:
+    pattern: Pattern, finishing: Sequence[Finishing], *, gaps: Collection[str] = (), stands: Sequence[Stand] = ()
+) -> Pattern:
     """Return a pattern with the pieces that finish its edges, and the seams that join them.
 
     Args:
@@ -81,7 +81,7 @@ def finish_edges(
     return with_stand_facings(pattern, left)
 
 
-def _with_strip(pattern: Garment, wish: Finishing, chain: FreeChain) -> Garment:
+def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain) -> Pattern:
     """Return a pattern with a straight strip along a chain of free edges."""
     name = find_unused_name(wish.name, {piece.name for piece in pattern.pieces[pattern.sample]})
     sided = any(without_side(side.edge) != side.edge for side in chain.sides)
@@ -106,7 +106,7 @@ def _with_strip(pattern: Garment, wish: Finishing, chain: FreeChain) -> Garment:
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def _centres(pattern: Garment, chain: FreeChain) -> tuple[float, ...]:
+def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
     """Return the shares of a chain at the middles of the edges that cross a centre line; its joints are notched anyway.
 
     A piece that is printed half has the notch on its fold, and the strip has one for it.

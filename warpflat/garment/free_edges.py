@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from warpflat.pattern.pieces import Garment, Piece, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, SeamSide
 
 __all__ = ["FreeChain", "free_chain", "free_edges"]
 
@@ -26,7 +26,7 @@ class FreeChain:
     closed: bool
 
 
-def free_edges(pattern: Garment) -> list[tuple[str, str]]:
+def free_edges(pattern: Pattern) -> list[tuple[str, str]]:
     """Return piece and edge of every edge with a seam's allowance that is in no seam."""
     sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
     pieces = pattern.pieces[pattern.sample]
@@ -38,7 +38,7 @@ def free_edges(pattern: Garment) -> list[tuple[str, str]]:
     ]
 
 
-def free_chain(pattern: Garment, places: Sequence[tuple[str, str]], gaps: Collection[str] = ()) -> FreeChain:
+def free_chain(pattern: Pattern, places: Sequence[tuple[str, str]], gaps: Collection[str] = ()) -> FreeChain:
     """Return the chain of free edges that the first of some places is part of.
 
     Args:
@@ -70,7 +70,7 @@ def _other_end(corner: _Corner) -> _Corner:
 
 
 def _next(
-    pattern: Garment, corner: _Corner, places: Sequence[tuple[str, str]], gaps: Collection[str]
+    pattern: Pattern, corner: _Corner, places: Sequence[tuple[str, str]], gaps: Collection[str]
 ) -> _Corner | None:
     """Return the corner of the free edge that goes on where another one ends; None where the chain ends."""
     piece, edge, mirrored, end = corner
@@ -100,7 +100,7 @@ def _beside(piece: Piece, edge: str, end: int) -> tuple[str, int]:
     return (names[(at + 1) % len(names)], 0) if end == 1 else (names[at - 1], 1)
 
 
-def _across(pattern: Garment, corner: _Corner, gaps: Collection[str]) -> _Corner | None:
+def _across(pattern: Pattern, corner: _Corner, gaps: Collection[str]) -> _Corner | None:
     """Return the corner that a seam sews to another one; None in a gap, or where no seam begins or ends."""
     piece, edge, mirrored, end = corner
     for turned in (False, True):

@@ -12,7 +12,7 @@ from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import INNER, centre_notch
 from warpflat.garment.shaped_band import without_strip
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["add_interfacing", "add_lining"]
 
@@ -20,7 +20,7 @@ __all__ = ["add_interfacing", "add_lining"]
 _SHORTER, _LEAST_HEM = 0.020, 0.010
 
 
-def add_interfacing(pattern: Garment, cloth: str) -> Garment:
+def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
     """Return a pattern whose facings and waistbands are cut from an interfacing too, by the same patterns.
 
     A facing that is grown on gets a piece of interfacing of its own, without allowances.
@@ -69,7 +69,7 @@ class _Faced:
     after: str
 
 
-def add_lining(pattern: Garment, cloth: str) -> Garment:
+def add_lining(pattern: Pattern, cloth: str) -> Pattern:
     """Return a pattern with a lining of the shell's pieces, sewn as they are, and to the inner edges of the facings.
 
     A lining leaves out what facings cover, and its hems end above the shell's.
@@ -112,7 +112,7 @@ def add_lining(pattern: Garment, cloth: str) -> Garment:
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def _facings_of(pattern: Garment, name: str) -> list[_Faced]:
+def _facings_of(pattern: Pattern, name: str) -> list[_Faced]:
     """Return the facings of a piece.
 
     Raises:

@@ -14,7 +14,7 @@ from warpflat.core.text import find_unused_name
 from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand
 from warpflat.garment.openings import Opening, OpeningPart
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["mark_openings", "with_notches"]
 
@@ -29,7 +29,7 @@ _LEAST_SEWN = 0.02
 Placed = Mapping[str, Sequence[Sequence[OpeningPart]]]
 
 
-def mark_openings(pattern: Garment, openings: Sequence[Opening], placed: Placed) -> Garment:
+def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed) -> Pattern:
     """Return a pattern with its openings drawn.
 
     A zip is a line along its edges with its name, and a notch at its end. A slit or a vent is an edge of its own, which
@@ -75,8 +75,8 @@ def _part_of(placed: Placed, size: str, number: int, seam: str) -> OpeningPart:
 
 
 def _with_zip(
-    pattern: Garment, seam: Seam, opening: Opening, end: float | None, number: int, placed: Placed
-) -> Garment:
+    pattern: Pattern, seam: Seam, opening: Opening, end: float | None, number: int, placed: Placed
+) -> Pattern:
     pieces = dict(pattern.pieces)
     for size in pieces:
         begin, stop = _reach(opening, _part_of(placed, size, number, seam.name))
@@ -112,7 +112,7 @@ def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[flo
     return tuple(sorted([*shares, *kept]))
 
 
-def _starts_on_top(pattern: Garment, seam: Seam) -> bool:
+def _starts_on_top(pattern: Pattern, seam: Seam) -> bool:
     """Return whether a seam's first side begins at its upper end."""
     side = seam.sides[0][0]
     piece = pattern.piece(side.piece, pattern.sample)
@@ -146,7 +146,7 @@ def _between(line: FloatArray, begin: float, end: float) -> FloatArray:
     return np.vstack([ends[:1], line[(at > begin + 1e-6) & (at < end - 1e-6)], ends[1:]])
 
 
-def _with_buttons(pattern: Garment, seam: Seam, opening: Opening, number: int, placed: Placed) -> Garment:
+def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, placed: Placed) -> Pattern:
     """Return a pattern with a button stand on both sides of a seam, which is sewn only below it."""
     sides = {(side.piece, side.edge) for row in seam.sides for side in row}
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0 or opening.buttons is None:
@@ -174,7 +174,7 @@ def _with_buttons(pattern: Garment, seam: Seam, opening: Opening, number: int, p
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def _with_keyhole(pattern: Garment, opening: Opening, name: str) -> Garment:
+def _with_keyhole(pattern: Pattern, opening: Opening, name: str) -> Pattern:
     """Return a pattern with a keyhole drawn on one piece: its slit, its round end, its button and loop."""
     pieces = {
         size: [_keyhole(piece, opening) if piece.name == name else piece for piece in row]
@@ -214,7 +214,7 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     return replace(piece, internal_lines=lines, marks=marks)
 
 
-def _with_slit(pattern: Garment, seam: Seam, opening: Opening, number: int, placed: Placed) -> Garment:
+def _with_slit(pattern: Pattern, seam: Seam, opening: Opening, number: int, placed: Placed) -> Pattern:
     sides = [side for row in seam.sides for side in row]
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
         raise InputError(f"openings[{number}]: a {opening.kind} begins at the lower end of a seam between two edges")

@@ -12,7 +12,7 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
 if TYPE_CHECKING:
-    from warpflat.garment.garment import Garment as FlatGarment
+    from warpflat.garment.garment import Garment
 
 __all__ = ["MirrorPair", "find_mirror_pairs", "sew_mirror_pairs"]
 
@@ -36,7 +36,7 @@ class MirrorPair:
 
 
 def find_mirror_pairs(
-    garments: Mapping[str, FlatGarment], pieces: Mapping[str, Sequence[Piece]], seams: Sequence[Seam]
+    garments: Mapping[str, Garment], pieces: Mapping[str, Sequence[Piece]], seams: Sequence[Seam]
 ) -> tuple[MirrorPair, ...]:
     """Find pieces that are mirror images in every size, with equal edges, and whose seams are mirror images too.
 
@@ -88,7 +88,7 @@ def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) 
     return tuple(sewn)
 
 
-def _matching_edges(garment: FlatGarment, pieces: Sequence[Piece], first: str, second: str) -> dict[str, str] | None:
+def _matching_edges(garment: Garment, pieces: Sequence[Piece], first: str, second: str) -> dict[str, str] | None:
     """Return the first piece's edge for each of the second's; None if one pattern does not serve for both."""
     one, two = (next(piece for piece in pieces if piece.name == name) for name in (first, second))
     partners = garment.mirror_vertices(first, second)

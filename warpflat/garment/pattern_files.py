@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from warpflat.garment.garment import Garment
     from warpflat.pattern.drafted import DraftedGarment
     from warpflat.pattern.marker import Cloth
-    from warpflat.pattern.pieces import Garment as Pattern
+    from warpflat.pattern.pieces import Pattern
     from warpflat.pattern.walked import WalkedSeam
     from warpflat.surface.border_seams import NamedSeam
 

@@ -14,7 +14,7 @@ from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name, other_side
 from warpflat.garment.mark_openings import with_notches
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["Pocket", "add_pockets"]
 
@@ -48,7 +48,7 @@ class Pocket:
     from_centre: float = 0.07
 
 
-def add_pockets(pattern: Garment, pockets: Sequence[Pocket]) -> Garment:
+def add_pockets(pattern: Pattern, pockets: Sequence[Pocket]) -> Pattern:
     """Return a pattern with pockets: their pieces, their places on pieces, their notches in seams.
 
     Raises:
@@ -62,7 +62,7 @@ def add_pockets(pattern: Garment, pockets: Sequence[Pocket]) -> Garment:
     return pattern
 
 
-def _with_patch(pattern: Garment, pocket: Pocket) -> Garment:
+def _with_patch(pattern: Pattern, pocket: Pocket) -> Pattern:
     """Return a pattern with a patch pocket and its place, on both sides of a piece that has both."""
     import shapely
 
@@ -142,7 +142,7 @@ def _patch(pocket: Pocket, title: str, like: Piece, count: int) -> Piece:
     )
 
 
-def _with_bags(pattern: Garment, pocket: Pocket) -> Garment:
+def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
     """Return a pattern with the bags of a pocket in a seam, and on the other side's too, and notches where they open."""
     names = {pocket.where, other_side(pocket.where)}
     own = [seam for seam in pattern.seams if seam.name in names]
@@ -174,7 +174,7 @@ def _downwards(piece: Piece, side: SeamSide) -> tuple[FloatArray, bool]:
     return (points if down else points[::-1]), down != side.reversed
 
 
-def _with_opening(pattern: Garment, seam: Seam, pocket: Pocket) -> Seam:
+def _with_opening(pattern: Pattern, seam: Seam, pocket: Pocket) -> Seam:
     """Return a seam with notches at both ends of a pocket's opening.
 
     Raises:

@@ -12,7 +12,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import INNER, centre_notch, facing_edges
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["with_shaped_waistband", "without_strip"]
 
@@ -59,8 +59,8 @@ def _rest(edge: Edge, part: Edge, *, at_start: bool) -> FloatArray:
 
 
 def with_shaped_waistband(
-    pattern: Garment, places: Sequence[tuple[str, str]], width: float, *, gaps: Collection[str] = ()
-) -> Garment:
+    pattern: Pattern, places: Sequence[tuple[str, str]], width: float, *, gaps: Collection[str] = ()
+) -> Pattern:
     """Return a pattern whose upper strip is a waistband of its own, each piece cut for its outside and its inside.
 
     Args:
@@ -138,7 +138,7 @@ def _inside(piece: Piece) -> Piece:
 
 
 def _with_moved_notches(
-    pattern: Garment, seam: Seam, cut: dict[tuple[str, str], tuple[str, bool]], width: float
+    pattern: Pattern, seam: Seam, cut: dict[tuple[str, str], tuple[str, bool]], width: float
 ) -> Seam:
     """Return a seam whose given notches keep their places on the cloth where its upper end is cut off."""
     side = seam.sides[0][0]

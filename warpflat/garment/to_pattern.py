@@ -33,7 +33,7 @@ from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import MeshFeatures, inner_stretches, line_labels, piece_from_mesh
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart, Edge, Hole
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.surface.border_seams import SAME_PLACE
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.cut.dart import fish_eye_measure
@@ -41,10 +41,10 @@ from warpflat.surface.cut.dart_legs import are_curved, open_length, pull_back, p
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
-    from warpflat.garment.garment import Garment as FlatGarment
+    from warpflat.garment.garment import Garment
     from warpflat.mannequin.pieces import FormPiece
     from warpflat.surface.border_seams import NamedSeam
-    from warpflat.surface.cut.cut_mesh import Seam as Cut
+    from warpflat.surface.cut.cut_mesh import Crack
     from warpflat.surface.mesh import Surface
 
 __all__ = ["check_edge_names", "grain_of", "pattern_of_garment", "pattern_of_surface"]
@@ -57,8 +57,8 @@ GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 
 
 def pattern_of_garment(
-    garments: Mapping[str, FlatGarment], *, name: str, rules: EdgeRules | None = None, sample_size: str | None = None
-) -> tuple[Garment, tuple[str, ...]]:
+    garments: Mapping[str, Garment], *, name: str, rules: EdgeRules | None = None, sample_size: str | None = None
+) -> tuple[Pattern, tuple[str, ...]]:
     """Make the pattern of a garment; of one on a form in one or more sizes. For a mesh see :func:`pattern_of_surface`.
 
     Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece
@@ -69,7 +69,7 @@ def pattern_of_garment(
         garments: flattened, by size; "" where there is none.
         name: of the pattern.
         rules: exceptions for edges.
-        sample_size: see :class:`Garment`.
+        sample_size: see :class:`Pattern`.
 
     Returns:
         The pattern, and what was chosen on the way, one sentence each.
@@ -154,7 +154,7 @@ def pattern_of_garment(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
     )
-    pattern = Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
+    pattern = Pattern(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
     placed = {
         size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
         for size, garment in garments.items()
@@ -316,7 +316,7 @@ def pattern_of_surface(
     rules: EdgeRules | None = None,
     size: str = "",
     seams: Sequence[NamedSeam] = (),
-) -> tuple[Garment, tuple[str, ...]]:
+) -> tuple[Pattern, tuple[str, ...]]:
     """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
 
     A cut with one tip inside becomes a dart of its name, one with two tips a fish-eye dart; their tips are moved back
@@ -371,13 +371,13 @@ def pattern_of_surface(
                 hole = replace(hole, allowance=DEFAULT_ALLOWANCE[kind] if width is None else width)
             holes.append(hole)
         ruled.append(replace(piece, edges=edges, holes=holes))
-    return Garment(name=name, pieces={size: ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
+    return Pattern(name=name, pieces={size: ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
 
 
 def _mesh_piece(result: Flattening, size: str) -> Piece:
     """Return one piece with its cuts as darts, and its grain."""
     darts: dict[str, tuple[int, int, int]] = {}
-    fisheyes: dict[str, Cut] = {}
+    fisheyes: dict[str, Crack] = {}
     tip_back = {title: cut.tip_back for title, cut, _ in seams_of_cuts(result)}
     closed = _closed_cuts(result)
     faces, lines = result.faces, dict(result.network.surface.lines)
@@ -432,11 +432,11 @@ def _mesh_piece(result: Flattening, size: str) -> Piece:
     return replace(piece, darts=drawn, grain=grain)
 
 
-def _closed_cuts(result: Flattening) -> dict[str, Cut]:
+def _closed_cuts(result: Flattening) -> dict[str, Crack]:
     return {title: seam for title, _, seam in seams_of_cuts(result) if are_closed(result.positions, seam)}
 
 
-def _dart_places(loops: Sequence[IntArray], cut: Cut) -> tuple[int, int, int] | None:
+def _dart_places(loops: Sequence[IntArray], cut: Crack) -> tuple[int, int, int] | None:
     """Return left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
     at_end = cut.left[-1] == cut.right[-1]
     tip = int(cut.left[-1] if at_end else cut.left[0])

@@ -35,7 +35,7 @@ from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Garment, Piece, Seam
+from warpflat.pattern.pieces import Pattern, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
 from warpflat.pattern.truing import CornerReport, true_corners
@@ -49,7 +49,7 @@ ALONG_GRAIN = np.radians(1.0)
 
 
 def draft_garment(
-    garment: Garment,
+    garment: Pattern,
     *,
     tolerance: float | None = None,
     sizes: Sequence[str] | None = None,

@@ -12,7 +12,7 @@ from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_leng
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge
-from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE
 from warpflat.pattern.truing import CornerReport
 
@@ -187,7 +187,7 @@ class DraftedGarment:
         corners: where edges run on across seams, darts and folds, before and after truing.
     """
 
-    garment: Garment
+    garment: Pattern
     pieces: Mapping[str, tuple[DraftedPiece, ...]]
     seams: tuple[SeamReport, ...]
     corners: tuple[CornerReport, ...] = ()

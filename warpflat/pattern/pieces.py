@@ -22,7 +22,7 @@ from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 if TYPE_CHECKING:
     import shapely
 
-__all__ = ["Garment", "Piece", "Seam", "SeamSide", "unknown_size"]
+__all__ = ["Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
 
 
 ROLES = ("shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket")
@@ -180,7 +180,7 @@ class Seam:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Garment:
+class Pattern:
     """All pieces of a garment in one or more sizes, and the seams between them (the same in every size).
 
     Attributes:

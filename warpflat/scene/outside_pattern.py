@@ -21,7 +21,7 @@ from warpflat.scene.schema import DrapeTable
 if TYPE_CHECKING:
     from warpflat.draping.lift import Lift
     from warpflat.mannequin.mannequin import Mannequin
-    from warpflat.pattern.pieces import Garment, Piece, Seam
+    from warpflat.pattern.pieces import Pattern, Piece, Seam
 
 __all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
 
@@ -79,7 +79,7 @@ class OutsideJob:
     """
 
     name: str
-    pattern: Garment
+    pattern: Pattern
     sewing: SewingTable
     body: Mannequin | None
     lifts: dict[str, Lift]
@@ -138,7 +138,7 @@ def edge_table(path: Path, *, sewing: Path | None = None) -> str:
     return "\n".join(lines)
 
 
-def _read(path: Path, table: SewingTable) -> tuple[Garment, dict[str, Lift], dict[str, Any] | None]:
+def _read(path: Path, table: SewingTable) -> tuple[Pattern, dict[str, Lift], dict[str, Any] | None]:
     """Return the pattern, the ways to its designed surface, and the run's table of its body."""
     from warpflat.draping.lift import read_lift
     from warpflat.export.pattern_json import read_pattern_json
@@ -167,7 +167,7 @@ def _read(path: Path, table: SewingTable) -> tuple[Garment, dict[str, Lift], dic
     return pattern, lifts, found if isinstance(found, dict) else None
 
 
-def _sewn(pattern: Garment, table: SewingTable) -> Garment:
+def _sewn(pattern: Pattern, table: SewingTable) -> Pattern:
     """Return the pattern with the folds, quantities and seams of the sewing file, whose seams replace the pattern's.
 
     Raises:
@@ -215,7 +215,7 @@ def _side(text: str, *, reversed: bool) -> Any:
     return SeamSide(piece=piece, edge=edge, reversed=reversed != mirrored, mirrored=mirrored)
 
 
-def _examples(pattern: Garment) -> list[str]:
+def _examples(pattern: Pattern) -> list[str]:
     pieces = list(pattern.pieces[pattern.sample])
     second = pieces[1] if len(pieces) > 1 else pieces[0]
     return [f'"{pieces[0].name}.{pieces[0].edges[0].name}"', f'"{second.name}.{second.edges[-1].name}"']

@@ -22,13 +22,13 @@ from warpflat.surface.connectivity import components_of, join_labels
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
 
-__all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "faces_at"]
+__all__ = ["Crack", "Cut", "CutKind", "cut_along", "cut_along_many", "faces_at"]
 
 CutKind = Literal["dart", "slit", "split", "hole", "opening", "network"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seam:
+class Crack:
     """The two edges of cloth that one stretch of a cut leaves, matched vertex by vertex.
 
     Attributes:
@@ -63,7 +63,7 @@ class Cut:
     faces: IntArray
     vertex_origin: IntArray
     kind: CutKind
-    seams: tuple[Seam, ...]
+    seams: tuple[Crack, ...]
     tips: IntArray
     face_component: IntArray
     component_count: int
@@ -71,7 +71,7 @@ class Cut:
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
-    def seam(self) -> Seam:
+    def seam(self) -> Crack:
         """The one stretch of a plain cut.
 
         Raises:
@@ -169,7 +169,7 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
     origin = np.append(np.arange(vertex_count), copies).astype(np.int32)
     new_faces = faces.copy()
     new_faces[near[he.face], he.slot] = vertex
-    seams: list[Seam] = []
+    seams: list[Crack] = []
     for chain, (left, right) in zip(chains, sides, strict=True):
         # Rows: the edges of the path; columns: where each starts and ends in the new numbering.
         left_ends = np.column_stack([vertex[left], vertex[he.next[left]]])
@@ -191,7 +191,7 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
         for run in runs:
             last = run[-1]
             seams.append(
-                Seam(
+                Crack(
                     path=np.append(chain[run], chain[last + 1]),
                     left=np.append(left_ends[run, 0], left_ends[last, 1]),
                     right=np.append(right_ends[run, 0], right_ends[last, 1]),

@@ -16,13 +16,13 @@ from warpflat.surface.half_edges import half_edges, sides_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import corner_triangles
 
-__all__ = ["Piece", "apply_cut", "lines_after_cut", "split_pieces"]
+__all__ = ["CutPart", "apply_cut", "lines_after_cut", "split_pieces"]
 
 _PART = re.compile(r"\.(left|right|\d+)(\.\d+)?$")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Piece:
+class CutPart:
     """One connected part of a cut surface.
 
     Attributes:
@@ -113,7 +113,7 @@ def lines_after_cut(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) ->
     return renumbered
 
 
-def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = None) -> tuple[Piece, ...]:
+def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = None) -> tuple[CutPart, ...]:
     """Return one surface per connected piece of the cut mesh, in the order of their first faces.
 
     Where a piece has only one part of a line, the part gets the line's plain name back.
@@ -157,7 +157,7 @@ def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = No
             input_index=whole.input_index[used],
         )
         pieces.append(
-            Piece(surface=part, vertex_index=used, vertex_origin=cut.vertex_origin[used], face_index=face_index)
+            CutPart(surface=part, vertex_index=used, vertex_origin=cut.vertex_origin[used], face_index=face_index)
         )
     return tuple(pieces)
 
