@@ -129,6 +129,8 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         line for name, piece in metrics["pieces"].items() for line in _piece_warnings(name, piece, given_up=given_up)
     ]
     lines += [*_sewing_warnings(metrics), *_drape_warnings(metrics)]
+    if told := metrics.get("garment", {}).get("no_pattern"):
+        lines.insert(0, told)
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
     lines += [

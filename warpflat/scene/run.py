@@ -106,17 +106,20 @@ def _run_surface(
     from warpflat.cutting.separate_pieces import separate
     from warpflat.garment.pattern_files import surface_files
     from warpflat.scene.drape import write_drape
+    from warpflat.scene.found_seams import found_seams, seams_entry
     from warpflat.scene.frames import Film
     from warpflat.scene.pattern_options import pattern_options
     from warpflat.scene.seams import scene_surface_seams
     from warpflat.scene.surface import scene_pieces
+    from warpflat.seams.find import seam_words
 
     settings = scene.settings
     scene_relax_options(scene)  # a mistake is reported before anything is made
     with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         seams = scene_surface_seams(settings.seams, scene.name)
-    parts = None if cuts is not None else scene_pieces(scene)
+    found = None if cuts is not None else found_seams(scene)
+    parts = found.pieces if found is not None else None if cuts is not None else scene_pieces(scene)
     if parts is not None and settings.drape is not None:
         raise InputError(
             f'{scene.where}: a drape takes one piece, or the folder of a run: warpflat drape DIR --body "EU 38"'
@@ -145,7 +148,8 @@ def _run_surface(
                 whole = pieces
                 if sewn is None and len(pieces) > 1:
                     notes.append("no borders meet in space, vertex by vertex: the pieces are not sewn to each other")
-            notes = [*_unsewn(whole, seams), *notes]
+            garment = {} if found is None else {"garment": seams_entry(found, pieces)}
+            notes = [*_unsewn(whole, seams), *notes] if found is None else [seam_words(found), *found.notes, *notes]
             notes += [message for piece in whole for message in piece.messages]
             fit = beside.enter_context(Beside(partial(measure_fit, scene, pieces, folder), "measuring how it fits"))
             pictures = Beside(partial(write_pieces, scene, pieces, folder), "drawing the pictures")
@@ -162,7 +166,7 @@ def _run_surface(
             pictures=pictures,
             pattern=pattern,
             fit=fit,
-            more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
+            more={**({} if sewn is None else sewn.metrics()), **drape_metrics, **garment},
             files=dict.fromkeys([*drape_files, *film.files]),
             notes=notes,
         )
@@ -249,7 +253,7 @@ def _takes_all(settings: SceneTable) -> bool:
 
 
 def _opened(scene: Scene, parts: Sequence[Surface]) -> list[CutSequence]:
-    """Return the pieces of a file, tubes among them cut open, with their seams as lines."""
+    """Return the pieces of a file, tubes among them cut open, with their seams as lines where they have no lines of their own."""
     from warpflat.garment.sew_pieces import name_seams
     from warpflat.scene.cuts import plan_cuts
 
@@ -272,6 +276,7 @@ def _flatten_pieces(
     """Flatten all pieces of a file, and sew borders that meet."""
     from warpflat.flattening.flatten_all import flatten_all
     from warpflat.garment.sew_pieces import sew_pieces
+    from warpflat.seams.find import GRAIN
 
     settings, relax = scene.settings, scene_relax_options(scene)
     with errors_named(scene.where):
@@ -279,6 +284,8 @@ def _flatten_pieces(
             flatten_all(
                 surfaces,
                 fabric=scene_fabric(scene),
+                # Pieces of a garment whose seams were found know how their grain runs.
+                datum=[GRAIN if GRAIN in surface.lines else None for surface in surfaces],
                 grain_angle=settings.grain_angle,
                 model=settings.model,
                 wear=scene_wear(scene),

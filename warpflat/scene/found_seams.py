@@ -1,0 +1,104 @@
+"""The pieces of a scene's garment whose seams are found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.errors import InputError
+from warpflat.scene.load import Scene, errors_named, expand_variables
+from warpflat.scene.schema import FileSurface
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from warpflat.flattening.result import Flattening
+    from warpflat.seams.find import FoundSeams
+    from warpflat.surface.mesh import Surface
+
+__all__ = ["found_seams", "seams_entry"]
+
+# More than this share of the cloth beyond its limit is no pattern yet.
+_NO_PATTERN = 0.1
+# A panel's border is at least this long over that of a flat disk of its area; a shorter one cannot lie flat.
+_FLAT = 0.8
+
+
+def found_seams(scene: Scene) -> FoundSeams | None:
+    """Find the seams of a scene's garment; None where it asks for none, or its one piece can lie flat.
+
+    Raises:
+        InputError: the file is wrong.
+    """
+    from warpflat.seams.find import find_seams
+    from warpflat.seams.layers import read_layers
+    from warpflat.seams.options import SeamOptions
+
+    settings, table = scene.settings, scene.settings.surface
+    asked = settings.find_seams
+    if not isinstance(table, FileSurface) or table.component == "all" or (asked is not None and asked.find == "none"):
+        return None
+    own = ("lines", "cuts", "auto_cut", "datum", "start", "constraints", "seams", "drape")
+    if asked is None and (table.component is not None or any(getattr(settings, key) for key in own)):
+        return None
+    with errors_named(f"{scene.where}: surface.file"):
+        path = scene.folder / expand_variables(table.file)
+    try:
+        layers: Sequence[Surface] = read_layers(path, units=table.units, prim=table.prim, name=scene.name)
+    except InputError:
+        if asked is None:
+            return None
+        raise
+    if asked is None and (len(layers) > 1 or not _is_whole_garment(layers[0])):
+        return None
+    if isinstance(table.component, int):
+        if table.component >= len(layers):
+            raise InputError(
+                f"{path}: component {table.component} does not exist; the garment has {len(layers)} layers"
+            )
+        layers = [layers[table.component]]
+    elif table.component == "largest":
+        layers = layers[:1]
+    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"find"})
+    return find_seams(layers, SeamOptions(**{**given, "no": tuple(given.get("no", ()))}))
+
+
+def _is_whole_garment(surface: Surface) -> bool:
+    """Return whether a surface cannot lie flat in one piece: closed, forked, a cap, or a tube that is no strip when it is opened."""
+    from warpflat.surface.connectivity import border_loops, euler_characteristic
+    from warpflat.surface.triangles import triangulate
+
+    loops = border_loops(surface.faces, surface.vertices)
+    handles = (2 - len(loops) - euler_characteristic(surface.faces)) // 2
+    if not loops or handles > 0:
+        return True
+    a, b, c = surface.vertices[triangulate(surface.faces)[0]].transpose(1, 0, 2)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    length = [
+        float(np.linalg.norm(np.diff(surface.vertices[np.append(loop, loop[0])], axis=0), axis=1).sum())
+        for loop in loops
+    ]
+    wide = [one for one in length if one > 0.06 * np.sqrt(area)]
+    return len(wide) > 2 or (len(wide) == 1 and wide[0] ** 2 < _FLAT * 4.0 * np.pi * area)
+
+
+def seams_entry(found: FoundSeams, pieces: Sequence[Flattening]) -> Mapping[str, Any]:
+    """Return the entry `garment` of `metrics.json`: what it is, its seams, and whether this is a pattern yet."""
+    area = np.array([float(piece.fit.area.sum()) for piece in pieces])
+    outside = np.array([piece.fit.outside for piece in pieces])
+    share = float((outside * area).sum() / area.sum())
+    entry: dict[str, Any] = {
+        "what": found.what,
+        "outside": share,
+        "found_seams": [seam.as_dict() for seam in found.seams],
+        "notes": list(found.notes),
+    }
+    if share > _NO_PATTERN:
+        worst = pieces[int((outside * area).argmax())].surface.name
+        entry["no_pattern"] = (
+            f"no pattern yet: {100 * share:.0f} % of the cloth is beyond its limit, most of it in {worst}; take a fabric that gives more, "
+            "smooth wrinkles (--smooth 5), or cut the mesh further"
+        )
+    return entry
