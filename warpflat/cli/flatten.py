@@ -34,6 +34,13 @@ __all__ = ["flatten"]
 )
 @click.option("--up", metavar="AXIS", help="Where up is: +y, +z ...  [default: found]")
 @click.option("--no", multiple=True, metavar="SEAM", help='A seam that is left closed: "shoulder", "side left".')
+@click.option("--most-pieces", type=int, metavar="N", help="At most so many pieces.  [default: as usual for its kind]")
+@click.option(
+    "--limit",
+    type=float,
+    metavar="SHARE",
+    help="Of the cloth that may stay beyond its limit before darts and further seams are tried.  [default: 0.01]",
+)
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
@@ -118,6 +125,8 @@ def flatten(
         "seams": ("find_seams", "find"),
         "front": ("find_seams", "front"),
         "up": ("find_seams", "up"),
+        "most_pieces": ("find_seams", "most_pieces"),
+        "limit": ("find_seams", "limit"),
     }
     for option, (table, key) in places.items():
         if options[option] is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.errors import InputError
-from warpflat.scene.load import Scene, errors_named, expand_variables
+from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.scene.schema import FileSurface
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ __all__ = ["found_seams", "seams_entry"]
 
 # More than this share of the cloth beyond its limit is no pattern yet.
 _NO_PATTERN = 0.1
+# A mesh of fewer faces is too coarse for a garment.
+_FEWEST = 60
 # A panel's border is at least this long over that of a flat disk of its area; a shorter one cannot lie flat.
 _FLAT = 0.8
 
@@ -62,7 +64,8 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     elif table.component == "largest":
         layers = layers[:1]
     given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"find"})
-    return find_seams(layers, SeamOptions(**{**given, "no": tuple(given.get("no", ()))}))
+    options = SeamOptions(**{**given, "no": tuple(given.get("no", ()))})
+    return find_seams(layers, options, fabric=scene_fabric(scene))
 
 
 def _is_whole_garment(surface: Surface) -> bool:
@@ -72,6 +75,8 @@ def _is_whole_garment(surface: Surface) -> bool:
 
     loops = border_loops(surface.faces, surface.vertices)
     handles = (2 - len(loops) - euler_characteristic(surface.faces)) // 2
+    if len(surface.faces) < _FEWEST:
+        return False
     if not loops or handles > 0:
         return True
     a, b, c = surface.vertices[triangulate(surface.faces)[0]].transpose(1, 0, 2)

@@ -166,7 +166,11 @@ class FindSeamsTable(Table):
     up: Direction | None = None
     front: Direction | None = None
     no: list[str] = Field(default_factory=list)
-    """Seams that are left closed: "shoulder", or "shoulder left"."""
+    """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts."""
+    limit: Annotated[float, Field(ge=0, le=1)] = 0.01
+    """Share of the cloth that may stay beyond its strain limit before further seams and darts are looked for."""
+    most_pieces: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """At most so many pieces of one layer; as many as are usual for its kind if not given."""
 
 
 class ConstraintTable(Table):

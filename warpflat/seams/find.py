@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, expect
 from warpflat.core.text import find_unused_name, format_count
+from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.library import as_fabric
 from warpflat.seams.anatomy import Anatomy, axis_name, describe, find_anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh
+from warpflat.seams.energy import Trial, cut_by_energy
 from warpflat.seams.fields import Operators
 from warpflat.seams.options import SeamOptions
 from warpflat.seams.tailor import FACING, cut_as_a_tailor, draw_fields, side_word
@@ -38,14 +41,16 @@ class FoundSeam:
     Attributes:
         name: as "side left".
         length: [m].
+        released: strain energy that it releases, by trial [J]; None for seams that every garment of the kind has.
     """
 
     name: str
     length: float
+    released: float | None = None
 
     def as_dict(self) -> dict[str, object]:
         """Return plain data."""
-        return {"name": self.name, "length_m": self.length}
+        return {"name": self.name, "length_m": self.length, "released_j": self.released}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,7 +74,12 @@ class FoundSeams:
     notes: tuple[str, ...] = ()
 
 
-def find_seams(surface: Surface | Sequence[Surface], options: SeamOptions | None = None) -> FoundSeams:
+def find_seams(
+    surface: Surface | Sequence[Surface],
+    options: SeamOptions | None = None,
+    *,
+    fabric: Fabric | str | None = None,
+) -> FoundSeams:
     """Find the seams of a whole garment, and cut it there.
 
     Seams are zero lines of smooth fields (harmonic, or screened by where the cloth faces), averaged over both sides of a symmetric garment.
@@ -78,6 +88,7 @@ def find_seams(surface: Surface | Sequence[Surface], options: SeamOptions | None
     Args:
         surface: one connected layer of cloth, or several of one garment.
         options: see `SeamOptions`.
+        fabric: the cloth; with it further seams and darts are tried where it stays strained beyond its limit.
 
     Raises:
         InputError: an option is wrong.
@@ -89,7 +100,7 @@ def find_seams(surface: Surface | Sequence[Surface], options: SeamOptions | None
         expect(layer, Surface, "surface", "a Surface, or a sequence of them")
     found: list[FoundSeams] = []
     for layer in layers:
-        found.append(_find_in_layer(layer, options))
+        found.append(_find_in_layer(layer, options, None if fabric is None else as_fabric(fabric)))
         # All layers of a garment are worn the same way up.
         options = replace(options, up=options.up or found[0].up, front=options.front or found[0].front)
     often = Counter(piece.name for one in found for piece in one.pieces)
@@ -110,19 +121,32 @@ def find_seams(surface: Surface | Sequence[Surface], options: SeamOptions | None
     )
 
 
-def _find_in_layer(surface: Surface, options: SeamOptions) -> FoundSeams:
+def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
     cloth, turned = without_thickness(cloth_of(surface))
     operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
     fields = draw_fields(cloth, anatomy, operators)
     cloth, notes = cut_as_a_tailor(fields, anatomy)
     for name in list(cloth.seams):
-        if any(name == no or name.startswith(f"{no} ") for no in options.no):
+        if options.forbids(name):
             cloth = cloth.without_seam(name)
+    trials = list[Trial]()
+    if fabric is not None:
+        try:
+            cloth, trials, _ = cut_by_energy(
+                cloth, anatomy, fabric, options, lambda trial, mesh: _surface_of(trial, anatomy, mesh, surface)
+            )
+        except InputError as reason:
+            notes.append(f"no further seams were looked for: {reason}")
+    price = {trial.name: trial for trial in trials}
     return FoundSeams(
         pieces=tuple(_as_surfaces(cloth, anatomy, surface)),
         seams=tuple(
-            FoundSeam(name=name, length=float(np.linalg.norm(np.diff(cloth.vertices[edges], axis=1), axis=2).sum()))
+            FoundSeam(
+                name=name,
+                length=float(np.linalg.norm(np.diff(cloth.vertices[edges], axis=1), axis=2).sum()),
+                released=price[name].released if name in price else None,
+            )
             for name, edges in cloth.seams.items()
         ),
         what=describe(anatomy),
@@ -167,25 +191,29 @@ def _as_surfaces(cloth: Cloth, anatomy: Anatomy, whole: Surface) -> list[Surface
     beside = _faces_beside(cloth)
     made = []
     for number, mesh in enumerate(meshes):
-        faces = np.full((len(mesh.faces), 4), -1, dtype=np.int32)
-        faces[:, :3] = mesh.faces
-        piece = Surface(
-            vertices=mesh.vertices.copy(),
-            faces=faces,
-            name=names[number],
-            input_vertices=mesh.vertices.copy(),
-            input_index=np.arange(len(mesh.vertices), dtype=np.int32),
-            sources=whole.sources,
-        )
+        piece = _surface_of(cloth, anatomy, mesh, whole, name=names[number])
         lines = _edge_lines(piece, mesh, number, names, label, role, of_face, beside)
-        grain = _grain(piece, cloth, mesh, anatomy)
-        if grain is not None:
-            lines[GRAIN] = grain
-        made.append(replace(piece, lines=lines))
+        made.append(replace(piece, lines={**lines, **piece.lines}))
     # Repairs of the whole are told once.
     if made and whole.notes:
         made[0] = replace(made[0], notes=whole.notes)
     return made
+
+
+def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface, *, name: str = "piece") -> Surface:
+    """Return a piece as a surface, with its grain."""
+    faces = np.full((len(mesh.faces), 4), -1, dtype=np.int32)
+    faces[:, :3] = mesh.faces
+    piece = Surface(
+        vertices=mesh.vertices.copy(),
+        faces=faces,
+        name=name,
+        input_vertices=mesh.vertices.copy(),
+        input_index=np.arange(len(mesh.vertices), dtype=np.int32),
+        sources=whole.sources,
+    )
+    grain = _grain(piece, cloth, mesh, anatomy)
+    return piece if grain is None else replace(piece, lines={GRAIN: grain})
 
 
 def _faces_beside(cloth: Cloth) -> Mapping[tuple[int, int], list[int]]:

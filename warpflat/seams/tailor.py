@@ -249,11 +249,10 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]
     upper = _upper(anatomy)
     crotch = next((limb.fork for limb in anatomy.limbs_of("leg")), None)
     lines = cloth.line_between(ahead, trunk)
-    middle = cloth.vertices[lines].mean(axis=1)
-    left = cloth.values[LEFT][lines].mean(axis=1) > 0.0
+    on_left = cloth.values[LEFT][lines].mean(axis=1) > 0.0
     ends: list[tuple[str, Ids]] = []
-    for is_left in (True, False):
-        parts = edge_components(lines[left == is_left])
+    for leftwards in (True, False):
+        parts = edge_components(lines[on_left == leftwards])
         near = (
             [float(np.linalg.norm(cloth.vertices[part.ravel()] - crotch, axis=1).min()) for part in parts]
             if crotch is not None
@@ -267,10 +266,9 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]
                 word = "shoulder"
             else:
                 word = "side"
-            name = f"{word} {side_word(1.0 if is_left else -1.0)}"
+            name = f"{word} {side_word(1.0 if leftwards else -1.0)}"
             cloth = cloth.with_seam(name, part)
             ends.append((word, part))
-    del middle
     low = np.unique(
         np.concatenate([part.ravel() for word, part in ends if word in ("side", "inseam")] or [np.empty(0, np.int64)])
     )
