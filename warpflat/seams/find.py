@@ -19,7 +19,8 @@ from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.energy import Trial, cut_by_energy
 from warpflat.seams.fields import Operators
 from warpflat.seams.options import SeamOptions
-from warpflat.seams.tailor import FACING, cut_as_a_tailor, draw_fields, side_word
+from warpflat.seams.solid import part_solids
+from warpflat.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word
 from warpflat.seams.thickness import without_thickness
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
@@ -29,6 +30,9 @@ from warpflat.surface.triangles import triangulate
 __all__ = ["GRAIN", "FoundSeam", "FoundSeams", "find_seams", "seam_words"]
 
 Ids = NDArray[np.int64]
+
+# Pieces are alike if their sizes and outlines agree within this share of the outline.
+_ALIKE = 0.01
 
 #: The line of a piece along which its grain runs.
 GRAIN = "grain"
@@ -125,8 +129,11 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
     cloth, turned = without_thickness(cloth_of(surface))
     operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
-    fields = draw_fields(cloth, anatomy, operators)
-    cloth, notes = cut_as_a_tailor(fields, anatomy)
+    notes = list[str]()
+    if anatomy.kind in TAILORED:
+        cloth, notes = cut_as_a_tailor(draw_fields(cloth, anatomy, operators), anatomy)
+    cloth, more = part_solids(cloth, shape=anatomy.kind not in TAILORED, most=options.most_pieces)
+    notes += more
     for name in list(cloth.seams):
         if options.forbids(name):
             cloth = cloth.without_seam(name)
@@ -139,8 +146,9 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
         except InputError as reason:
             notes.append(f"no further seams were looked for: {reason}")
     price = {trial.name: trial for trial in trials}
+    pieces = _as_surfaces(cloth, anatomy, surface)
     return FoundSeams(
-        pieces=tuple(_as_surfaces(cloth, anatomy, surface)),
+        pieces=tuple(pieces),
         seams=tuple(
             FoundSeam(
                 name=name,
@@ -152,7 +160,7 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
         what=describe(anatomy),
         up=axis_name(anatomy.up),
         front=axis_name(anatomy.front),
-        notes=(*turned, *anatomy.notes, *notes),
+        notes=(*notes, *turned, *_alike(pieces), *anatomy.notes),
     )
 
 
@@ -236,7 +244,8 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
     for mesh in meshes:
         weight = area[mesh.face_of]
         corners = cloth.faces[mesh.face_of]
-        ahead = float((cloth.values[FACING][corners].mean(axis=1) * weight).sum()) > 0.0
+        facing = cloth.values.get(FACING, np.zeros(len(cloth.vertices)))
+        ahead = float((facing[corners].mean(axis=1) * weight).sum()) > 0.0
         across = (cloth.vertices[corners].mean(axis=1) @ anatomy.normal - anatomy.offset) * weight
         # Wholly on one side, or over the middle.
         lopsided = abs(float(across.sum())) > 0.6 * float(np.abs(across).sum())
@@ -261,6 +270,40 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
         seen[name] += 1
         names.append(f"{name}_{seen[name]}" if both_sides[name] > 1 else name)
     return names
+
+
+def _alike(pieces: Sequence[Surface]) -> list[str]:
+    """Return a note on pieces that are much the same, or mirror images: a maker draws them once."""
+    measures = []
+    for piece in pieces:
+        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+        around = [piece.vertices[np.append(loop, loop[0])] for loop in border_loops(piece.faces)]
+        length = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in around)
+        axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
+        measures.append(
+            [
+                np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()),
+                length,
+                *np.ptp(piece.vertices @ axes, axis=0),
+            ]
+        )
+    left = list(range(len(pieces)))
+    notes = []
+    while left:
+        first, *others = left
+        size = measures[first][1]
+        same = [first, *(k for k in others if np.abs(np.subtract(measures[k], measures[first])).max() < _ALIKE * size)]
+        left = [k for k in left if k not in same]
+        names = [pieces[k].name for k in same]
+        if (
+            len(names) == 2
+            and names[0].split("_")[1:] == names[1].split("_")[1:]
+            and {names[0].split("_")[0], names[1].split("_")[0]} == {"left", "right"}
+        ):
+            notes.append(f"{names[0]} and {names[1]} mirror each other: cut 2, one mirrored")
+        elif len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
+            notes.append(f"{', '.join(names)} are alike: cut {len(names)}, or some of them mirrored")
+    return notes
 
 
 def _edge_lines(
@@ -309,6 +352,14 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     normals = np.cross(b - a, c - a)
     facing = normals.sum(axis=0)
     middle = np.average((a + b + c) / 3.0, axis=0, weights=np.maximum(np.linalg.norm(normals, axis=1), 1e-300))
+    underarm = [edges for name, edges in cloth.seams.items() if name.startswith("underarm")]
+    if sleeve >= 0 and underarm:
+        # Over the arm, opposite to the seam.
+        seam = cloth.vertices[np.unique(np.concatenate(underarm))]
+        own = seam[np.linalg.norm(seam - middle, axis=1) < anatomy.size]
+        near = own[(own - middle) @ anatomy.normal * sleeves[sleeve].side > -0.3 * anatomy.size] if len(own) else own
+        if len(near):
+            facing = middle - near.mean(axis=0)
     across = np.cross(along, facing)
     if np.linalg.norm(across) < 0.1 * np.linalg.norm(facing) or not facing.any():
         return None

@@ -13,7 +13,7 @@ from warpflat.seams.anatomy import Anatomy, Limb
 from warpflat.seams.cloth import Cloth, edge_components
 from warpflat.seams.fields import Operators
 
-__all__ = ["FACING", "Fields", "cut_as_a_tailor", "draw_fields", "side_word", "tidied"]
+__all__ = ["FACING", "LEFT", "TAILORED", "Fields", "cut_as_a_tailor", "draw_fields", "side_word", "tidied"]
 
 Ids = NDArray[np.int64]
 
@@ -33,6 +33,8 @@ _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
 # An island of the other sign of less than this share of its part is a wrinkle.
 _ISLAND = 0.06
 
+#: Kinds of garments that a tailor knows how to cut.
+TAILORED = ("top", "dress", "skirt", "trousers", "jumpsuit")
 #: The field that is positive in front, the one that is positive on the left, and those that are positive in a sleeve.
 FACING, LEFT = "front", "left"
 
