@@ -24,8 +24,6 @@ __all__ = ["found_seams", "seams_entry"]
 _NO_PATTERN = 0.1
 # A mesh of fewer faces is too coarse for a garment.
 _FEWEST = 60
-# A panel's border is at least this long over that of a flat disk of its area; a shorter one cannot lie flat.
-_FLAT = 0.8
 
 
 def found_seams(scene: Scene) -> FoundSeams | None:
@@ -69,24 +67,21 @@ def found_seams(scene: Scene) -> FoundSeams | None:
 
 
 def _is_whole_garment(surface: Surface) -> bool:
-    """Return whether a surface cannot lie flat in one piece: closed, forked, a cap, or a tube that is no strip when it is opened."""
+    """Return whether a surface cannot lie flat in one piece: closed, with handles, forked, or a cap."""
+    from warpflat.seams.anatomy import HOLE
+    from warpflat.seams.find import cloth_of
+    from warpflat.seams.solid import is_panel
     from warpflat.surface.connectivity import border_loops, euler_characteristic
-    from warpflat.surface.triangles import triangulate
 
-    loops = border_loops(surface.faces, surface.vertices)
-    handles = (2 - len(loops) - euler_characteristic(surface.faces)) // 2
     if len(surface.faces) < _FEWEST:
         return False
-    if not loops or handles > 0:
-        return True
-    a, b, c = surface.vertices[triangulate(surface.faces)[0]].transpose(1, 0, 2)
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    length = [
-        float(np.linalg.norm(np.diff(surface.vertices[np.append(loop, loop[0])], axis=0), axis=1).sum())
-        for loop in loops
-    ]
-    wide = [one for one in length if one > 0.06 * np.sqrt(area)]
-    return len(wide) > 2 or (len(wide) == 1 and wide[0] ** 2 < _FLAT * 4.0 * np.pi * area)
+    loops = border_loops(surface.faces, surface.vertices)
+    cloth = cloth_of(surface)
+    least = HOLE * np.sqrt(float(cloth.face_areas.sum()))
+    rings = [surface.vertices[np.append(loop, loop[0])] for loop in loops]
+    wide = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) > least for ring in rings)
+    handles = (2 - len(loops) - euler_characteristic(surface.faces)) // 2
+    return wide > 2 or wide == 0 or handles > 0 or (wide == 1 and not is_panel(cloth))
 
 
 def seams_entry(found: FoundSeams, pieces: Sequence[Flattening]) -> Mapping[str, Any]:

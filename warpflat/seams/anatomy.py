@@ -17,7 +17,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.seams.cloth import Cloth
 from warpflat.seams.fields import MirrorMap, Operators, mirror_map
 
-__all__ = ["AXES", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
+__all__ = ["AXES", "HOLE", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
 
 Ids = NDArray[np.int64]
 Kind = Literal[
@@ -29,7 +29,7 @@ AXES = {sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[k] for k, lett
 
 # Lengths are shares of the square root of the area, unless they say otherwise.
 # A border shorter than this is a hole: a buttonhole, or a fault of the mesh.
-_HOLE = 0.06
+HOLE = 0.06
 # Two borders mirror each other if their middles do within this, and their lengths within this ratio.
 _PAIR, _PAIR_RATIO = 0.3, 1.7
 # A border whose middle is nearer to the plane of symmetry is in the middle.
@@ -137,8 +137,8 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
     loops = cloth.borders()
     notes: list[str] = []
     raw = [_measured(cloth.vertices, loop) for loop in loops]
-    upward = AXES[up] if up else _upward([one for one in raw if one[1] >= _HOLE * size])
-    if up is None and abs(upward[1]) < 0.5:
+    upward = AXES[up] if up else _upward([one for one in raw if one[1] >= HOLE * size])
+    if up is None and abs(upward[1]) < 0.5 and len(loops) > 1:
         notes.append(f"up is taken as {axis_name(upward)}, as its openings lie; --up says otherwise")
     normal, offset, asymmetry = _plane_of_symmetry(cloth.vertices, operators.mass, upward, size)
     holds = asymmetry <= _SYMMETRIC * size
@@ -298,7 +298,7 @@ def _roles(
 ) -> list[Border]:
     """Return the borders: pairs beside the plane of symmetry as "limb", those in the middle as "middle", and holes."""
     across = np.array([middle @ normal - offset for middle, *_ in raw])
-    roles = ["hole" if length < _HOLE * size else "middle" for _, length, *_ in raw]
+    roles = ["hole" if length < HOLE * size else "middle" for _, length, *_ in raw]
     pairs = []
     for i, (middle, length, *_) in enumerate(raw):
         for j in range(i + 1, len(raw)):

@@ -19,7 +19,7 @@ from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.energy import Trial, cut_by_energy
 from warpflat.seams.fields import Operators
 from warpflat.seams.options import SeamOptions
-from warpflat.seams.solid import part_solids
+from warpflat.seams.solid import is_panel, part_solids
 from warpflat.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word
 from warpflat.seams.thickness import without_thickness
 from warpflat.surface.connectivity import border_loops
@@ -132,7 +132,8 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
     notes = list[str]()
     if anatomy.kind in TAILORED:
         cloth, notes = cut_as_a_tailor(draw_fields(cloth, anatomy, operators), anatomy)
-    cloth, more = part_solids(cloth, shape=anatomy.kind not in TAILORED, most=options.most_pieces)
+    shape = anatomy.kind not in TAILORED and not is_panel(cloth)
+    cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
     notes += more
     for name in list(cloth.seams):
         if options.forbids(name):

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.seams.anatomy import HOLE
 from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.fields import Operators
 from warpflat.seams.tailor import tidied
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 
-__all__ = ["is_open", "part_solids"]
+__all__ = ["is_open", "is_panel", "part_solids"]
 
 Ids = NDArray[np.int64]
 
@@ -32,6 +33,8 @@ _SMOOTH = 0.04
 _SEAM = 0.005
 # Where cloth faces an axis by more than this (cosine) it is a base.
 _BASE = 0.6
+# The border of a panel squared is at least this share of a disk's; a cap's is shorter.
+_PANEL = 0.8
 # Parts at most.
 _MOST = 16
 # A part smaller than this share of the whole is not cut further, and no cut leaves a smaller one.
@@ -50,6 +53,15 @@ def is_open(mesh: PieceMesh) -> bool:
     """Return whether a piece is a disk, or a tube that one cut opens."""
     loops = len(border_loops(mesh.faces.astype(np.int32)))
     return loops in (1, 2) and euler_characteristic(mesh.faces.astype(np.int32)) == 2 - loops
+
+
+def is_panel(cloth: Cloth) -> bool:
+    """Return whether a cloth is one panel: with one border that is about as long as that of a flat disk of its area, or longer."""
+    loops = [cloth.vertices[np.append(loop, loop[0])] for loop in cloth.borders()]
+    length = [float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in loops]
+    area = float(cloth.face_areas.sum())
+    wide = [one for one in length if one > HOLE * np.sqrt(area)]
+    return len(wide) == 1 and wide[0] ** 2 >= _PANEL * 4.0 * np.pi * area
 
 
 def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[Cloth, list[str]]:
