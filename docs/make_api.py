@@ -13,7 +13,7 @@ GROUPS = {
     "Surfaces": ("surface",),
     "Fabrics and wear": ("fabric", "model"),
     "Flattening": ("flattening", "solver"),
-    "Cutting": ("cutting",),
+    "Cutting": ("cutting", "seams"),
     "Bodies and forms": ("mannequin",),
     "Garments and patterns": ("garment", "pattern", "export"),
     "Drape": ("draping",),

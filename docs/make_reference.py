@@ -46,6 +46,7 @@ HEADINGS = {
     "CutPlane": "`plane` of a cut",
     "AutoCutTable": "`[auto_cut]`",
     "SeamTable": "`[[seams]]`",
+    "FindSeamsTable": "`[seams]`",
     "ConstraintTable": "`[[constraints]]`",
     "WearTable": "`[wear]`",
     "DrapeTable": "`[drape]`",

@@ -34,11 +34,12 @@ ROOMS = {
     "mannequin": "core surface export kernels",
     "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
     "draping": "core surface fabric model solver pattern export flattening mannequin garment kernels",
+    "seams": "core surface fabric model solver flattening cutting",
     "review": "core surface export",
-    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review",
-    "batch": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",
-    "studio": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",
-    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene batch studio",
+    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review",
+    "batch": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review scene",
+    "studio": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review scene",
+    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review scene batch studio",
     "kernels": "",
 }
 

@@ -66,6 +66,9 @@ if TYPE_CHECKING:
     from warpflat.scene.compare import compare_fabrics, save_comparison
     from warpflat.scene.load import load_scene, make_scene
     from warpflat.scene.run import run_scene
+    from warpflat.seams.find import find_seams
+    from warpflat.seams.layers import read_layers
+    from warpflat.seams.options import SeamOptions
     from warpflat.solver.options import RelaxOptions
     from warpflat.surface.io.read import read_surface
     from warpflat.surface.mesh import Surface
@@ -119,6 +122,7 @@ _HOME = {
     "RelaxationStep": "flattening.step_by_step",
     "Remedy": "flattening.fit_report",
     "ScanOptions": "mannequin.scan_pose",
+    "SeamOptions": "seams.options",
     "SeamWish": "garment.ease",
     "Straight": "garment.constraints",
     "Surface": "surface.mesh",
@@ -134,6 +138,7 @@ _HOME = {
     "drape": "draping.drape_garment",
     "drape_pattern": "draping.drape_pattern",
     "find_fabric": "fabric.library",
+    "find_seams": "seams.find",
     "flatten": "flattening.flatten_piece",
     "flatten_all": "flattening.flatten_all",
     "flatten_form": "garment.garment",
@@ -156,6 +161,7 @@ _HOME = {
     "open_tube": "cutting.open_tube",
     "pattern_of_garment": "garment.to_pattern",
     "read_dxf": "export.read_dxf",
+    "read_layers": "seams.layers",
     "read_pieces": "surface.io.read_pieces",
     "read_pattern_json": "export.pattern_json",
     "read_surface": "surface.io.read",
@@ -198,6 +204,7 @@ __all__ = [
     "RelaxationStep",
     "Remedy",
     "ScanOptions",
+    "SeamOptions",
     "SeamWish",
     "Straight",
     "Surface",
@@ -214,6 +221,7 @@ __all__ = [
     "drape",
     "drape_pattern",
     "find_fabric",
+    "find_seams",
     "flatten",
     "flatten_all",
     "flatten_form",
@@ -236,6 +244,7 @@ __all__ = [
     "open_tube",
     "pattern_of_garment",
     "read_dxf",
+    "read_layers",
     "read_pattern_json",
     "read_pieces",
     "read_surface",

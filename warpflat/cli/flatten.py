@@ -24,6 +24,23 @@ __all__ = ["flatten"]
     metavar="WHICH",
     help="Which connected part: largest, or 0, 1, ... by size; all makes a piece of each, and seams of edges that meet.",
 )
+@click.option(
+    "--seams",
+    metavar="HOW",
+    help="auto: cut a whole garment where a tailor would; none: keep it whole.  [default: auto where one piece cannot lie flat]",
+)
+@click.option(
+    "--front", metavar="AXIS", help="Where the front of a whole garment faces: +z, -z, +x ...  [default: found]"
+)
+@click.option("--up", metavar="AXIS", help="Where up is: +y, +z ...  [default: found]")
+@click.option("--no", multiple=True, metavar="SEAM", help='A seam that is left closed: "shoulder", "side left".')
+@click.option("--most-pieces", type=int, metavar="N", help="At most so many pieces.  [default: as usual for its kind]")
+@click.option(
+    "--limit",
+    type=float,
+    metavar="SHARE",
+    help="Of the cloth that may stay beyond its limit before darts and further seams are tried.  [default: 0.01]",
+)
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
@@ -88,6 +105,7 @@ def flatten(
       warpflat flatten dress.usdc --prim /World/front --datum /World/centre_front
       warpflat flatten front.obj --units m --datum 120,2087 --out front
       warpflat flatten garment.obj --units cm --component all
+      warpflat flatten shirt.obj --units m --fabric woven --seams auto
     """
     from warpflat.scene.load import make_scene
 
@@ -104,10 +122,17 @@ def flatten(
         "stretch_warp": ("wear", "stretch_warp"),
         "stretch_weft": ("wear", "stretch_weft"),
         "pressure": ("wear", "pressure"),
+        "seams": ("find_seams", "find"),
+        "front": ("find_seams", "front"),
+        "up": ("find_seams", "up"),
+        "most_pieces": ("find_seams", "most_pieces"),
+        "limit": ("find_seams", "limit"),
     }
     for option, (table, key) in places.items():
         if options[option] is not None:
             tables.setdefault(table, {})[key] = options[option]
+    if options["no"]:
+        tables.setdefault("find_seams", {})["no"] = list(options["no"])
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
     for key in ("name", "fabric", "start", "grain_angle", "model"):

@@ -139,6 +139,8 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         way_out = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
         left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
         lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {way_out} in [drape]")
+    if refused := metrics.get("garment", {}).get("no_pattern"):
+        lines.insert(0, refused)
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
     lines += [

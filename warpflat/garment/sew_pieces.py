@@ -123,13 +123,16 @@ def sew_pieces(
 def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:
     """Return the surfaces with a line along each stretch of border that meets another piece, by that piece's name: "to front".
 
-    Lines along the border name a pattern's edges, and part it where they end.
+    A stretch that has a line keeps that one. Lines along the border name a pattern's edges, and part it where they end.
     """
     named = {surface.name: dict(surface.lines) for surface in surfaces}
     for pair in meeting_borders({surface.name: surface for surface in surfaces}):
         if pair.pieces[0] != pair.pieces[1]:
             for own, other, row in zip(pair.pieces, pair.pieces[::-1], pair.vertices, strict=True):
-                named[own][find_unused_name(f"to {other}", named[own])] = row
+                ends = {frozenset(row[:2].tolist()), frozenset(row[-2:].tolist())}
+                known = (map(frozenset, pairwise(line.tolist())) for line in named[own].values())
+                if not any(ends <= set(line) for line in known):
+                    named[own][find_unused_name(f"to {other}", named[own])] = row
     return [replace(surface, lines=named[surface.name]) for surface in surfaces]
 
 

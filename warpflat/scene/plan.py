@@ -34,12 +34,14 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.scene.form import scene_form, scene_recipe
+from warpflat.scene.found_seams import found_seams
 from warpflat.scene.frames import FrameRecorder
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
 from warpflat.scene.surface import scene_pieces, scene_surface
+from warpflat.seams.find import GRAIN, FoundSeams, seam_words
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import NamedSeam
 from warpflat.surface.mesh import Surface
@@ -56,6 +58,7 @@ class MeshPlan:
         drawing: options of the pattern files.
         sequences: the pieces, uncut, each with its cuts.
         seams: those that the scene names.
+        found: seams that were found on a whole garment, which its pieces come from.
         device: Warp device, before the scene's own.
     """
 
@@ -63,6 +66,7 @@ class MeshPlan:
     drawing: PatternOptions
     sequences: Sequence[CutSequence]
     seams: Sequence[NamedSeam] = ()
+    found: FoundSeams | None = None
     device: str | None = None
 
     @property
@@ -93,13 +97,15 @@ class MeshPlan:
         names, recorders = [surface.name for surface in self.surfaces], recorders or {}
         steps = {name: None if callback is None else partial(callback, name) for name in names}
         with errors_named(scene.where):
-            if len(names) == 1:
+            if len(names) == 1 and self.found is None:
                 step = steps[names[0]]
                 pieces = [flatten_surface(scene, self.surfaces[0], relax, callback=step, device=self.device)]
             else:
                 pieces = flatten_all(
                     self.surfaces,
                     fabric=scene_fabric(scene),
+                    # Pieces of a garment whose seams were found know how their grain runs.
+                    datum=[GRAIN if GRAIN in surface.lines else None for surface in self.surfaces],
                     grain_angle=settings.grain_angle,
                     model=settings.model,
                     wear=scene_wear(scene),
@@ -124,7 +130,8 @@ class MeshPlan:
         if garment.sewn is not None:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])
-        return replace(garment, remarks=tuple(note for sequence in self.sequences for note in sequence.notes))
+        found = () if self.found is None else (seam_words(self.found), *self.found.notes)
+        return replace(garment, remarks=(*found, *(note for sequence in self.sequences for note in sequence.notes)))
 
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help where it does not fit."""
@@ -262,7 +269,8 @@ def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | No
     with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         seams = scene_surface_seams(settings.seams, scene.name)
-    parts = None if cuts is not None else scene_pieces(scene)
+    found = None if cuts is not None else found_seams(scene)
+    parts = found.pieces if found is not None else None if cuts is not None else scene_pieces(scene)
     if parts is None:
         sequences = [cuts or scene_cuts(scene, device=device)]
     else:
@@ -290,7 +298,7 @@ def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | No
         with errors_named(f"{scene.where}: pattern"):
             check_edge_names(surfaces, rules, cuts=[plan.name for sequence in sequences for plan in sequence.plans])
             check_names(drawing.names, {surface.name: None for surface in surfaces})
-    return MeshPlan(scene=scene, drawing=drawing, sequences=sequences, seams=seams, device=device)
+    return MeshPlan(scene=scene, drawing=drawing, sequences=sequences, seams=seams, found=found, device=device)
 
 
 def scene_cuts(scene: Scene, *, device: str | None = None, surface: Surface | None = None) -> CutSequence:

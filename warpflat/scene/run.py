@@ -33,6 +33,7 @@ from warpflat.review.page import pack_frames, pack_pictures, write_review
 from warpflat.scene.cuts import CutSequence
 from warpflat.scene.drape import drape_names, write_drape
 from warpflat.scene.form_shaping import ClosedDarts, require_open_darts, settle_shape
+from warpflat.scene.found_seams import seams_entry
 from warpflat.scene.frames import MANNEQUIN, Film, FrameSchedule
 from warpflat.scene.load import Scene
 from warpflat.scene.plan import GarmentPlan, MeshPlan, plan_scene
@@ -152,7 +153,8 @@ def _run(
 
             garment = plan.flatten(callback=each_step, recorders=film.recorders)
             require_open_darts(scene, [garment])
-            notes = unsewn_notes(garment)
+            # What lies beside a seam that was found, such as a hem, is not a border that was forgotten.
+            notes = unsewn_notes(garment) if getattr(plan, "found", None) is None else []
             fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))
             pictures = Beside(partial(garment.write_files, folder, picture=output.picture), "drawing the pictures")
             if vertices < _MANY:
@@ -236,7 +238,10 @@ def _measure_fit(
                 on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in advised.pieces]
                 write_wear_sheet(path, list(advised.pieces.values()), title=garment.name, on_body=on_body)
     remedies = {name: part.remedies for name, part in advised.parts.items()}
-    return advised.metrics(), advised.notes, remedies, files
+    measured = advised.metrics()
+    if isinstance(plan, MeshPlan) and plan.found is not None:
+        measured["garment"] = seams_entry(plan.found, list(advised.pieces.values()))
+    return measured, advised.notes, remedies, files
 
 
 def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], own_size: str, folder: Path) -> WrittenPattern:

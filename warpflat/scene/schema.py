@@ -185,6 +185,7 @@ def _as_component(value: Any) -> Any:
     return value
 
 
+Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Component = Annotated[Literal["largest", "all"] | int, BeforeValidator(_as_component)]
 
 
@@ -288,6 +289,24 @@ class SeamTable(Table):
         if given > 1 or (given == 0 and self.sides is None):
             raise ValueError("give either fullness = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
         return self
+
+
+class FindSeamsTable(Table):
+    """How the seams of a whole garment are found (see `warpflat.find_seams`); in a scene it is `[seams]`, a table, not `[[seams]]`.
+
+    With `find = "auto"` the garment is cut where a tailor would cut it, with "none" it is kept whole. Without this table a garment that
+    cannot lie flat in one piece is cut.
+    """
+
+    find: Literal["auto", "none"] = "auto"
+    up: Direction | None = None
+    front: Direction | None = None
+    no: list[str] = Field(default_factory=list)
+    """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts."""
+    limit: Annotated[float, Field(ge=0, le=1)] = 0.01
+    """Share of the cloth that may stay beyond its strain limit before further seams and darts are looked for."""
+    most_pieces: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """At most so many pieces of one layer; as many as are usual for its kind if not given."""
 
 
 class ConstraintTable(Table):
@@ -548,6 +567,7 @@ class SceneTable(Table):
     cuts: list[CutTable] = Field(default_factory=list)
     auto_cut: AutoCutTable | None = None
     seams: list[SeamTable] = Field(default_factory=list)
+    find_seams: FindSeamsTable | None = None
     constraints: list[ConstraintTable] = Field(default_factory=list)
     datum: str | None = None
     start: str | None = None
@@ -565,6 +585,17 @@ class SceneTable(Table):
     openings: list[OpeningTable] = Field(default_factory=list)
     finishing: list[FinishingTable] = Field(default_factory=list)
     pockets: list[PocketTable] = Field(default_factory=list)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _found_seams(cls, data: Any) -> Any:
+        """Read a table `[seams]` as that of seams to be found; a list `[[seams]]` names seams."""
+        if isinstance(data, dict) and isinstance(data.get("seams"), dict):
+            if "find_seams" in data:
+                raise ValueError("give [seams] or [find_seams], which are one table")
+            data = {**data, "find_seams": data["seams"]}
+            del data["seams"]
+        return data
 
     @model_validator(mode="after")
     def _consistent(self) -> SceneTable:
@@ -596,10 +627,14 @@ class SceneTable(Table):
             raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
         if self.ease is not None:
             raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
-        if isinstance(self.surface, FileSurface) and self.surface.component == "all":
+        found = self.find_seams is not None and self.find_seams.find == "auto"
+        if found and not isinstance(self.surface, FileSurface):
+            raise ValueError('[seams] find = "auto" takes a garment from a file')
+        if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or found):
             for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "constraints", "drape"):
                 if getattr(self, key):
-                    raise ValueError(f'{key} belongs to one piece; with component = "all" leave it out')
+                    why = '[seams] find = "auto"' if found else 'component = "all"'
+                    raise ValueError(f"{key} belongs to one piece; with {why} leave it out")
         for number, cut in enumerate(self.cuts):
             cut.check_for_surface(f"cuts[{number}]")
         if self.half:
@@ -616,6 +651,8 @@ class SceneTable(Table):
 
     def _check_garment(self) -> None:
         """Refuse what belongs to a surface."""
+        if self.find_seams is not None:
+            raise ValueError("[seams] is for a garment from a file; a form has its own, and [[seams]] change them")
         if self.lines or self.datum:
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
         if self.auto_cut and self.shape == "auto":

@@ -96,6 +96,7 @@ def make_surface(
     component: int | Literal["largest"] | None = None,
     weld: bool | None = None,
     split_corners: bool = False,
+    closed: bool = False,
     sliver_tolerance: float = 1e-3,
     source: str | None = None,
 ) -> Surface:
@@ -111,6 +112,7 @@ def make_surface(
             splits them (unless that would close a piece that is one sheet as it stands), if faces are connected in no
             other way, or if several parts become one sheet by it. A cut in one connected part thus stays open.
         split_corners: true if the format has one vertex per corner of a face, or per texture coordinate.
+        closed: true to accept a surface without a border, or with handles, that is cut before it is flattened.
         sliver_tolerance: a face whose least width is below this share of the edge length around it is degenerate and
             merged into its neighbours (see :mod:`warpflat.surface.repair.slivers`).
         source: name of the input in messages, such as a file's; by default `name`.
@@ -138,7 +140,8 @@ def make_surface(
             mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
         )
         mesh.notes += off
-        _check_border(mesh.half_edges)
+        if not closed:
+            _check_border(mesh.half_edges)
         mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, sliver_tolerance)
         for what, which in cut.items():
             mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")

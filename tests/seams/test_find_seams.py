@@ -1,0 +1,145 @@
+"""Whole garments are cut where a tailor would cut them."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import seam_solids as solids
+
+import warpflat
+from warpflat.garment.sew_pieces import meeting_borders, unsewn_borders
+from warpflat.seams.find import FoundSeams
+from warpflat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.surface.mesh import Surface
+
+SHIRTS = {
+    "T-pose": {"arm": 0.0},
+    "A-pose": {"arm": 0.8},
+    "hanging": {"arm": 1.35},
+    "short sleeves": {"arm": 0.5, "sleeve": 0.27},
+}
+
+
+@cache
+def shirt(name: str) -> Surface:
+    return solids.shirt(step=0.035, **SHIRTS[name])
+
+
+@cache
+def trousers() -> Surface:
+    return solids.trousers()
+
+
+def check_pieces(found: FoundSeams) -> None:
+    """Every piece lies flat as a disk, and all borders along seams meet."""
+    for piece in found.pieces:
+        assert euler_characteristic(piece.faces) == 1
+        assert len(border_loops(piece.faces)) == 1
+    pieces = {piece.name: piece for piece in found.pieces}
+    assert len(pieces) == len(found.pieces)
+    assert not unsewn_borders(pieces)
+    sewn = sum(
+        float(np.linalg.norm(np.diff(pieces[pair.pieces[0]].vertices[pair.vertices[0]], axis=0), axis=1).sum())
+        for pair in meeting_borders(pieces)
+    )
+    assert sewn == pytest.approx(sum(seam.length for seam in found.seams), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", SHIRTS)
+def test_a_shirt_becomes_front_back_and_two_sleeves(name: str) -> None:
+    found = warpflat.find_seams(shirt(name))
+    assert found.what == "top, 2 sleeves"
+    assert {piece.name for piece in found.pieces} == {"front", "back", "left_sleeve", "right_sleeve"}
+    assert {seam.name for seam in found.seams} == {
+        f"{seam} {side}" for seam in ("armhole", "underarm", "side", "shoulder") for side in ("left", "right")
+    }
+    check_pieces(found)
+    by_name = {piece.name: piece for piece in found.pieces}
+    # The wearer's left is +x, as the front faces +z.
+    assert by_name["left_sleeve"].vertices[:, 0].min() > 0.05
+    assert by_name["front"].vertices[:, 2].mean() > 0.03
+    # The armhole passes the armpit, which is nearer to the trunk than to the wrist, and goes over the shoulder.
+    edges = [line for key, line in by_name["front"].lines.items() if key.startswith("armhole")]
+    armhole = by_name["front"].vertices[np.concatenate(edges)]
+    assert np.abs(armhole[:, 0]).min() > 0.13
+    assert np.abs(armhole[:, 0]).max() < 0.30
+
+
+def test_left_and_right_are_mirror_images() -> None:
+    found = {seam.name: seam for seam in warpflat.find_seams(shirt("T-pose")).seams}
+    for name in ("armhole", "side", "shoulder", "underarm"):
+        assert found[f"{name} left"].length == pytest.approx(found[f"{name} right"].length, abs=4e-3)
+
+
+def test_trousers_become_four_legs() -> None:
+    found = warpflat.find_seams(trousers())
+    assert {piece.name for piece in found.pieces} == {
+        f"{side}_{part}_leg" for side in ("left", "right") for part in ("front", "back")
+    }
+    assert {"centre front", "centre back", "inseam left", "side right"} <= {seam.name for seam in found.seams}
+    check_pieces(found)
+    # The grain of a leg hangs.
+    for piece in found.pieces:
+        line = piece.vertices[piece.lines["grain"]]
+        way = line[-1] - line[0]
+        assert abs(way[1]) > 0.98 * np.linalg.norm(way)
+
+
+def test_a_skirt_becomes_front_and_back() -> None:
+    found = warpflat.find_seams(solids.skirt())
+    assert {piece.name for piece in found.pieces} == {"front", "back"}
+    check_pieces(found)
+    # Its side seams lie in the plane between front and back.
+    pieces = {piece.name: piece for piece in found.pieces}
+    for pair in meeting_borders(pieces):
+        assert np.abs(pieces[pair.pieces[0]].vertices[pair.vertices[0]][:, 2]).max() < 2e-3
+
+
+def test_the_front_is_where_the_user_says() -> None:
+    found = warpflat.find_seams(solids.skirt(), warpflat.SeamOptions(front="-z"))
+    front = next(piece for piece in found.pieces if piece.name == "front")
+    assert front.vertices[:, 2].mean() < 0.0
+    with pytest.raises(warpflat.InputError, match=r"front = 'z' is no direction; .*\+z"):
+        warpflat.find_seams(solids.skirt(), warpflat.SeamOptions(front="z"))
+
+
+def test_a_garment_that_lies_on_its_back_is_set_upright() -> None:
+    surface = trousers()
+    turned = surface.vertices @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    lying = warpflat.make_surface(turned, surface.faces, name="trousers")
+    found = warpflat.find_seams(lying)
+    assert found.up == "+z"
+    assert {seam.name for seam in found.seams} == {seam.name for seam in warpflat.find_seams(surface).seams}
+
+
+def test_seams_can_be_left_closed() -> None:
+    found = warpflat.find_seams(shirt("T-pose"), warpflat.SeamOptions(no=("shoulder",)))
+    assert not any(seam.name.startswith("shoulder") for seam in found.seams)
+    assert {piece.name for piece in found.pieces} >= {"left_sleeve", "right_sleeve"}
+    assert len(found.pieces) == 3
+
+
+def test_thickness_drawn_at_a_hem_is_no_cloth() -> None:
+    surface = solids.skirt()
+    loop = max(border_loops(surface.faces), key=lambda ids: -surface.vertices[ids, 1].mean())
+    inner = surface.vertices[loop] * [0.95, 1.0, 0.95]
+    upper = inner + np.array([0.0, 0.03, 0.0])
+    count, around = len(surface.vertices), len(loop)
+    faces = surface.faces.tolist()
+    rows = [loop.tolist(), [count + k for k in range(around)], [count + around + k for k in range(around)]]
+    for one, other in pairwise(rows):
+        faces += [[one[(k + 1) % around], one[k], other[k], other[(k + 1) % around]] for k in range(around)]
+    thick = warpflat.make_surface(np.concatenate([surface.vertices, inner, upper]), faces)
+    found = warpflat.find_seams(thick)
+    assert any("drawn thickness" in note for note in found.notes)
+    area = sum(_area(piece) for piece in found.pieces)
+    assert area == pytest.approx(_area(surface), rel=1e-6)
+
+
+def _area(surface: Surface) -> float:
+    faces = np.concatenate([surface.faces[:, [0, 1, 2]], surface.faces[surface.faces[:, 3] >= 0][:, [0, 2, 3]]])
+    a, b, c = surface.vertices[faces].transpose(1, 0, 2)
+    return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())

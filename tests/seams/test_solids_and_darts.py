@@ -1,0 +1,129 @@
+"""Closed things fall into gores and bases; strained pieces get darts, mirrored; the command does it all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import seam_solids as solids
+import trimesh
+
+import warpflat
+from warpflat.cli.main import main
+from warpflat.scene.found_seams import found_seams
+from warpflat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.surface.mesh import Surface
+from warpflat.surface.tubes import tube_borders
+
+
+def surface_of(mesh: trimesh.Trimesh, keep: np.ndarray | None = None) -> Surface:
+    faces = mesh.faces if keep is None else mesh.faces[keep]
+    used, place = np.unique(faces, return_inverse=True)
+    return warpflat.make_surface(mesh.vertices[used], place.reshape(-1, 3), closed=True, name="thing")
+
+
+def test_a_ball_falls_into_eight_gores() -> None:
+    ball = trimesh.creation.icosphere(3, radius=0.12)
+    found = warpflat.find_seams(surface_of(ball))
+    assert len(found.pieces) == 8
+    areas = []
+    for piece in found.pieces:
+        assert euler_characteristic(piece.faces) == 1
+        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+        areas.append(0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()))
+    assert sum(areas) == pytest.approx(float(ball.area), rel=1e-3)
+    assert max(areas) < 1.05 * min(areas)
+    assert any("are alike" in note for note in found.notes)
+
+
+def test_a_ring_is_opened_all_around() -> None:
+    found = warpflat.find_seams(surface_of(trimesh.creation.torus(0.18, 0.02, major_sections=40, minor_sections=12)))
+    for piece in found.pieces:
+        loops = len(border_loops(piece.faces))
+        assert euler_characteristic(piece.faces) == 2 - loops
+        assert loops in (1, 2)
+
+
+def test_a_bag_becomes_panels_that_lie_flat() -> None:
+    box = trimesh.creation.box((0.3, 0.35, 0.12)).subdivide().subdivide().subdivide()
+    found = warpflat.find_seams(surface_of(box, box.triangles_center[:, 1] < 0.174))
+    assert 2 <= len(found.pieces) <= 4
+    for piece in found.pieces:
+        flat = warpflat.flatten(warpflat.open_tube(piece) if tube_borders(piece) else piece, fabric="woven")
+        assert flat.fit.outside < 0.04
+
+
+def dented() -> Surface:
+    """A skirt with a bump at either side of its back: a seat."""
+    plain = solids.skirt(20, 56)
+    vertices = plain.vertices.copy()
+    for x in (0.1, -0.1):
+        off = vertices - [x, 0.42, -0.12]
+        vertices += 0.08 * np.exp(-(off**2).sum(axis=1) / 0.06**2)[:, None] * [0.0, 0.0, -1.0]
+    return warpflat.make_surface(vertices, plain.faces, name="skirt")
+
+
+def test_darts_are_mirrored_and_release_what_they_say() -> None:
+    surface = dented()
+    plain = warpflat.find_seams(surface)
+    darted = warpflat.find_seams(surface, fabric="woven")
+    more = [seam for seam in darted.seams if seam.name not in {seam.name for seam in plain.seams}]
+    assert more
+    assert all(seam.released is not None and seam.released > 0.0 for seam in more)
+    darts = [seam.length for seam in more if seam.name.startswith("dart")]
+    assert len(darts) % 2 == 0
+    for one, other in zip(darts[::2], darts[1::2], strict=True):
+        assert one == pytest.approx(other, abs=2e-3)
+    outside = []
+    for found in (plain, darted):
+        pieces = [warpflat.flatten(piece, fabric="woven", datum="grain") for piece in found.pieces]
+        areas = [float(piece.fit.area.sum()) for piece in pieces]
+        outside.append(sum(piece.fit.outside * area for piece, area in zip(pieces, areas, strict=True)) / sum(areas))
+    assert outside[1] < 0.6 * outside[0]
+    none = warpflat.find_seams(
+        surface, warpflat.SeamOptions(no=("dart", "yoke", "waist", "centre back")), fabric="woven"
+    )
+    assert {seam.name for seam in none.seams} == {seam.name for seam in plain.seams}
+
+
+def write(surface: Surface, path: Path) -> Path:
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
+    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_the_command_parts_a_garment_and_sews_it(tmp_path: Path) -> None:
+    mesh = write(solids.shirt(step=0.045), tmp_path / "shirt.obj")
+    arguments = ["flatten", str(mesh), "--units", "m", "--fabric", "woven", "--no-picture", "--frames", "0"]
+    assert main([*arguments, "--limit", "1", "--out", str(tmp_path / "out")]) == 0
+    pattern = warpflat.read_pattern_json(tmp_path / "out" / "pattern.json")
+    names = {piece.name for pieces in pattern.pieces.values() for piece in pieces}
+    assert names == {"front", "back", "left_sleeve", "right_sleeve"}
+    for find, is_parted in (("none", False), (None, True)):
+        tables = {"surface": {"file": str(mesh), "units": "m"}} | ({} if find is None else {"seams": {"find": find}})
+        scene = warpflat.make_scene(tables, name="shirt", folder=tmp_path, where="test")
+        assert (found_seams(scene) is not None) == is_parted
+
+
+def test_two_layers_are_worn_the_same_way_up(tmp_path: Path) -> None:
+    shirt, skirt = solids.shirt(step=0.045), solids.skirt()
+    lines = []
+    count = 0
+    for surface in (shirt, skirt):
+        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
+        lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in surface.faces.tolist()]
+        count += len(surface.vertices)
+    button = trimesh.creation.icosphere(1, radius=0.005)
+    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in button.vertices.tolist()]
+    lines += ["f " + " ".join(str(v + 1 + count) for v in face) for face in button.faces.tolist()]
+    (tmp_path / "two.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    layers = warpflat.read_layers(tmp_path / "two.obj", units="m")
+    assert len(layers) == 2
+    assert any("small part" in note for note in layers[0].notes)
+    found = warpflat.find_seams(layers)
+    assert found.what == "top, 2 sleeves; skirt"
+    assert {piece.name for piece in found.pieces} == {
+        "top front", "top back", "left_sleeve", "right_sleeve", "skirt front", "skirt back",
+    }  # fmt: skip

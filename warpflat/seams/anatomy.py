@@ -1,0 +1,562 @@
+"""What a garment is: up, front and left, its plane of symmetry, its borders by role, and its kind.
+
+Borders tell most. Those that mirror each other beside the plane of symmetry are sleeves, armholes or legs; those in the plane are neck,
+waist and hem. Where the garment is a tube that forks, the shortest way between two borders runs through the fork: the armpit, the crotch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.seams.cloth import Cloth
+from warpflat.seams.fields import MirrorMap, Operators, mirror_map
+
+__all__ = ["AXES", "HOLE", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
+
+Ids = NDArray[np.int64]
+Kind = Literal[
+    "top", "dress", "skirt", "trousers", "jumpsuit", "sleeve", "hat", "glove", "sock", "band", "closed", "other"
+]
+
+#: Directions by name.
+AXES = {sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[k] for k, letter in enumerate("xyz") for sign in "+-"}
+
+# Lengths are shares of the square root of the area, unless they say otherwise.
+# A border shorter than this is a hole: a buttonhole, or a fault of the mesh.
+HOLE = 0.06
+# Two borders mirror each other if their middles do within this, and their lengths within this ratio.
+_PAIR, _PAIR_RATIO = 0.3, 1.7
+# A border whose middle is nearer to the plane of symmetry is in the middle.
+_BESIDE = 0.06
+# An opening in front reaches down by at least this share of the garment's height.
+_OPEN = 0.6
+# A sleeve shorter than this is an armhole with a facing.
+_SHORTEST_SLEEVE = 0.05
+# The way along sleeve and side bends at the armpit by at least this [cosine of the angle between both].
+_STRAIGHT = np.cos(np.radians(160.0))
+# A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
+_SYMMETRIC = 0.02
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Border:
+    """A closed border.
+
+    Attributes:
+        vertices: in their order.
+        middle: [m], length: [m].
+        normal: the area vector of the loop over its length squared: how level it is, and which way it faces.
+        role: neck, waist, hem, sleeve, leg, opening, armhole, hole, or border.
+        side: +1 on the garment's left, -1 on its right, 0 in the middle.
+    """
+
+    vertices: Ids
+    middle: FloatArray
+    length: float
+    normal: FloatArray
+    role: str
+    side: int = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limb:
+    """A sleeve or a leg.
+
+    Attributes:
+        kind: "sleeve" or "leg".
+        side: +1 left, -1 right.
+        border: its number in the anatomy.
+        fork: the place where its inner line meets that of the trunk or the other leg: the armpit, or the crotch [m].
+        along: direction from the fork along the limb.
+        length: from the fork to its end [m].
+    """
+
+    kind: Literal["sleeve", "leg"]
+    side: int
+    border: int
+    fork: FloatArray
+    along: FloatArray
+    length: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Anatomy:
+    """What a garment is.
+
+    Attributes:
+        kind: of garment.
+        up, front, left: directions in space.
+        normal, offset: the plane of symmetry, normal . x = offset; the normal points to the left.
+        asymmetry: median distance of the mirrored cloth from the cloth [m].
+        mirror: the mirror images of its vertices; None without symmetry.
+        borders: by length.
+        limbs: sleeves and legs.
+        open_front: whether it opens from top to bottom in front.
+        size: square root of its area [m].
+        notes: what was chosen, one sentence each.
+    """
+
+    kind: Kind
+    up: FloatArray
+    front: FloatArray
+    left: FloatArray
+    normal: FloatArray
+    offset: float
+    asymmetry: float
+    mirror: MirrorMap | None
+    borders: tuple[Border, ...]
+    limbs: tuple[Limb, ...]
+    open_front: bool
+    size: float
+    notes: tuple[str, ...] = field(default=())
+
+    def limbs_of(self, kind: str) -> list[Limb]:
+        """Return the sleeves, or the legs."""
+        return [limb for limb in self.limbs if limb.kind == kind]
+
+    def border(self, role: str) -> Border | None:
+        """Return the longest border of a role, if there is one."""
+        return next((border for border in self.borders if border.role == role), None)
+
+
+def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, front: str | None = None) -> Anatomy:
+    """Find out what a garment is.
+
+    Args:
+        cloth: one connected part, its normals pointing out.
+        operators: of its mesh.
+        up, front: directions as "+y", "-z", where the user says them; +y and +z are tried first otherwise.
+    """
+    size = float(np.sqrt(cloth.face_areas.sum()))
+    loops = cloth.borders()
+    notes: list[str] = []
+    raw = [_measured(cloth.vertices, loop) for loop in loops]
+    upward = AXES[up] if up else _upward([one for one in raw if one[1] >= HOLE * size])
+    if up is None and abs(upward[1]) < 0.5 and len(loops) > 1:
+        notes.append(f"up is taken as {axis_name(upward)}, as its openings lie; --up says otherwise")
+    normal, offset, asymmetry = _plane_of_symmetry(cloth.vertices, operators.mass, upward, size)
+    holds = asymmetry <= _SYMMETRIC * size
+    if front:
+        forward = AXES[front] - (AXES[front] @ upward) * upward
+        if np.linalg.norm(forward) < 0.5:
+            forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
+    else:
+        forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
+    if holds:
+        level = normal - (normal @ upward) * upward
+        level /= np.linalg.norm(level)
+        across = np.cross(upward, forward)
+        # Front is at right angles to the plane of symmetry, unless the user says that it is not.
+        if abs(across @ level) > 0.5 or not front:
+            turned = np.cross(level, upward)
+            forward = turned * (1.0 if turned @ forward >= -1e-9 else -1.0)
+    left = np.cross(upward, forward)
+    left /= np.linalg.norm(left)
+    forward = np.cross(left, upward)
+    if not holds or abs(normal @ left) < 0.5:
+        normal, offset = left, float(np.median(cloth.vertices @ left))
+    normal, offset = (normal, offset) if normal @ left > 0 else (-normal, -offset)
+    borders = _roles(raw, upward, normal, offset, size)
+    heights = cloth.vertices @ upward
+    kind, borders, open_front = _kind(cloth, borders, upward, heights, size)
+    limbs = _limbs(cloth, borders, upward, kind, size)
+    if front is None:
+        turned_words = _faces_backwards(cloth, borders, kind, upward, forward, open_front, size)
+        if turned_words:
+            notes.append(turned_words)
+            forward, left, normal, offset = -forward, -left, -normal, -offset
+            borders = [replace(border, side=-border.side) for border in borders]
+            limbs = [replace(limb, side=-limb.side) for limb in limbs]
+    mirror = None
+    if holds:
+        mirror = mirror_map(cloth.vertices, cloth.faces, normal, offset, reach=0.05 * size)
+        if asymmetry > 1e-3:
+            notes.append(
+                f"left and right differ by {1e3 * asymmetry:.0f} mm in the middle: lines are averaged over both sides"
+            )
+    else:
+        notes.append(
+            f"it has no plane of symmetry (mirrored, it is {1e3 * asymmetry:.0f} mm off): each side has its own lines"
+        )
+    return Anatomy(
+        kind=kind,
+        up=upward,
+        front=forward,
+        left=left,
+        normal=normal,
+        offset=offset,
+        asymmetry=asymmetry,
+        mirror=mirror,
+        borders=tuple(borders),
+        limbs=tuple(limbs),
+        open_front=open_front,
+        size=size,
+        notes=tuple(notes),
+    )
+
+
+def describe(anatomy: Anatomy) -> str:
+    """Return what a garment is, in a few words: "top, two sleeves, open in front"."""
+    words: list[str] = [anatomy.kind]
+    for kind in ("sleeve", "leg"):
+        count = len(anatomy.limbs_of(kind))
+        if count and anatomy.kind not in (kind, "trousers"):
+            words.append(f"{count} {kind}{'s' if count > 1 else ''}")
+    if anatomy.open_front:
+        words.append("open in front")
+    return ", ".join(words)
+
+
+def _measured(vertices: FloatArray, loop: Ids) -> tuple[FloatArray, float, FloatArray, Ids]:
+    """Return middle, length and area vector over the length squared of a loop, and its vertices."""
+    points = vertices[loop]
+    following = np.roll(points, -1, axis=0)
+    steps = np.linalg.norm(following - points, axis=1)
+    length = float(steps.sum())
+    middle = ((points + following) * (0.5 * steps[:, None])).sum(axis=0) / max(length, 1e-300)
+    area = 0.5 * np.cross(points - middle, following - middle).sum(axis=0)
+    return middle, length, area * (4.0 * np.pi / max(length, 1e-300) ** 2), loop
+
+
+def _upward(loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]]) -> FloatArray:
+    """Return +y, or +z where the openings lie level in z and not in y."""
+    if not loops:
+        return AXES["+y"]
+    level = sum(length * np.abs(normal) for _, length, normal, _ in loops)
+    assert isinstance(level, np.ndarray)
+    return AXES["+z"] if level[2] > 2.0 * level[1] and level[2] > level[0] else AXES["+y"]
+
+
+def axis_name(direction: FloatArray) -> str:
+    """Return the axis of space that is nearest to a direction, as "+y"."""
+    k = int(np.abs(direction).argmax())
+    return f"{'+' if direction[k] > 0 else '-'}{'xyz'[k]}"
+
+
+def _plane_of_symmetry(
+    vertices: FloatArray, mass: FloatArray, upward: FloatArray, size: float
+) -> tuple[FloatArray, float, float]:
+    """Return normal, offset [m] and asymmetry [m] of the plane in which a surface is most its own mirror image.
+
+    Closest points again and again, from twelve upright planes through the middle.
+    """
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(vertices)
+    share = mass / mass.sum()
+    # Quadrature points of equal area, and so independent of how fine the mesh is where.
+    rank = np.searchsorted(np.cumsum(share), (np.arange(900) + 0.5) / 900)
+    points = vertices[np.unique(np.minimum(rank, len(vertices) - 1))]
+    middle = points.mean(axis=0)
+    one = np.cross(upward, [1.0, 0.0, 0.0] if abs(upward[0]) < 0.9 else [0.0, 1.0, 0.0])
+    one /= np.linalg.norm(one)
+    other = np.cross(upward, one)
+    found: list[tuple[float, FloatArray, float]] = []
+    for turn in range(12):
+        angle = np.pi * turn / 12
+        normal = np.cos(angle) * one + np.sin(angle) * other
+        offset = float(normal @ middle)
+        rounds = 6
+        while rounds:
+            image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
+            away, nearest = tree.query(image)
+            near = away <= max(float(np.quantile(away, 0.8)), 1e-3 * size)
+            p, q = points[near], vertices[nearest[near]]
+            p_mean, q_mean = p.mean(axis=0), q.mean(axis=0)
+            spread = (p - p_mean).T @ (q - q_mean)
+            values, axes = np.linalg.eigh(spread + spread.T)
+            # Of the three the one that is nearest to the plane before: the smallest may be the thickness of a flat thing.
+            k = int(np.abs(axes.T @ normal).argmax()) if values[1] - values[0] < 0.05 * values[2] else 0
+            normal = axes[:, k] * (1.0 if axes[:, k] @ normal >= 0 else -1.0)
+            offset = float(normal @ (p_mean + q_mean)) / 2.0
+            rounds -= 1
+        image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
+        found.append((float(np.median(tree.query(image)[0])), normal, offset))
+    # A lying plane (above against below) is no garment's.
+    upright = [one for one in found if abs(one[1] @ upward) < 0.5] or found
+    best = min(upright, key=lambda one: one[0])
+    # Round things have many: the one nearest to the axes is taken.
+    as_good = [one for one in upright if one[0] <= best[0] + 0.004 * size]
+    best = max(as_good, key=lambda one: (round(float(abs(one[1][0])), 2), -one[0]))
+    spacing = float(np.median(tree.query(vertices[:: max(1, len(vertices) // 500)], k=2)[0][:, 1]))
+    # Images fall between vertices: what the mesh's own spacing explains is no asymmetry.
+    return best[1], best[2], max(0.0, best[0] - 0.5 * spacing)
+
+
+def _roles(
+    raw: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
+    upward: FloatArray,
+    normal: FloatArray,
+    offset: float,
+    size: float,
+) -> list[Border]:
+    """Return the borders: pairs beside the plane of symmetry as "limb", those in the middle as "middle", and holes."""
+    across = np.array([middle @ normal - offset for middle, *_ in raw])
+    roles = ["hole" if length < HOLE * size else "middle" for _, length, *_ in raw]
+    pairs = []
+    for i, (middle, length, *_) in enumerate(raw):
+        for j in range(i + 1, len(raw)):
+            if "hole" in (roles[i], roles[j]) or across[i] * across[j] >= 0.0:
+                continue
+            image = middle - 2.0 * across[i] * normal
+            away = float(np.linalg.norm(image - raw[j][0]))
+            ratio = max(length, raw[j][1]) / min(length, raw[j][1])
+            if (
+                away < _PAIR * size
+                and away < 0.7 * abs(across[i] - across[j])
+                and ratio < _PAIR_RATIO
+                and min(abs(across[i]), abs(across[j])) > _BESIDE * size
+            ):
+                pairs.append((away, i, j))
+    for _, i, j in sorted(pairs):
+        if roles[i] == roles[j] == "middle":
+            roles[i] = roles[j] = "limb"
+    widest = max((abs(x) for x in across), default=0.0)
+    longest = max((length for _, length, *_ in raw), default=0.0)
+    for i, (_, length, *_) in enumerate(raw):
+        # One sleeve alone.
+        if roles[i] == "middle" and abs(across[i]) > max(0.15 * size, 0.5 * widest) and length < 0.6 * longest:
+            roles[i] = "limb"
+    return [
+        Border(
+            vertices=loop,
+            middle=middle,
+            length=length,
+            normal=area,
+            role=roles[i],
+            side=int(np.sign(across[i])) if roles[i] == "limb" else 0,
+        )
+        for i, (middle, length, area, loop) in enumerate(raw)
+    ]
+
+
+def _kind(
+    cloth: Cloth, borders: Sequence[Border], upward: FloatArray, heights: FloatArray, size: float
+) -> tuple[Kind, list[Border], bool]:
+    """Return the kind, the borders with their roles, and whether the front is open."""
+    low, high = float(heights.min()), float(heights.max())
+    tall = max(high - low, 1e-300)
+    limbs = [i for i, border in enumerate(borders) if border.role == "limb"]
+    middles = [i for i, border in enumerate(borders) if border.role == "middle"]
+    roles = {i: border.role for i, border in enumerate(borders)}
+    level = {i: float(borders[i].middle @ upward) for i in range(len(borders))}
+
+    def reach(i: int) -> tuple[float, float]:
+        own = heights[borders[i].vertices]
+        return float(own.min()), float(own.max())
+
+    spans = {i: (reach(i)[1] - reach(i)[0]) / tall for i in middles}
+    open_front = any(span > _OPEN for span in spans.values()) and len(limbs) > 0
+    kind: Kind = "other"
+    if not borders or all(role == "hole" for role in roles.values()):
+        kind = "closed"
+    elif len(limbs) >= 4:
+        kind = "jumpsuit"
+        order = sorted(limbs, key=lambda i: level[i])
+        for i in order[:2]:
+            roles[i] = "leg"
+        for i in order[2:]:
+            roles[i] = "sleeve"
+        for i in middles:
+            roles[i] = "opening" if spans[i] > _OPEN else "neck"
+    elif limbs and len(middles) == 1 and not open_front:
+        i = middles[0]
+        if all(level[k] < level[i] for k in limbs):
+            kind = "trousers"
+            roles[i] = "waist"
+            for k in limbs:
+                roles[k] = "leg"
+        else:
+            kind = "top"
+            roles[i] = "hem" if level[i] < (low + high) / 2 else "neck"
+            for k in limbs:
+                roles[k] = "sleeve"
+    elif limbs:
+        order = sorted(middles, key=lambda i: level[i])
+        kind = "top"
+        for i in middles:
+            roles[i] = "border"
+        if open_front:
+            roles[max(middles, key=lambda i: spans[i])] = "opening"
+        elif order:
+            roles[order[0]], roles[order[-1]] = "hem", "neck"
+        for k in limbs:
+            roles[k] = "sleeve"
+    elif len(middles) == 2:
+        a, b = sorted(middles, key=lambda i: level[i])
+        girth = 0.5 * (borders[a].length + borders[b].length)
+        apart = float(np.linalg.norm(borders[a].middle - borders[b].middle))
+        upright = abs(level[b] - level[a]) > 0.5 * apart
+        if apart < 0.2 * girth:
+            kind = "band"
+            roles[a], roles[b] = "border", "border"
+        elif upright and (girth > 0.55 or girth > 0.75 * apart):
+            kind = "skirt"
+            roles[a], roles[b] = "hem", "waist"
+        else:
+            kind = "sleeve"
+            roles[a], roles[b] = "border", "border"
+    elif len(middles) == 1:
+        kind = _one_border(cloth, borders[middles[0]], upward, size)
+        roles[middles[0]] = "border"
+    else:
+        for i in middles:
+            roles[i] = "border"
+    if kind == "top":
+        hem = next((i for i, role in roles.items() if role == "hem"), None)
+        arms = [i for i, role in roles.items() if role == "sleeve"]
+        if hem is not None and arms:
+            # From the armhole down, a dress is longer than a body is to the hip.
+            above = max(level[i] for i in arms)
+            top = max([level[i] for i, role in roles.items() if role == "neck"] or [above])
+            if top - reach(hem)[0] > 0.8 or (top - reach(hem)[0]) > 1.9 * _trunk_width(cloth, borders, upward):
+                kind = "dress"
+    made = [replace(border, role=roles[i]) for i, border in enumerate(borders)]
+    return kind, made, open_front
+
+
+def _trunk_width(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> float:
+    """Return the girth of the lowest middle border over two: about how wide the garment is, laid flat."""
+    hem = min((b for b in borders if b.role == "middle"), key=lambda b: float(b.middle @ upward))
+    return 0.5 * hem.length
+
+
+def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -> Kind:
+    """Return what a thing with one border is: a deep one a hat, a sock or a glove; a flat one a panel."""
+    depth = (cloth.vertices - border.middle) @ upward
+    # A disk that is no deeper than a panel has about the area of its outline.
+    if border.length > 3.0 * size:
+        return "other"
+    if -depth.min() > 2.0 * max(depth.max(), 0.0):
+        return "sock"
+    return "hat" if depth.max() > 0.5 * np.sqrt(border.length**2 / (4 * np.pi**2)) else "other"
+
+
+def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Kind, size: float) -> list[Limb]:
+    """Return the limbs with their forks, which the shortest ways between borders pass through."""
+    from scipy.sparse.csgraph import dijkstra
+
+    from warpflat.surface.half_edges import mesh_edges
+
+    arms = [i for i, border in enumerate(borders) if border.role == "sleeve"]
+    legs = [i for i, border in enumerate(borders) if border.role == "leg"]
+    if not arms and not legs:
+        return []
+    from scipy.sparse import coo_array
+
+    edges = mesh_edges(cloth.faces.astype(np.int32)).astype(np.int64)
+    long = np.linalg.norm(cloth.vertices[edges[:, 0]] - cloth.vertices[edges[:, 1]], axis=1)
+    graph = coo_array((long, (edges[:, 0], edges[:, 1])), shape=(len(cloth.vertices),) * 2).tocsr()
+    heights = cloth.vertices @ upward
+    found = []
+    for i in (*arms, *legs):
+        own = borders[i]
+        if i in arms:
+            # To the lower part of the trunk's end: the hem, the lower part of an opening, or the legs.
+            ends = [b.vertices for b in borders if b.role in ("hem", "opening", "leg")]
+            if not ends:
+                continue
+            goal = np.concatenate(ends)
+            goal = goal[heights[goal] <= heights[goal].min() + 0.25 * (heights.max() - heights[goal].min())]
+            # Borders of the garment's own side, so that the way runs down this side.
+        else:
+            mates = [borders[j].vertices for j in legs if j != i]
+            if not mates:
+                continue
+            goal = np.concatenate(mates)
+        far, before, _ = dijkstra(graph, directed=False, indices=own.vertices, min_only=True, return_predecessors=True)
+        end = int(goal[np.argmin(far[goal])])
+        if not np.isfinite(far[end]):
+            continue
+        way = [end]
+        while before[way[-1]] >= 0:
+            way.append(int(before[way[-1]]))
+        points = cloth.vertices[way[::-1]]
+        fork, along, length, bend = _fork(points, size)
+        if i in arms and (bend < _STRAIGHT or length < _SHORTEST_SLEEVE * size):
+            continue
+        found.append(
+            Limb(
+                kind="sleeve" if i in arms else "leg",
+                side=own.side or 1,
+                border=i,
+                fork=fork,
+                along=along,
+                length=length,
+            )
+        )
+    return found
+
+
+def _fork(points: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float, float]:
+    """Return where a way along a limb and on along the trunk bends most, the direction from there along the limb, and its length.
+
+    Returns:
+        The place, the direction, the length from the first point to the place [m], and the cosine of the angle between both legs.
+    """
+    from warpflat.core.polyline import arc_lengths, points_at_lengths
+
+    arc = arc_lengths(points)
+    total = float(arc[-1])
+    samples = np.linspace(0.0, total, 201)
+    line = points_at_lengths(points, samples)
+    for _ in range(2):
+        # The way follows edges: its steps are smoothed away.
+        line[1:-1] = 0.25 * line[:-2] + 0.5 * line[1:-1] + 0.25 * line[2:]
+    chord = (line[-1] - line[0]) / max(float(np.linalg.norm(line[-1] - line[0])), 1e-300)
+    away = line - line[0]
+    at = int(np.linalg.norm(away - (away @ chord)[:, None] * chord, axis=1).argmax())
+    at = min(max(at, 1), 199)
+    for _ in range(4):
+        r = max(3, min(at, 200 - at, max(3, int(200 * 0.2 * size / max(total, 1e-300)))))
+        low, high = max(0, at - r), min(200, at + r)
+        one, other = line[low] - line[at], line[high] - line[at]
+        one /= max(float(np.linalg.norm(one)), 1e-300)
+        other /= max(float(np.linalg.norm(other)), 1e-300)
+        step = line[low : high + 1] @ -(one + other)
+        new = low + int(step.argmax())
+        new = min(max(new, 1), 199)
+        if new == at:
+            break
+        at = new
+    along = line[0] - line[at]
+    return line[at], along / max(float(np.linalg.norm(along)), 1e-300), float(samples[at]), float(one @ other)
+
+
+def _faces_backwards(
+    cloth: Cloth,
+    borders: Sequence[Border],
+    kind: Kind,
+    upward: FloatArray,
+    forward: FloatArray,
+    open_front: bool,
+    size: float,
+) -> str:
+    """Return why the garment faces the other way, or "": an opening lies in front, a neck is lower in front, a seat is behind."""
+    heights, depth = cloth.vertices @ upward, cloth.vertices @ forward
+    middle = float(np.median(depth))
+    for border in borders:
+        own = border.vertices
+        if open_front and border.role == "opening":
+            # Between top and bottom only the edges of the opening are left.
+            low, high = heights[own].min(), heights[own].max()
+            inner = own[(heights[own] > low + 0.3 * (high - low)) & (heights[own] < low + 0.7 * (high - low))]
+            if len(inner) and np.median(depth[inner]) < middle - 0.02 * size:
+                return (
+                    f"it opens at the {axis_name(-forward)} side, which is taken as its front; --front says otherwise"
+                )
+            return ""
+    for border in borders:
+        own = border.vertices
+        if border.role == "neck" and kind in ("top", "dress"):
+            ahead = depth[own] > np.median(depth[own])
+            drop = float(np.quantile(heights[own[~ahead]], 0.1) - np.quantile(heights[own[ahead]], 0.1))
+            if drop < -0.06 * size:
+                return f"its neck is lower at the {axis_name(-forward)} side, which is taken as its front; --front says otherwise"
+    return ""

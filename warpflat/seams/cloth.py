@@ -1,0 +1,272 @@
+"""A garment's cloth while seams are drawn on it: a triangle mesh that is split along the zero lines of fields.
+
+Faces are split, not edges followed, so that a seam is as smooth as its field. Where a line would pass a vertex closely and leave a
+sliver, the vertex moves onto the line, along an edge and so within the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.surface.connectivity import border_loops, components, join_labels
+from warpflat.surface.half_edges import HalfEdges, half_edges
+
+__all__ = ["Cloth", "PieceMesh", "edge_components"]
+
+Ids = NDArray[np.int64]
+
+# A line that passes a vertex within this share of an edge takes the vertex with it.
+_NEAR = 0.2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PieceMesh:
+    """One piece that the seams leave: its mesh, and where each vertex and face was before."""
+
+    vertices: FloatArray
+    faces: Ids
+    vertex_of: Ids
+    face_of: Ids
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cloth:
+    """Triangles with values at their vertices, labels of their faces, and the edges along which they are cut.
+
+    Attributes:
+        vertices: #V by 3 [m].
+        faces: #F by 3, wound so that normals point out of the garment.
+        values: fields by name, #V each; vertices that are added have those of their edge.
+        labels: of faces by name, #F each; parts of a face have those of the whole.
+        seams: edges by the name of their seam, #E by 2.
+    """
+
+    vertices: FloatArray
+    faces: Ids
+    values: Mapping[str, FloatArray] = field(default_factory=dict)
+    labels: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    seams: Mapping[str, Ids] = field(default_factory=dict)
+
+    @property
+    def half_edges(self) -> HalfEdges:
+        """The half-edges of the faces."""
+        return half_edges(self.faces.astype(np.int32))
+
+    @property
+    def face_areas(self) -> FloatArray:
+        """#F [m2]."""
+        return 0.5 * np.linalg.norm(self._normals(), axis=1)
+
+    @property
+    def face_normals(self) -> FloatArray:
+        """#F by 3, of length 1, or 0 for a face without area."""
+        normal = self._normals()
+        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+
+    def _normals(self) -> FloatArray:
+        a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
+        return np.asarray(np.cross(b - a, c - a))
+
+    def seam_edges(self) -> Ids:
+        """#E by 2, the edges of all seams, the lower vertex first, each once."""
+        if not self.seams:
+            return np.empty((0, 2), dtype=np.int64)
+        return np.unique(np.sort(np.concatenate(list(self.seams.values())), axis=1), axis=0)
+
+    def with_seam(self, name: str, edges: Ids) -> Cloth:
+        """Return the cloth with edges added to a seam."""
+        own = np.sort(edges, axis=1)
+        if name in self.seams:
+            own = np.unique(np.concatenate([self.seams[name], own]), axis=0)
+        return replace(self, seams={**self.seams, name: own})
+
+    def without_seam(self, name: str) -> Cloth:
+        """Return the cloth with a seam closed again."""
+        return replace(self, seams={key: edges for key, edges in self.seams.items() if key != name})
+
+    def split(self, level: str, within: BoolArray) -> tuple[Cloth, BoolArray]:
+        """Split faces along the zero line of a field.
+
+        Args:
+            level: the name of the field.
+            within: #F, the faces that are split; neighbours follow where a shared edge is.
+
+        Returns:
+            The cloth, and #F, true for the faces in which the field is positive.
+        """
+        cloth = self._snapped(level, within)
+        f, faces, count = cloth.values[level], cloth.faces, len(cloth.vertices)
+        sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
+        crossing = within[:, None] & (f[sides[:, :, 0]] * f[sides[:, :, 1]] < 0.0)
+        key = sides[:, :, 0] * count + sides[:, :, 1]
+        known = np.unique(key[crossing])
+        new = np.searchsorted(known, key)
+        hit = (new < len(known)) & (known[np.minimum(new, max(len(known) - 1, 0))] == key) if len(known) else crossing
+        middle = np.where(hit, count + new, -1)
+        a, b = known // count, known % count
+        t = (f[a] / (f[a] - f[b]))[:, None] if len(known) else np.empty((0, 1))
+        values = {
+            name: np.concatenate([value, (1.0 - t[:, 0]) * value[a] + t[:, 0] * value[b]])
+            for name, value in cloth.values.items()
+        }
+        values[level] = np.concatenate([f, np.zeros(len(known))])
+        vertices = np.concatenate([cloth.vertices, (1.0 - t) * cloth.vertices[a] + t * cloth.vertices[b]])
+        parts, parents = [faces[~hit.any(axis=1)]], [np.flatnonzero(~hit.any(axis=1))]
+        once = np.flatnonzero(hit.sum(axis=1) == 1)
+        if len(once):
+            k = hit[once].argmax(axis=1)
+            i, j, o = (faces[once, (k + n) % 3] for n in range(3))
+            m = middle[once, k]
+            parts += [np.stack([i, m, o], axis=1), np.stack([m, j, o], axis=1)]
+            parents += [once, once]
+        twice = np.flatnonzero(hit.sum(axis=1) >= 2)
+        if len(twice):
+            # The corner between both split edges is cut off; what is left is a quad, split along its shorter diagonal.
+            k = (~hit[twice]).argmax(axis=1)
+            j, o, i = (faces[twice, (k + n) % 3] for n in (0, 1, 2))
+            p, q = middle[twice, (k + 1) % 3], middle[twice, (k + 2) % 3]
+            # Edges: j-o whole, o-i split by p, i-j split by q.
+            first = np.linalg.norm(vertices[j] - vertices[p], axis=1) <= np.linalg.norm(
+                vertices[o] - vertices[q], axis=1
+            )
+            parts += [
+                np.stack([i, q, p], axis=1),
+                np.where(first[:, None], np.stack([j, o, p], axis=1), np.stack([j, o, q], axis=1)),
+                np.where(first[:, None], np.stack([j, p, q], axis=1), np.stack([o, p, q], axis=1)),
+            ]
+            parents += [twice, twice, twice]
+        parent = np.concatenate(parents)
+        order = np.argsort(parent, kind="stable")
+        parent, split = parent[order], np.concatenate(parts)[order]
+        seams = {}
+        for name, edges in cloth.seams.items():
+            place = np.searchsorted(known, edges[:, 0] * count + edges[:, 1])
+            cut = (
+                (place < len(known))
+                & (known[np.minimum(place, max(len(known) - 1, 0))] == edges[:, 0] * count + edges[:, 1])
+                if len(known)
+                else np.zeros(len(edges), bool)
+            )
+            m = count + place[cut]
+            halves = [np.stack([edges[cut, 0], m], axis=1), np.stack([edges[cut, 1], m], axis=1)]
+            seams[name] = np.concatenate([edges[~cut], *halves])
+        made = Cloth(
+            vertices=vertices,
+            faces=split,
+            values=values,
+            labels={name: label[parent] for name, label in cloth.labels.items()},
+            seams=seams,
+        )
+        return made, values[level][split].sum(axis=1) > 0.0
+
+    def _snapped(self, level: str, within: BoolArray) -> Cloth:
+        """Return the cloth with vertices that the zero line passes closely moved onto it."""
+        f = self.values[level].copy()
+        he = self.half_edges
+        edges, count = he.edges.astype(np.int64), he.count
+        held = np.zeros(len(f), dtype=bool)
+        on_border = count == 1
+        fixed = np.zeros(len(edges), dtype=bool)
+        fixed[on_border] = True
+        if len(seam := self.seam_edges()):
+            stride = len(f)
+            fixed |= np.isin(edges[:, 0] * stride + edges[:, 1], seam[:, 0] * stride + seam[:, 1])
+        held[edges[fixed]] = True
+        inside = np.zeros(len(edges), dtype=bool)
+        inside[he.edge[within[he.face]]] = True
+        crossing = np.flatnonzero(inside & (f[edges[:, 0]] * f[edges[:, 1]] < 0.0))
+        a, b = edges[crossing].T
+        t = f[a] / (f[a] - f[b])
+        vertex, other = np.where(t < 0.5, a, b), np.where(t < 0.5, b, a)
+        share = np.minimum(t, 1.0 - t)
+        # A vertex of the border or of a seam keeps to it.
+        near = (share < _NEAR) & (~held[vertex] | fixed[crossing])
+        order = np.flatnonzero(near)[np.argsort(share[near], kind="stable")]
+        taken, first = np.unique(vertex[order], return_index=True)
+        row = order[first]
+        # A neighbour that moves, too, would be aimed at where it is no more.
+        moves = np.zeros(len(f), dtype=bool)
+        moves[taken] = True
+        keep = ~(moves[other[row]] & (share[row] > 0.0) & (taken > other[row]))
+        taken, row = taken[keep], row[keep]
+        zero = f == 0.0
+        zero[taken] = True
+        flat = self.faces[zero[self.faces].all(axis=1)]
+        if len(flat):
+            # A face all of whose corners lay on the line would be on neither side.
+            off = flat[np.arange(len(flat)), np.abs(f[flat]).argmax(axis=1)]
+            stay = ~np.isin(taken, off)
+            taken, row = taken[stay], row[stay]
+        weight = share[row]
+        values = {}
+        for name, value in self.values.items():
+            moved = value.copy()
+            moved[taken] = (1.0 - weight) * value[taken] + weight * value[other[row]]
+            values[name] = moved
+        values[level][taken] = 0.0
+        vertices = self.vertices.copy()
+        vertices[taken] += weight[:, None] * (self.vertices[other[row]] - self.vertices[taken])
+        return replace(self, vertices=vertices, values=values)
+
+    def line_between(self, sides: NDArray[np.generic], within: BoolArray) -> Ids:
+        """Return the edges (#E by 2) between faces of different sides (#F), both of them in `within` (#F)."""
+        he = self.half_edges
+        inner = np.flatnonzero(he.count[he.edge] == 2)
+        order = inner[np.argsort(he.edge[inner], kind="stable")].reshape(-1, 2)
+        one, other = he.face[order].T
+        apart = (sides[one] != sides[other]) & within[one] & within[other]
+        return he.edges[he.edge[order[apart, 0]]].astype(np.int64)
+
+    def parts(self) -> NDArray[np.int64]:
+        """Return #F, the piece of each face that the seams leave."""
+        seam = self.seam_edges()
+        return components(self.faces.astype(np.int32), barrier=seam.astype(np.int32)).astype(np.int64)
+
+    def pieces(self) -> Iterator[PieceMesh]:
+        """Yield the pieces that the seams leave, vertices doubled where a seam has cloth of one piece on both sides."""
+        part, seam = self.parts(), self.seam_edges()
+        stride = np.int64(len(self.vertices))
+        cut = set((seam[:, 0] * stride + seam[:, 1]).tolist())
+        for number in range(int(part.max()) + 1):
+            chosen = np.flatnonzero(part == number)
+            faces = self.faces[chosen]
+            # Corners at a vertex are one vertex where faces share an edge there that is not cut.
+            he = half_edges(faces.astype(np.int32))
+            keys = he.edges[:, 0].astype(np.int64) * stride + he.edges[:, 1]
+            opened = (
+                np.isin(keys, np.fromiter(cut, dtype=np.int64, count=len(cut))) if cut else np.zeros(len(keys), bool)
+            )
+            inner = np.flatnonzero((he.count[he.edge] == 2) & ~opened[he.edge])
+            pair = inner[np.argsort(he.edge[inner], kind="stable")].reshape(-1, 2)
+            a, b = pair.T
+            fan = join_labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b]))
+            _, first = np.unique(fan, return_index=True)
+            vertex = he.tail[first].astype(np.int64)
+            yield PieceMesh(
+                vertices=self.vertices[vertex],
+                faces=fan.reshape(-1, 3).astype(np.int64),
+                vertex_of=vertex,
+                face_of=chosen,
+            )
+
+    def borders(self, faces: BoolArray | None = None) -> list[Ids]:
+        """Return the border loops of the cloth, or of some of its faces (#F), the longest first."""
+        chosen = self.faces if faces is None else self.faces[faces]
+        if len(chosen) == 0:
+            return []
+        return [loop.astype(np.int64) for loop in border_loops(chosen.astype(np.int32), self.vertices)]
+
+
+def edge_components(edges: Ids) -> list[Ids]:
+    """Return the connected lines among edges (#E by 2), each as rows of edges."""
+    if len(edges) == 0:
+        return []
+    used, place = np.unique(edges, return_inverse=True)
+    place = place.reshape(-1, 2)
+    label = join_labels(len(used), place[:, 0], place[:, 1])[place[:, 0]]
+    return [edges[label == number] for number in np.unique(label)]

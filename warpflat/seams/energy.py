@@ -1,0 +1,461 @@
+"""Further seams and darts, where the cloth of a piece stays strained beyond its limit: each is tried, and kept if it releases enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.activity import report_activity
+from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.errors import InputError
+from warpflat.cutting.ledger import coarse_options
+from warpflat.fabric.fabric import Fabric
+from warpflat.flattening.flatten_piece import flatten
+from warpflat.flattening.result import Flattening
+from warpflat.seams.anatomy import Anatomy
+from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
+from warpflat.seams.options import SeamOptions
+from warpflat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.surface.mesh import Surface
+
+__all__ = ["Trial", "cut_by_energy"]
+
+Ids = NDArray[np.int64]
+
+# A dart or a seam is made if it brings this share of the whole garment's cloth back within its limit, and this share of what is beyond in
+# its piece.
+_WORTH, _WORTH_OF_PIECE = 0.002, 0.15
+# A garment of which more than the first share is beyond the limit is parted further before darts are looked for; one of which more than the
+# second is, after them.
+_PARTED_FIRST, _PARTED = 0.05, 0.025
+# A centimetre sewn counts as this much cloth beyond the limit [m2].
+_PRICE = 1e-5
+# One that brings back this share of what is beyond in its piece is taken without a look at others.
+_ENOUGH = 0.5
+# Of a piece so many places are looked at, and from each so many stretches of border.
+_PLACES, _STRETCHES = 3, 2
+# A place is looked at if it has this share of what is beyond in its piece.
+_HEARD = 0.08
+# Two ways to the border are different from this angle on [cosine].
+_OTHER_WAY = 0.6
+# Lengths are shares of the garment's size. A dart is between these long, and its tip a little behind the place.
+_SHORTEST, _LONGEST, _BEHIND = 0.03, 0.32, 0.01
+# Seams and darts at most, mirrored ones counted once; and how many are tried.
+_MOST_ROUNDS, _MOST_TRIALS = 6, 48
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trial:
+    """What a seam or a dart was found to do.
+
+    Attributes:
+        name: of the seam.
+        released: strain energy released [J].
+        outside: share of the garment's cloth that it brings back within the limit.
+    """
+
+    name: str
+    released: float
+    outside: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Candidate:
+    """A line that may be cut.
+
+    Attributes:
+        name: of the seam, without its side.
+        normal, point: of its plane.
+        start, end: only what projects between them along the line is cut; all of the piece if start is None [m].
+        parts: whether it parts the piece.
+    """
+
+    name: str
+    normal: FloatArray
+    point: FloatArray
+    start: FloatArray | None
+    end: FloatArray | None
+    parts: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Measured:
+    """A piece, flattened coarsely."""
+
+    mesh: PieceMesh
+    surface: Surface
+    result: Flattening
+    outside: float
+    energy: float
+    area: float
+
+
+Prepare = Callable[[Cloth, PieceMesh], Surface]
+
+
+def cut_by_energy(
+    cloth: Cloth, anatomy: Anatomy, fabric: Fabric, options: SeamOptions, prepare: Prepare
+) -> tuple[Cloth, list[Trial], float]:
+    """Return the cloth with further seams and darts, what each of them does, and the share that is beyond the limit at the end.
+
+    Args:
+        cloth: cut by a tailor.
+        anatomy: of the garment.
+        fabric: the cloth's.
+        options: how many pieces there may be, and how much may be beyond the limit.
+        prepare: makes the surface of a piece, with its grain.
+    """
+    pieces = _measured(cloth, fabric, prepare, [])
+    total = sum(piece.area for piece in pieces)
+    trials = list[Trial]()
+    exhausted = set[int]()
+    tried = 0
+    most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
+    parting = _PARTED_FIRST * total < sum(piece.outside for piece in pieces)
+    for _ in range(_MOST_ROUNDS):
+        beyond = sum(piece.outside for piece in pieces)
+        if beyond <= options.limit * total:
+            break
+        worst = next(
+            (
+                piece
+                for piece in sorted(pieces, key=lambda one: -one.outside)
+                if _key(cloth, piece.mesh, anatomy) not in exhausted and piece.outside > options.limit * piece.area
+            ),
+            None,
+        )
+        if worst is None and not parting and beyond > _PARTED * total:
+            # Darts alone do not do.
+            parting = True
+            exhausted.clear()
+            continue
+        if worst is None or tried >= _MOST_TRIALS:
+            break
+        twin = _twin(worst, pieces, anatomy)
+        best: tuple[float, _Candidate, float, float, Cloth] | None = None
+        laid = _with_layout(cloth, worst)
+        for candidate in _candidates(cloth, worst, anatomy, may_part=parting and len(pieces) < most):
+            if options.forbids(candidate.name):
+                continue
+            tried += 1
+            report_activity(f"seams: trying {candidate.name}")
+            made = _cut(laid, worst.mesh, candidate, f"trial of {candidate.name}")
+            if made is None:
+                continue
+            try:
+                after = _measured(made, fabric, prepare, pieces)
+            except InputError:
+                continue
+            gain = beyond - sum(piece.outside for piece in after)
+            released = sum(piece.energy for piece in pieces) - sum(piece.energy for piece in after)
+            length = _length(made, f"trial of {candidate.name}")
+            value = gain - _PRICE * 100.0 * length
+            least = max(_WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
+            if gain >= least and (best is None or value > best[0]):
+                best = value, candidate, gain, released, made
+                if gain >= _ENOUGH * worst.outside:
+                    break
+        if best is None:
+            exhausted.add(_key(cloth, worst.mesh, anatomy))
+            if twin is not None:
+                exhausted.add(_key(cloth, twin.mesh, anatomy))
+            continue
+        _, candidate, gain, released, made = best
+        names = [_free_name(cloth, candidate, _side_of(worst.mesh, cloth, anatomy) if twin is not None else 0)]
+        made = replace(made, values={key: value for key, value in made.values.items() if not key.startswith("flat ")})
+        cloth = _renamed(made, f"trial of {candidate.name}", names[0])
+        mirrored = _mirrored(candidate, anatomy)
+        lopsided = candidate.start is not None and abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
+        if anatomy.mirror is not None and (twin is not None or (lopsided and not candidate.parts)):
+            # The other side is cut alike.
+            target = _mesh_at(cloth, twin.mesh if twin is not None else worst.mesh)
+            names.append(_free_name(cloth, candidate, -_side_of(worst.mesh, cloth, anatomy) if twin is not None else 0))
+            other = None if target is None else _cut(cloth, target, mirrored, names[1])
+            if other is not None:
+                cloth = other
+        before, pieces = pieces, _measured(cloth, fabric, prepare, pieces)
+        gain = (sum(one.outside for one in before) - sum(one.outside for one in pieces)) / total
+        released = sum(one.energy for one in before) - sum(one.energy for one in pieces)
+        trials += [Trial(name=name, released=released / len(names), outside=gain / len(names)) for name in names]
+    return cloth, trials, sum(piece.outside for piece in pieces) / total
+
+
+def _usual_pieces(anatomy: Anatomy, now: int) -> int:
+    """Return how many pieces a tailor would cut at most."""
+    return max(now, {"top": 6, "dress": 6, "skirt": 4, "trousers": 4, "jumpsuit": 12, "sleeve": 2}.get(anatomy.kind, 8))
+
+
+def _measured(cloth: Cloth, fabric: Fabric, prepare: Prepare, known: Sequence[_Measured]) -> list[_Measured]:
+    """Return the pieces, flattened coarsely; those that are as they were are taken over.
+
+    Raises:
+        InputError: a piece cannot be flattened.
+    """
+    # A trial need tell good from bad, no more.
+    trial_options = replace(coarse_options(), energy_left=0.02, outline_left_mm=2.0, check_every=5)
+    same = {(len(one.mesh.faces), one.mesh.vertices[:, :2].sum().round(9)): one for one in known}
+    found = []
+    for mesh in cloth.pieces():
+        key = len(mesh.faces), mesh.vertices[:, :2].sum().round(9)
+        if key in same:
+            found.append(replace(same[key], mesh=mesh))
+            continue
+        surface = prepare(cloth, mesh)
+        if euler_characteristic(surface.faces) != 1 or len(border_loops(surface.faces)) != 1:
+            # A tube is opened when all seams are known.
+            continue
+        datum = "grain" if "grain" in surface.lines else None
+        start = None
+        if "flat 0" in cloth.values:
+            laid = np.stack([cloth.values["flat 0"], cloth.values["flat 1"]], axis=1)[mesh.vertex_of]
+            # Where the piece was laid before, both sides of the new cut on each other.
+            start = laid if np.isfinite(laid).all() else None
+        result = flatten(surface, fabric=fabric, datum=datum, start=start, relax=trial_options)
+        fit = result.fit
+        area = float(fit.area.sum())
+        found.append(
+            _Measured(
+                mesh=mesh,
+                surface=surface,
+                result=result,
+                outside=fit.outside * area,
+                energy=result.layout_measures["strain_energy_j"],
+                area=area,
+            )
+        )
+    return found
+
+
+def _with_layout(cloth: Cloth, piece: _Measured) -> Cloth:
+    """Return the cloth with a piece's layout as fields, not a number elsewhere; without where seams within the piece lie open."""
+    if len(np.unique(piece.mesh.vertex_of)) < len(piece.mesh.vertex_of):
+        return cloth
+    flat = {}
+    for k in (0, 1):
+        value = np.full(len(cloth.vertices), np.nan)
+        value[piece.mesh.vertex_of] = piece.result.positions[:, k]
+        flat[f"flat {k}"] = value
+    return replace(cloth, values={**cloth.values, **flat})
+
+
+def _key(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> int:
+    """Return a number by which a piece is known while others are cut: its area and place, rounded."""
+    middle = mesh.vertices[mesh.faces].mean(axis=1).mean(axis=0)
+    return hash((len(mesh.faces), tuple(np.round(middle, 4).tolist())))
+
+
+def _side_of(mesh: PieceMesh, cloth: Cloth, anatomy: Anatomy) -> int:
+    return 1 if float((mesh.vertices @ anatomy.normal).mean()) - anatomy.offset > 0.0 else -1
+
+
+def _twin(piece: _Measured, pieces: Sequence[_Measured], anatomy: Anatomy) -> _Measured | None:
+    """Return the piece that mirrors another one; None where there is none, or it mirrors itself."""
+    if anatomy.mirror is None:
+        return None
+    middle = piece.mesh.vertices[piece.mesh.faces].mean(axis=(0, 1))
+    across = float(middle @ anatomy.normal) - anatomy.offset
+    if abs(across) < 0.04 * anatomy.size:
+        return None
+    image = middle - 2.0 * across * anatomy.normal
+    others = [one for one in pieces if one is not piece]
+    if not others:
+        return None
+    away = [float(np.linalg.norm(one.mesh.vertices[one.mesh.faces].mean(axis=(0, 1)) - image)) for one in others]
+    nearest = others[int(np.argmin(away))]
+    return nearest if min(away) < 0.06 * anatomy.size and abs(nearest.area / piece.area - 1.0) < 0.25 else None
+
+
+def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: bool) -> Iterator[_Candidate]:
+    """Yield lines that may relieve a piece: a seam across the garment through the place, and darts from the borders near it."""
+    surface, size = piece.surface, anatomy.size
+    triangles = surface.vertices[surface.faces[:, :3]]
+    facing = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    misfits = piece.result.fit.misfits
+    heights = surface.vertices @ anatomy.up
+    across = surface.vertices @ anatomy.normal - anatomy.offset
+    sleeve = "sleeve" in cloth.labels and int(np.median(cloth.labels["sleeve"][piece.mesh.face_of])) >= 0
+    whole = across.min() < -0.08 * size and across.max() > 0.08 * size
+    ahead = float((facing @ anatomy.front).sum()) > 0.0
+    if may_part and not sleeve and misfits:
+        if whole:
+            name = "centre front" if ahead else "centre back"
+            yield _Candidate(
+                name=name,
+                normal=anatomy.normal,
+                point=anatomy.offset * anatomy.normal,
+                start=None,
+                end=None,
+                parts=True,
+            )
+        tall = float(np.ptp(heights))
+        level = float(np.average(heights[[m.vertex for m in misfits]], weights=[m.area for m in misfits]))
+        if 0.2 * tall < level - heights.min() < 0.8 * tall and tall > 0.5 * size:
+            yield _Candidate(
+                name="waist" if tall > 0.8 * size else "yoke",
+                normal=anatomy.up,
+                point=level * anatomy.up,
+                start=None,
+                end=None,
+                parts=True,
+            )
+    loop = border_loops(surface.faces)[0]
+    rim = surface.vertices[loop]
+    normals = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    heard = sum(misfit.area for misfit in misfits)
+    for misfit in sorted(misfits, key=lambda one: -one.area)[:_PLACES]:
+        if misfit.area < _HEARD * heard:
+            continue
+        place = surface.vertices[misfit.vertex]
+        beside = (surface.faces[:, :3] == misfit.vertex).any(axis=1)
+        normal = normals[beside].mean(axis=0)
+        away = np.linalg.norm(rim - place, axis=1)
+        # The nearest places of the border, each in another direction.
+        nearest = list[int]()
+        open_to = np.ones(len(rim), dtype=bool)
+        directions = (rim - place) / np.maximum(away, 1e-300)[:, None]
+        while open_to.any() and len(nearest) < _STRETCHES:
+            k = int(np.where(open_to, away, np.inf).argmin())
+            nearest.append(k)
+            open_to &= directions @ directions[k] < _OTHER_WAY
+        for k in nearest:
+            length = float(away[k])
+            if not _SHORTEST * size < length < _LONGEST * size:
+                # A place at the border is reached from there: inwards by a hand.
+                continue
+            way = (place - rim[k]) / length
+            flat = np.cross(way, normal)
+            if np.linalg.norm(flat) < 0.3:
+                continue
+            yield _Candidate(
+                name="dart",
+                normal=flat / np.linalg.norm(flat),
+                point=rim[k],
+                start=rim[k],
+                end=place + _BEHIND * size * way,
+                parts=False,
+            )
+        if away.min() < _SHORTEST * size:
+            k = int(away.argmin())
+            inwards = surface.vertices[surface.faces[beside, :3]].mean(axis=(0, 1)) - rim[k]
+            middle = triangles.mean(axis=1)
+            near = np.linalg.norm(middle - rim[k], axis=1) < 0.08 * size
+            inwards = middle[near].mean(axis=0) - rim[k]
+            far = float(np.linalg.norm(inwards))
+            if far < 1e-6 * size:
+                continue
+            way = inwards / far
+            flat = np.cross(way, normal)
+            if np.linalg.norm(flat) < 0.3:
+                continue
+            for reach in (0.06, 0.11):
+                yield _Candidate(
+                    name="dart",
+                    normal=flat / np.linalg.norm(flat),
+                    point=rim[k],
+                    start=rim[k],
+                    end=rim[k] + reach * size * way,
+                    parts=False,
+                )
+
+
+def _across(candidate: _Candidate, anatomy: Anatomy) -> float:
+    return float(candidate.point @ anatomy.normal) - anatomy.offset
+
+
+def _mirrored(candidate: _Candidate, anatomy: Anatomy) -> _Candidate:
+    """Return the mirror image of a line."""
+    n, d = anatomy.normal, anatomy.offset
+
+    def image(point: FloatArray | None) -> FloatArray | None:
+        return None if point is None else point - 2.0 * (float(point @ n) - d) * n
+
+    point = image(candidate.point)
+    assert point is not None
+    normal = candidate.normal - 2.0 * float(candidate.normal @ n) * n
+    return replace(candidate, normal=normal, point=point, start=image(candidate.start), end=image(candidate.end))
+
+
+def _cut(cloth: Cloth, mesh: PieceMesh, candidate: _Candidate, name: str) -> Cloth | None:
+    """Return the cloth with a line cut in one piece; None where the line does not run as it should.
+
+    A dart begins at the border of the piece and ends inside; a seam parts the piece in two.
+    """
+    own = np.zeros(len(cloth.faces), dtype=bool)
+    own[mesh.face_of] = True
+    field = (cloth.vertices - candidate.point) @ candidate.normal
+    values = {**cloth.values, "trial": field}
+    if candidate.start is not None and candidate.end is not None:
+        way = candidate.end - candidate.start
+        along = (cloth.vertices - candidate.start) @ way / float(way @ way)
+        beside = np.linalg.norm(cloth.vertices - candidate.start - np.clip(along, 0.0, 1.0)[:, None] * way, axis=1)
+        # Cloth that lies elsewhere in the same plane, such as the other side of a tube, is not meant.
+        near = (along < 1.0) & (beside < 0.5 * float(np.linalg.norm(way)))
+        reached = _reached_within(cloth, own & near[cloth.faces].any(axis=1), candidate.start)
+        own &= reached
+    labels = {**cloth.labels, "own": own.astype(np.int64)}
+    made, positive = replace(cloth, values=values, labels=labels).split("trial", own)
+    within = made.labels["own"] > 0
+    lines = made.line_between(positive, within)
+    if len(lines) == 0:
+        return None
+    before = {tuple(edge) for edge in made.seam_edges().tolist()}
+    lines = np.array([edge for edge in lines.tolist() if tuple(edge) not in before], dtype=np.int64).reshape(-1, 2)
+    if len(lines) == 0:
+        return None
+    he = made.half_edges
+    outside = set(np.unique(he.edges[he.count == 1]).tolist()) | set(np.unique(made.seam_edges()).tolist())
+    for part in sorted(edge_components(lines), key=len, reverse=True)[:1]:
+        vertices, counts = np.unique(part, return_counts=True)
+        ends = vertices[counts == 1]
+        if (counts > 2).any() or len(ends) != 2:
+            return None
+        at_border = [int(v) in outside for v in ends]
+        inner = vertices[counts == 2]
+        if any(int(v) in outside for v in inner) or sum(at_border) != (2 if candidate.parts else 1):
+            return None
+        kept = {key: value for key, value in made.values.items() if key != "trial"}
+        marks = {key: label for key, label in made.labels.items() if key != "own"}
+        return replace(made, values=kept, labels=marks).with_seam(name, part)
+    return None
+
+
+def _reached_within(cloth: Cloth, allowed: BoolArray, start: FloatArray) -> BoolArray:
+    """Return #F, the allowed faces that hang together with the one nearest to a place."""
+    from warpflat.surface.connectivity import components
+
+    chosen = np.flatnonzero(allowed)
+    found = np.zeros(len(cloth.faces), dtype=bool)
+    if len(chosen) == 0:
+        return found
+    part = components(cloth.faces[chosen].astype(np.int32), barrier=cloth.seam_edges().astype(np.int32))
+    middle = cloth.vertices[cloth.faces[chosen]].mean(axis=1)
+    first = int(np.linalg.norm(middle - start, axis=1).argmin())
+    found[chosen[part == part[first]]] = True
+    return found
+
+
+def _mesh_at(cloth: Cloth, mesh: PieceMesh) -> PieceMesh | None:
+    """Return the piece of the cloth that lies where another one did."""
+    middle = mesh.vertices[mesh.faces].mean(axis=(0, 1))
+    meshes = list(cloth.pieces())
+    away = [float(np.linalg.norm(one.vertices[one.faces].mean(axis=(0, 1)) - middle)) for one in meshes]
+    return meshes[int(np.argmin(away))] if meshes else None
+
+
+def _length(cloth: Cloth, name: str) -> float:
+    return float(np.linalg.norm(np.diff(cloth.vertices[cloth.seams[name]], axis=1), axis=2).sum())
+
+
+def _renamed(cloth: Cloth, old: str, new: str) -> Cloth:
+    return replace(cloth, seams={new if key == old else key: edges for key, edges in cloth.seams.items()})
+
+
+def _free_name(cloth: Cloth, candidate: _Candidate, side: int) -> str:
+    """Return an unused name of a seam or a dart, with its side."""
+    from warpflat.core.text import find_unused_name
+
+    word = {1: " left", -1: " right", 0: ""}[side]
+    return find_unused_name(f"{candidate.name}{word}", cloth.seams)

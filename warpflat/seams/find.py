@@ -1,0 +1,380 @@
+"""`find_seams`: a whole garment, made by somebody else as one mesh, becomes pieces that sew up into it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, expect
+from warpflat.core.text import find_unused_name, format_count
+from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.library import as_fabric
+from warpflat.seams.anatomy import Anatomy, axis_name, describe, find_anatomy
+from warpflat.seams.cloth import Cloth, PieceMesh
+from warpflat.seams.energy import Trial, cut_by_energy
+from warpflat.seams.fields import Operators
+from warpflat.seams.options import SeamOptions
+from warpflat.seams.solid import is_panel, part_solids
+from warpflat.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word
+from warpflat.seams.thickness import without_thickness
+from warpflat.surface.connectivity import border_loops
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.lines import line_on_plane
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["GRAIN", "FoundSeam", "FoundSeams", "find_seams", "seam_words"]
+
+Ids = NDArray[np.int64]
+
+# Pieces are alike if their sizes and outlines agree within this share of the outline.
+_ALIKE = 0.01
+
+#: The line of a piece along which its grain runs.
+GRAIN = "grain"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FoundSeam:
+    """A seam that was found.
+
+    Attributes:
+        name: as "side left".
+        length: [m].
+        released: strain energy that it releases, by trial [J]; None for seams that every garment of the kind has.
+    """
+
+    name: str
+    length: float
+    released: float | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return plain data."""
+        return {"name": self.name, "length_m": self.length, "released_j": self.released}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FoundSeams:
+    """The pieces of a garment, and the seams between them.
+
+    Attributes:
+        pieces: surfaces of different names, whose borders meet vertex by vertex along the seams; the line "grain" of each runs with the
+            body, other lines name the stretches of its border.
+        seams: by name.
+        what: the garment in words.
+        up, front: the axes of space that are nearest to its own, as "+y" and "+z".
+        notes: what was chosen or left out, one sentence each, the most important first.
+    """
+
+    pieces: tuple[Surface, ...]
+    seams: tuple[FoundSeam, ...]
+    what: str
+    up: str
+    front: str
+    notes: tuple[str, ...] = ()
+
+
+def find_seams(
+    surface: Surface | Sequence[Surface],
+    options: SeamOptions | None = None,
+    *,
+    fabric: Fabric | str | None = None,
+) -> FoundSeams:
+    """Find the seams of a whole garment, and cut it there.
+
+    Seams are zero lines of smooth fields (harmonic, or screened by where the cloth faces), averaged over both sides of a symmetric garment.
+    Faces are split along them.
+
+    Args:
+        surface: one connected layer of cloth, or several of one garment.
+        options: see `SeamOptions`.
+        fabric: the cloth; with it further seams and darts are tried where it stays strained beyond its limit.
+
+    Raises:
+        InputError: an option is wrong.
+    """
+    options = options or SeamOptions()
+    options.validate()
+    layers = [surface] if isinstance(surface, Surface) else list(surface)
+    for layer in layers:
+        expect(layer, Surface, "surface", "a Surface, or a sequence of them")
+    found: list[FoundSeams] = []
+    for layer in layers:
+        found.append(_find_in_layer(layer, options, None if fabric is None else as_fabric(fabric)))
+        # All layers of a garment are worn the same way up.
+        options = replace(options, up=options.up or found[0].up, front=options.front or found[0].front)
+    often = Counter(piece.name for one in found for piece in one.pieces)
+    pieces, taken = list[Surface](), set[str]()
+    for one in found:
+        for piece in one.pieces:
+            name = piece.name if often[piece.name] == 1 else f"{one.what.split(',')[0]} {piece.name}"
+            name = find_unused_name(name, taken)
+            taken.add(name)
+            pieces.append(replace(piece, name=name))
+    return FoundSeams(
+        pieces=tuple(pieces),
+        seams=tuple(seam for one in found for seam in one.seams),
+        what="; ".join(one.what for one in found),
+        up=found[0].up,
+        front=found[0].front,
+        notes=tuple(note for one in found for note in one.notes),
+    )
+
+
+def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
+    cloth, turned = without_thickness(cloth_of(surface))
+    operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
+    notes = list[str]()
+    if anatomy.kind in TAILORED:
+        cloth, notes = cut_as_a_tailor(draw_fields(cloth, anatomy, operators), anatomy)
+    shape = anatomy.kind not in TAILORED and not is_panel(cloth)
+    cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
+    notes += more
+    for name in list(cloth.seams):
+        if options.forbids(name):
+            cloth = cloth.without_seam(name)
+    trials = list[Trial]()
+    if fabric is not None:
+        try:
+            cloth, trials, _ = cut_by_energy(
+                cloth, anatomy, fabric, options, lambda trial, mesh: _surface_of(trial, anatomy, mesh, surface)
+            )
+        except InputError as reason:
+            notes.append(f"no further seams were looked for: {reason}")
+    price = {trial.name: trial for trial in trials}
+    pieces = _as_surfaces(cloth, anatomy, surface)
+    return FoundSeams(
+        pieces=tuple(pieces),
+        seams=tuple(
+            FoundSeam(
+                name=name,
+                length=float(np.linalg.norm(np.diff(cloth.vertices[edges], axis=1), axis=2).sum()),
+                released=price[name].released if name in price else None,
+            )
+            for name, edges in cloth.seams.items()
+        ),
+        what=describe(anatomy),
+        up=axis_name(anatomy.up),
+        front=axis_name(anatomy.front),
+        notes=(*notes, *turned, *_alike(pieces), *anatomy.notes),
+    )
+
+
+def cloth_of(surface: Surface) -> Cloth:
+    """Return the cloth of a surface: its triangles, wound so that their normals point out."""
+    triangles, _ = triangulate(surface.faces)
+    faces = triangles.astype(np.int64)
+    outwards = _volume(surface.vertices, faces) >= 0.0
+    return Cloth(vertices=surface.vertices.copy(), faces=faces if outwards else faces[:, ::-1].copy())
+
+
+def _volume(vertices: FloatArray, faces: Ids) -> float:
+    """Return the volume inside of a mesh whose borders are closed by fans [m3]; negative where normals point inwards."""
+    points = vertices - vertices[np.unique(faces)].mean(axis=0)
+    a, b, c = points[faces].transpose(1, 0, 2)
+    total = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())
+    for loop in border_loops(faces.astype(np.int32)):
+        ring = points[loop]
+        following, middle = np.roll(ring, -1, axis=0), ring.mean(axis=0)
+        total += float((np.cross(following, ring) @ middle).sum())
+    return total / 6.0
+
+
+def _as_surfaces(cloth: Cloth, anatomy: Anatomy, whole: Surface) -> list[Surface]:
+    """Return the pieces as surfaces: named, with the stretches of their borders and their grain as lines."""
+    meshes = list(cloth.pieces())
+    names = _names(cloth, anatomy, meshes)
+    label = {tuple(edge): name for name, edges in cloth.seams.items() for edge in edges.tolist()}
+    role = dict[int, str]()
+    old = {vertex: border for border in anatomy.borders for vertex in border.vertices.tolist()}
+    for vertex, border in old.items():
+        role[vertex] = border.role
+    of_face = np.empty(len(cloth.faces), dtype=np.int64)
+    for number, mesh in enumerate(meshes):
+        of_face[mesh.face_of] = number
+    beside = _faces_beside(cloth)
+    made = []
+    for number, mesh in enumerate(meshes):
+        piece = _surface_of(cloth, anatomy, mesh, whole, name=names[number])
+        lines = _edge_lines(piece, mesh, number, names, label, role, of_face, beside)
+        made.append(replace(piece, lines={**lines, **piece.lines}))
+    # Repairs of the whole are told once.
+    if made and whole.notes:
+        made[0] = replace(made[0], notes=whole.notes)
+    return made
+
+
+def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface, *, name: str = "piece") -> Surface:
+    """Return a piece as a surface, with its grain."""
+    faces = np.full((len(mesh.faces), 4), -1, dtype=np.int32)
+    faces[:, :3] = mesh.faces
+    piece = Surface(
+        vertices=mesh.vertices.copy(),
+        faces=faces,
+        name=name,
+        input_vertices=mesh.vertices.copy(),
+        input_index=np.arange(len(mesh.vertices), dtype=np.int32),
+        sources=whole.sources,
+    )
+    grain = _grain(piece, cloth, mesh, anatomy)
+    return piece if grain is None else replace(piece, lines={GRAIN: grain})
+
+
+def _faces_beside(cloth: Cloth) -> Mapping[tuple[int, int], list[int]]:
+    """Return the faces at each edge of a seam."""
+    wanted = set(map(tuple, cloth.seam_edges().tolist()))
+    found: dict[tuple[int, int], list[int]] = {}
+    for k in range(3):
+        sides = np.sort(np.stack([cloth.faces[:, k], cloth.faces[:, (k + 1) % 3]], axis=1), axis=1)
+        for face, edge in enumerate(map(tuple, sides.tolist())):
+            if edge in wanted:
+                found.setdefault(edge, []).append(face)
+    return found
+
+
+def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[str]:
+    """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
+    area = cloth.face_areas
+    plain = []
+    both_sides = Counter[str]()
+    for mesh in meshes:
+        weight = area[mesh.face_of]
+        corners = cloth.faces[mesh.face_of]
+        facing = cloth.values.get(FACING, np.zeros(len(cloth.vertices)))
+        ahead = float((facing[corners].mean(axis=1) * weight).sum()) > 0.0
+        across = (cloth.vertices[corners].mean(axis=1) @ anatomy.normal - anatomy.offset) * weight
+        # Wholly on one side, or over the middle.
+        lopsided = abs(float(across.sum())) > 0.6 * float(np.abs(across).sum())
+        side = float(across.sum())
+        sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
+        if sleeve >= 0:
+            name = f"{side_word(side)}_sleeve"
+        elif anatomy.kind == "trousers":
+            name = f"{side_word(side)}_{'front' if ahead else 'back'}_leg"
+        elif anatomy.kind in ("top", "dress", "skirt", "jumpsuit"):
+            name = "front" if ahead else "back"
+            name = f"{side_word(side)}_{name}" if lopsided else name
+        elif len(meshes) == 1:
+            name = anatomy.kind if anatomy.kind not in ("other", "closed") else "piece"
+        else:
+            name = "piece"
+        plain.append(name)
+        both_sides[name] += 1
+    seen = Counter[str]()
+    names = []
+    for name in plain:
+        seen[name] += 1
+        names.append(f"{name}_{seen[name]}" if both_sides[name] > 1 else name)
+    return names
+
+
+def _alike(pieces: Sequence[Surface]) -> list[str]:
+    """Return a note on pieces that are much the same, or mirror images: a maker draws them once."""
+    measures = []
+    for piece in pieces:
+        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+        around = [piece.vertices[np.append(loop, loop[0])] for loop in border_loops(piece.faces)]
+        length = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in around)
+        axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
+        measures.append(
+            [
+                np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()),
+                length,
+                *np.ptp(piece.vertices @ axes, axis=0),
+            ]
+        )
+    left = list(range(len(pieces)))
+    notes = []
+    while left:
+        first, *others = left
+        size = measures[first][1]
+        same = [first, *(k for k in others if np.abs(np.subtract(measures[k], measures[first])).max() < _ALIKE * size)]
+        left = [k for k in left if k not in same]
+        names = [pieces[k].name for k in same]
+        if (
+            len(names) == 2
+            and names[0].split("_")[1:] == names[1].split("_")[1:]
+            and {names[0].split("_")[0], names[1].split("_")[0]} == {"left", "right"}
+        ):
+            notes.append(f"{names[0]} and {names[1]} mirror each other: cut 2, one mirrored")
+        elif len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
+            notes.append(f"{', '.join(names)} are alike: cut {len(names)}, or some of them mirrored")
+    return notes
+
+
+def _edge_lines(
+    piece: Surface,
+    mesh: PieceMesh,
+    number: int,
+    names: Sequence[str],
+    label: Mapping[tuple[int, ...], str],
+    role: Mapping[int, str],
+    of_face: Ids,
+    beside: Mapping[tuple[int, int], list[int]],
+) -> dict[str, NDArray[np.int32]]:
+    """Return the stretches of a piece's border as lines, by the seam and the piece to which each is sewn, or by its role."""
+    lines: dict[str, NDArray[np.int32]] = {}
+    for loop in border_loops(piece.faces):
+        around = loop.tolist()
+        origin = mesh.vertex_of[loop].tolist()
+        keys = []
+        for k, vertex in enumerate(origin):
+            edge = tuple(sorted((vertex, origin[(k + 1) % len(origin)])))
+            seam = label.get(edge)
+            if seam is None:
+                keys.append((role.get(edge[0], role.get(edge[1], "edge")), -1))
+            else:
+                others = [int(of_face[face]) for face in beside[edge] if of_face[face] != number]
+                keys.append((seam, others[0] if others else number))
+        starts = [k for k in range(len(keys)) if keys[k] != keys[k - 1]]
+        if not starts:
+            continue
+        for a, b in zip(starts, [*starts[1:], starts[0] + len(keys)], strict=True):
+            run = [around[k % len(around)] for k in range(a, b + 1)]
+            seam, other = keys[a]
+            plain = seam.removesuffix(" left").removesuffix(" right")
+            several = len({key[1] for key in keys if key[0] == seam}) > 1
+            title = f"{plain} {names[other].split('_')[-1]}" if several and other >= 0 else plain
+            lines[find_unused_name(title, lines)] = np.array(run, dtype=np.int32)
+    return lines
+
+
+def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> NDArray[np.int32] | None:
+    """Return the line along which a piece's grain runs: down the trunk and the leg, along a sleeve; None where there is none."""
+    sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
+    sleeves = anatomy.limbs_of("sleeve")
+    along = sleeves[sleeve].along if 0 <= sleeve < len(sleeves) else anatomy.up
+    a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    facing = normals.sum(axis=0)
+    middle = np.average((a + b + c) / 3.0, axis=0, weights=np.maximum(np.linalg.norm(normals, axis=1), 1e-300))
+    underarm = [edges for name, edges in cloth.seams.items() if name.startswith("underarm")]
+    if sleeve >= 0 and underarm:
+        # Over the arm, opposite to the seam.
+        seam = cloth.vertices[np.unique(np.concatenate(underarm))]
+        own = seam[np.linalg.norm(seam - middle, axis=1) < anatomy.size]
+        near = own[(own - middle) @ anatomy.normal * sleeves[sleeve].side > -0.3 * anatomy.size] if len(own) else own
+        if len(near):
+            facing = middle - near.mean(axis=0)
+    across = np.cross(along, facing)
+    if np.linalg.norm(across) < 0.1 * np.linalg.norm(facing) or not facing.any():
+        return None
+    try:
+        line = line_on_plane(piece, middle, across)
+    except InputError:
+        return None
+    reach = float(np.linalg.norm(piece.vertices[line[-1]] - piece.vertices[line[0]])) if len(line) > 1 else 0.0
+    if line[0] == line[-1] or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
+        return None
+    return np.asarray(line, dtype=np.int32)
+
+
+def seam_words(found: FoundSeams) -> str:
+    """Return what was found in one line."""
+    total = 100 * sum(seam.length for seam in found.seams)
+    return f"{found.what}: {format_count(len(found.pieces), 'piece')}, {format_count(len(found.seams), 'seam')} of {total:.0f} cm"

@@ -1,0 +1,88 @@
+"""The layers of a garment that was made as a whole: its connected parts, without buttons and crumbs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from os import PathLike
+
+import numpy as np
+
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import make_file_name
+from warpflat.core.text import format_count
+from warpflat.surface.io.read import POSSIBLE, check_size, read_mesh_file
+from warpflat.surface.io.usd_stage import ALL_PRIMS
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.layers import Layer, doubled_layers
+from warpflat.surface.repair.validate import make_surface, parts_of_faces
+
+__all__ = ["read_layers"]
+
+# A part is a trifle, such as a button, below this share of the area of all; a closed one below this.
+_TRIFLE, _CLOSED_TRIFLE = 0.004, 0.05
+# So many parts at most are cut, each on its own.
+_MOST_LAYERS = 40
+
+
+def read_layers(
+    path: str | PathLike[str], *, units: str | None = None, prim: str | None = None, name: str | None = None
+) -> tuple[Surface, ...]:
+    """Read a garment whose seams are to be found: each connected part is a layer, largest first; closed ones are kept.
+
+    Vertices at one place are joined, so that seams of a texture do not part the cloth. Buttons, crumbs and second layers are left out
+    with a note, as is a part that is no surface where another one is.
+
+    Args:
+        path, units: as :func:`warpflat.read_surface`.
+        prim: of a USD stage or a GLB scene; all meshes if not given.
+        name: of the layers; by default the file's stem.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim or ALL_PRIMS, name=name)
+    vertices, title = raw.vertices * scale, name or make_file_name(file.stem)
+    try:
+        part = parts_of_faces(vertices, raw.polygons, weld=True)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    found: list[Surface] = []
+    faults: list[InputError] = []
+    notes = list(raw.notes)
+    counts = np.bincount(part[part >= 0])
+    order = np.argsort(-counts, kind="stable")
+    for number in order[:_MOST_LAYERS].tolist():
+        try:
+            surface = make_surface(
+                vertices, raw.polygons[part == number], name=title, weld=True, closed=True, source=str(file)
+            )
+        except InputError as error:
+            faults.append(error)
+            continue
+        if float(np.ptp(surface.vertices, axis=0).max()) >= POSSIBLE[0] or len(order) == 1:
+            found.append(surface)
+    if not found:
+        raise faults[0] if faults else InputError(f"{file}: every part is a crumb; no cloth is left")
+    layers = [Layer(surface.vertices, surface.faces) for surface in found]
+    total = sum(layer.area for layer in layers)
+    doubled = doubled_layers(layers)
+    kept, trifles = list[Surface](), len(order) - len(found) - len(faults)
+    for number, (surface, layer) in enumerate(zip(found, layers, strict=True)):
+        if number in doubled:
+            notes.append(f"{layer.describe()} dropped: a second layer that lies on another part")
+        elif number and layer.area < (_CLOSED_TRIFLE if _is_closed(surface) else _TRIFLE) * total:
+            trifles += 1
+        else:
+            check_size(surface, file, scale)
+            kept.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
+    if trifles:
+        notes.append(f"{format_count(trifles, 'small part')}, such as buttons, left out")
+    notes += [f"a part left out: {str(fault).removeprefix(f'{file}: ')}" for fault in faults[:3]]
+    kept.sort(key=lambda surface: -Layer(surface.vertices, surface.faces).area)
+    return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
+
+
+def _is_closed(surface: Surface) -> bool:
+    from warpflat.surface.connectivity import border_of
+
+    return len(border_of(surface)) == 0

@@ -1,0 +1,374 @@
+"""Where a tailor cuts: shoulder, side, armhole, underarm, inseam, centre front and back, each the zero line of a smooth field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.seams.anatomy import Anatomy, Limb
+from warpflat.seams.cloth import Cloth, edge_components
+from warpflat.seams.fields import Operators
+
+__all__ = ["FACING", "LEFT", "TAILORED", "Fields", "cut_as_a_tailor", "draw_fields", "side_word", "tidied"]
+
+Ids = NDArray[np.int64]
+
+# Lengths are shares of the garment's size, the square root of its area.
+# Wrinkles that are shorter than some three of these do not bend a seam.
+_SMOOTH, _SCREEN = 0.035, 0.07
+# The cloth at the plane of symmetry faces to the front or the back by at least this (cosine); between, at a crotch, it does neither.
+_FACES = 0.5
+# The armhole leans outwards towards the shoulder by this [rad]: a body is wider there than at the armpit.
+_LEAN = np.radians(8.0)
+# The armhole runs outside of the armpit by this, and by more where it would not close around the sleeve.
+_OUTSIDE, _STEP, _STEPS = 0.004, 0.008, 12
+# Its length falls by no more than this over the way outwards once it runs around the sleeve.
+_STEEP = 3.0
+# Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
+_HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
+# An island of the other sign of less than this share of its part is a wrinkle.
+_ISLAND = 0.06
+
+#: Kinds of garments that a tailor knows how to cut.
+TAILORED = ("top", "dress", "skirt", "trousers", "jumpsuit")
+#: The field that is positive in front, the one that is positive on the left, and those that are positive in a sleeve.
+FACING, LEFT = "front", "left"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fields:
+    """The cloth with its fields, and the normals by which they were drawn.
+
+    Attributes:
+        cloth: with values "front", "left", and "sleeve 0" and so on.
+        sleeves: the limb of each sleeve's field.
+    """
+
+    cloth: Cloth
+    sleeves: Mapping[str, Limb]
+
+
+def side_word(side: float) -> str:
+    """Return "left" for a positive number, else "right"."""
+    return "left" if side > 0 else "right"
+
+
+def draw_fields(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> Fields:
+    """Draw the fields whose zero lines are seams, symmetric where the garment is."""
+    size, mirror = anatomy.size, anatomy.mirror
+    normal = operators.smooth(operators.vertex_normals, _SMOOTH * size)
+    facing = normal @ anatomy.front / np.maximum(np.linalg.norm(normal, axis=1), 1e-3)
+    armholes = _armhole_fields(cloth, anatomy)
+    facing = _around_limbs(facing, cloth, anatomy, operators, armholes)
+    lateral = cloth.vertices @ anatomy.normal - anatomy.offset
+    sides = {side: [limb for limb in anatomy.borders if limb.side == side] for side in (1, -1)}
+    left = lateral
+    if sides[1] and sides[-1]:
+        fixed = {side: np.concatenate([border.vertices for border in sides[side]]) for side in (1, -1)}
+        given = np.concatenate([np.full(len(fixed[1]), 1.0), np.full(len(fixed[-1]), -1.0)])
+        left = operators.solve(np.concatenate([fixed[1], fixed[-1]]), given)
+        left = left if mirror is None else mirror.symmetrised(left, -1.0)
+    # The cloth at the centre lines is wholly in front, or wholly behind.
+
+    changes = (left[cloth.faces].min(axis=1) < 0.0) & (left[cloth.faces].max(axis=1) >= 0.0)
+    centre = np.unique(cloth.faces[changes])
+    centre = centre[np.abs(facing[centre]) > _FACES]
+    front = operators.solve(centre, np.sign(facing[centre]), data=facing, length=_SCREEN * size)
+    front = front if mirror is None else mirror.symmetrised(front)
+    values = {FACING: front, LEFT: left}
+    sleeves = {}
+    for number, limb in enumerate(anatomy.limbs_of("sleeve")):
+        if number in armholes:
+            values[f"sleeve {number}"] = armholes[number]
+            sleeves[f"sleeve {number}"] = limb
+    return Fields(cloth=replace(cloth, values=values), sleeves=sleeves)
+
+
+def _around_limbs(
+    facing: FloatArray, cloth: Cloth, anatomy: Anatomy, operators: Operators, armholes: Mapping[int, FloatArray]
+) -> FloatArray:
+    """Return how far vertices face to the front; along sleeves and legs by their place around the axis, which wrinkles do not turn."""
+    made = facing.copy()
+    sleeves = anatomy.limbs_of("sleeve")
+    regions = [(limb, armholes[number]) for number, limb in enumerate(sleeves) if number in armholes]
+    regions += [(limb, (limb.fork - cloth.vertices) @ anatomy.up) for limb in anatomy.limbs_of("leg")]
+    for limb, beyond in regions:
+        rim = anatomy.borders[limb.border].vertices
+        own = _reached(cloth.faces, beyond > 0.0, rim)
+        others = np.flatnonzero(~own)
+        if len(others) == 0 or own.sum() < 30:
+            continue
+        along = operators.solve(
+            np.concatenate([rim, others]), np.concatenate([np.ones(len(rim)), np.zeros(len(others))])
+        )
+        # The middle of each of some rings, as a smooth curve.
+        count = int(np.clip(own.sum() // 40, 4, 24))
+        order = np.flatnonzero(own)[np.argsort(along[own], kind="stable")]
+        mass = operators.mass[order]
+        ring = np.minimum((np.cumsum(mass) / mass.sum() * count).astype(np.int64), count - 1)
+        total = np.maximum(np.bincount(ring, mass, minlength=count), 1e-300)
+        at = np.bincount(ring, mass * along[order], minlength=count) / total
+        middle = np.stack(
+            [np.bincount(ring, mass * x, minlength=count) / total for x in cloth.vertices[order].T], axis=1
+        )
+        degree = min(4, count - 1)
+        curve = np.polynomial.polynomial.polyfit(at, middle, degree)
+        tangent = np.polynomial.polynomial.polyder(curve)
+        t = np.clip(along[own], at.min(), at.max())
+        way = np.polynomial.polynomial.polyval(t, tangent).T
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        off = cloth.vertices[own] - np.polynomial.polynomial.polyval(t, curve).T
+        off -= np.einsum("ij,ij->i", off, way)[:, None] * way
+        place = off @ anatomy.front / np.maximum(np.linalg.norm(off, axis=1), 1e-300)
+        weight = np.clip(4.0 * along[own], 0.0, 1.0)
+        made[own] = (1.0 - weight) * facing[own] + weight * place
+    return made
+
+
+def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
+    """Return for each sleeve, by its number, how far vertices are outside of its armhole [m]: negative in the trunk.
+
+    The armhole lies in a plane that faces between the side and the sleeve's direction, and leans outwards to the shoulder. It begins at
+    the armpit and moves outwards as long as its length falls fast: there it still runs along the trunk.
+    """
+    found: dict[int, tuple[FloatArray, float]] = {}
+    limbs, size = anatomy.limbs_of("sleeve"), anatomy.size
+    for number, limb in enumerate(limbs):
+        fork, along = limb.fork, limb.along
+        for _ in range(2):
+            direction = _facing_of_armhole(anatomy, limb, along)
+            outside = _outside(cloth, anatomy, limb, (cloth.vertices - fork) @ direction)
+            if outside is None:
+                break
+            offset, middle = outside
+            found[number] = direction, float(fork @ direction) + offset
+            way = anatomy.borders[limb.border].middle - middle
+            if np.linalg.norm(way) < 0.05 * size:
+                break
+            along = way / np.linalg.norm(way)
+    for number, limb in enumerate(limbs):
+        mate = next((k for k, other in enumerate(limbs) if other.side == -limb.side), None)
+        if limb.side > 0 and mate is not None and {number, mate} <= found.keys() and anatomy.mirror is not None:
+            # Both planes become the mean of one and the mirror image of the other, if these are much the same.
+            (one, at), (other, there) = found[number], found[mate]
+            normal = anatomy.normal
+            image = other - 2.0 * (other @ normal) * normal
+            shift = there - 2.0 * anatomy.offset * float(other @ normal)
+            rim = anatomy.borders[limb.border].middle
+            if abs((rim @ one - at) - (rim @ image - shift)) < 0.08 * size and one @ image > np.cos(np.radians(25.0)):
+                length = float(np.linalg.norm(one + image))
+                both, level = (one + image) / length, (at + shift) / length
+                found[number] = both, level
+                found[mate] = both - 2.0 * (both @ normal) * normal, level - 2.0 * anatomy.offset * float(both @ normal)
+    return {number: cloth.vertices @ direction - at for number, (direction, at) in found.items()}
+
+
+def _facing_of_armhole(anatomy: Anatomy, limb: Limb, along: FloatArray) -> FloatArray:
+    """Return the normal of an armhole's plane: half way from the side to the sleeve, and not far below the level."""
+    outwards, up = limb.side * anatomy.normal, anatomy.up
+    outwards = outwards - (outwards @ up) * up
+    outwards /= np.linalg.norm(outwards)
+    rise = 0.5 * np.arctan2(float(along @ up), max(float(along @ outwards), 1e-3))
+    angle = np.clip(rise, _HANGS, _RAISED) - _LEAN
+    return np.asarray(np.cos(angle) * outwards + np.sin(angle) * up)
+
+
+def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> tuple[float, FloatArray] | None:
+    """Return how far outside of a plane through the armpit the armhole lies [m], and the middle of its loop; None if there is none."""
+    rim = anatomy.borders[limb.border].vertices
+    others = np.concatenate([b.vertices for k, b in enumerate(anatomy.borders) if k != limb.border] or [rim[:0]])
+    step = _STEP * anatomy.size
+    lengths, middles, offsets = list[float](), list[FloatArray](), list[float]()
+    for number in range(60):
+        offset = _OUTSIDE * anatomy.size + number * step
+        beyond = _reached(cloth.faces, height > offset, rim)
+        if offset >= height[rim].min():
+            break
+        if not beyond[rim].all() or beyond[others].any():
+            lengths, middles, offsets = [], [], []
+            continue
+        length, middle = _section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))
+        lengths.append(length)
+        middles.append(middle)
+        offsets.append(offset)
+        if len(lengths) > 3 and all(lengths[-4 + k] - lengths[-2 + k] < _STEEP * 2.0 * step for k in (0, 1)):
+            return offsets[-4], middles[-4]
+    return (offsets[0], middles[0]) if offsets else None
+
+
+def _section(cloth: Cloth, f: FloatArray, within: BoolArray) -> tuple[float, FloatArray]:
+    """Return length [m] and middle of the zero line of a field within some faces."""
+    faces = cloth.faces[within]
+    faces = faces[(f[faces].min(axis=1) < 0.0) & (f[faces].max(axis=1) >= 0.0)]
+    ends = []
+    for k in range(3):
+        a, b = faces[:, k], faces[:, (k + 1) % 3]
+        t = np.clip(f[a] / np.where(f[a] == f[b], 1.0, f[a] - f[b]), 0.0, 1.0)[:, None]
+        cross = (f[a] >= 0.0) != (f[b] >= 0.0)
+        ends.append(np.where(cross[:, None], (1.0 - t) * cloth.vertices[a] + t * cloth.vertices[b], np.nan))
+    points = np.stack(ends, axis=1)
+    low, high = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
+    steps = np.linalg.norm(high - low, axis=1)
+    total = max(float(steps.sum()), 1e-300)
+    return float(steps.sum()), (np.nanmean(points, axis=1) * steps[:, None]).sum(axis=0) / total
+
+
+def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]:
+    """Return the cloth cut where a tailor would cut it, and notes.
+
+    Its faces have the label "sleeve": the number of the sleeve, or -1.
+    """
+    cloth, notes = fields.cloth, list[str]()
+    cloth = replace(cloth, labels={**cloth.labels, "sleeve": np.full(len(cloth.faces), -1, dtype=np.int64)})
+    for number, (name, limb) in enumerate(fields.sleeves.items()):
+        cut = _cut_armhole(cloth, anatomy, name, limb, number)
+        if cut is None:
+            notes.append(
+                f"no line around the {side_word(limb.side)} sleeve was found: it is cut in one with the front and back"
+            )
+        else:
+            cloth = cut
+    kind = anatomy.kind
+    if kind in ("trousers", "jumpsuit"):
+        everywhere = cloth.labels["sleeve"] < 0
+        cloth = tidied(cloth, LEFT, everywhere)
+        cloth, is_left = cloth.split(LEFT, cloth.labels["sleeve"] < 0)
+        edges = cloth.line_between(is_left, cloth.labels["sleeve"] < 0)
+        ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
+        for name, chosen in (("centre front", ahead), ("centre back", ~ahead)):
+            if chosen.any():
+                cloth = cloth.with_seam(name, edges[chosen])
+    cloth = tidied(cloth, FACING, cloth.labels["sleeve"] < 0)
+    for number in range(len(fields.sleeves)):
+        cloth = tidied(cloth, FACING, cloth.labels["sleeve"] == number)
+    cloth, ahead = cloth.split(FACING, np.ones(len(cloth.faces), dtype=bool))
+    trunk = cloth.labels["sleeve"] < 0
+    armpits = [float(limb.fork @ anatomy.up) for limb in fields.sleeves.values()]
+    upper = _upper(anatomy)
+    crotch = next((limb.fork for limb in anatomy.limbs_of("leg")), None)
+    lines = cloth.line_between(ahead, trunk)
+    on_left = cloth.values[LEFT][lines].mean(axis=1) > 0.0
+    ends: list[tuple[str, Ids]] = []
+    for leftwards in (True, False):
+        parts = edge_components(lines[on_left == leftwards])
+        near = (
+            [float(np.linalg.norm(cloth.vertices[part.ravel()] - crotch, axis=1).min()) for part in parts]
+            if crotch is not None
+            else []
+        )
+        for k, part in enumerate(parts):
+            heights = cloth.vertices[part.ravel()] @ anatomy.up
+            if near and k == int(np.argmin(near)) and len(parts) > 1:
+                word = "inseam"
+            elif heights.min() > min(armpits) + 0.02 * anatomy.size if armpits else heights.mean() > upper:
+                word = "shoulder"
+            else:
+                word = "side"
+            name = f"{word} {side_word(1.0 if leftwards else -1.0)}"
+            cloth = cloth.with_seam(name, part)
+            ends.append((word, part))
+    low = np.unique(
+        np.concatenate([part.ravel() for word, part in ends if word in ("side", "inseam")] or [np.empty(0, np.int64)])
+    )
+    for number, limb in enumerate(fields.sleeves.values()):
+        if number not in cloth.labels["sleeve"]:
+            continue
+        cloth = _open_sleeve(cloth, ahead, number, limb, low, anatomy)
+    return cloth, notes
+
+
+def _upper(anatomy: Anatomy) -> float:
+    """Return the height above which a line is a shoulder where there are no sleeves: the middle of the armholes."""
+    own = [border.middle @ anatomy.up for border in anatomy.borders if border.role == "sleeve"]
+    return float(np.mean(own)) if own else float("inf")
+
+
+def _cut_armhole(cloth: Cloth, anatomy: Anatomy, name: str, limb: Limb, number: int) -> Cloth | None:
+    """Return the cloth with an armhole cut: the first line outside of the armpit that closes around the sleeve; None if none does."""
+    rim = anatomy.borders[limb.border].vertices
+    base = cloth.values[name]
+    for step in range(_STEPS):
+        field = base - 0.006 * step * anatomy.size
+        trial = replace(cloth, values={**cloth.values, name: field})
+        trial = tidied(trial, name, np.ones(len(trial.faces), dtype=bool), keep=_ISLAND / 20)
+        # Only the part beyond the line that holds the sleeve's end is the sleeve.
+        beyond = trial.values[name] > 0.0
+        part = _reached(trial.faces, beyond, rim)
+        if not part[rim].all():
+            continue
+        within = np.asarray(part[trial.faces].any(axis=1))
+        trial, positive = trial.split(name, within)
+        grown = np.zeros(len(trial.vertices), dtype=bool)
+        grown[: len(part)] = part
+        sleeve = positive & grown[trial.faces].any(axis=1)
+        loops = trial.borders(sleeve)
+        if len(loops) != 2:
+            continue
+        labels = dict(trial.labels)
+        labels["sleeve"] = np.where(sleeve, number, labels["sleeve"])
+        trial = replace(trial, labels=labels)
+        edges = trial.line_between(sleeve, np.ones(len(trial.faces), dtype=bool))
+        return trial.with_seam(f"armhole {side_word(limb.side)}", edges)
+    return None
+
+
+def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: Ids, anatomy: Anatomy) -> Cloth:
+    """Return the cloth with a sleeve opened along the line that goes on from the side seam."""
+    own = cloth.labels["sleeve"] == number
+    name = f"underarm {side_word(limb.side)}"
+    armhole = np.unique(cloth.seams[f"armhole {side_word(limb.side)}"])
+    rim_edges = cloth.half_edges
+    border = np.unique(rim_edges.edges[rim_edges.count == 1])
+    for part in edge_components(cloth.line_between(ahead, own)):
+        touches = np.unique(part)
+        if np.isin(touches, armhole).any() and np.isin(touches, low).any() and np.isin(touches, border).any():
+            return cloth.with_seam(name, part)
+    return cloth
+
+
+def _reached(faces: Ids, allowed: BoolArray, seeds: Ids) -> BoolArray:
+    """Return #V, the vertices that are reached from seeds along edges between allowed ones."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    passable = allowed[a] & allowed[b]
+    graph = coo_array((np.ones(passable.sum()), (a[passable], b[passable])), shape=(len(allowed),) * 2)
+    _, label = connected_components(graph, directed=False)
+    found = np.isin(label, label[seeds[allowed[seeds]]]) & allowed
+    return np.asarray(found)
+
+
+def tidied(cloth: Cloth, level: str, within: BoolArray, *, keep: float = _ISLAND) -> Cloth:
+    """Return the cloth with islands of the other sign removed from a field: parts of a few per cent of what they lie in.
+
+    Args:
+        cloth: with the field.
+        level: its name.
+        within: #F, the faces in which islands are looked for.
+        keep: share of the area from which a part is no island.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    f, faces = cloth.values[level], cloth.faces[within]
+    if len(faces) == 0:
+        return cloth
+    mass = np.bincount(faces.ravel(), np.repeat(cloth.face_areas[within], 3), minlength=len(f)) / 3.0
+    used = mass > 0.0
+    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    same = (f[a] > 0.0) == (f[b] > 0.0)
+    graph = coo_array((np.ones(same.sum()), (a[same], b[same])), shape=(len(f),) * 2)
+    _, label = connected_components(graph, directed=False)
+    area = np.bincount(label, mass)
+    small = used & (area[label] < keep * mass.sum())
+    if not small.any():
+        return cloth
+    scale = 1e-2 * float(np.abs(f[used]).max())
+    made = f.copy()
+    made[small] = np.where(f[small] > 0.0, -1.0, 1.0) * np.minimum(np.abs(f[small]), scale)
+    return replace(cloth, values={**cloth.values, level: made})
