@@ -70,11 +70,35 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
-        tables.append(_seam_table(metrics["seams"]))
+        columns = ("seam", "sides", "mm", "mm", "ease", "difference", "price")
+        seams = [
+            (
+                seam["name"],
+                " = ".join(seam["sides"]),
+                *(f"{length:.1f}" for length in seam["length_mm"]),
+                f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
+                # Without the sign of a negative zero.
+                f"{round(seam['difference_mm'], 2) + 0.0:+.2f} mm",
+                _price(seam["price_j"]),
+            )
+            for seam in metrics["seams"]
+        ]
+        tables.append(_aligned(columns, seams, left=(0, 1)))
     if metrics.get("constraints"):
-        tables.append(_constraint_table(metrics["constraints"]))
+        held = [
+            (each["name"], f"{each['amiss_mm']:.2f} mm", _price(each["price_j"])) for each in metrics["constraints"]
+        ]
+        tables.append(_aligned(("constraint", "amiss", "price"), held))
     if metrics.get("girths"):
-        tables.append(_girth_line(metrics["girths"]))
+        # Of the pattern with darts and seams closed, the ease got and wanted.
+        parts = []
+        for level, girth in metrics["girths"].items():
+            wanted = f" of {100 * girth['ease_wanted_m']:+.1f}" if "ease_wanted_m" in girth else ""
+            parts.append(
+                f"{level} {100 * girth['body_m']:.1f} / {100 * girth['form_m']:.1f} / {100 * girth['pattern_m']:.1f} "
+                f"({100 * girth['ease_m']:+.1f}{wanted})"
+            )
+        tables.append(f"girths [cm], body / form / pattern (ease): {'; '.join(parts)}")
     if metrics.get("rings"):
         from warpflat.garment.rings import rings_line
 
@@ -82,55 +106,46 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
 
 
-def _girth_line(girths: Mapping[str, Mapping[str, float]]) -> str:
-    """Return the line of girths: of the body and of the pattern with darts and seams closed, the ease got and wanted."""
-    parts = []
-    for level, girth in girths.items():
-        wanted = f" of {100 * girth['ease_wanted_m']:+.1f}" if "ease_wanted_m" in girth else ""
-        parts.append(
-            f"{level} {100 * girth['body_m']:.1f} / {100 * girth['form_m']:.1f} / {100 * girth['pattern_m']:.1f} "
-            f"({100 * girth['ease_m']:+.1f}{wanted})"
-        )
-    return f"girths [cm], body / form / pattern (ease): {'; '.join(parts)}"
-
-
-def _seam_table(seams: Iterable[Mapping[str, Any]]) -> str:
-    head = ("seam", "sides", "mm", "mm", "ease", "difference", "price")
-    rows = [
-        (
-            seam["name"],
-            " = ".join(seam["sides"]),
-            *(f"{length:.1f}" for length in seam["length_mm"]),
-            f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
-            f"{_rounded(seam['difference_mm'], 2):+.2f} mm",
-            _price(seam["price_j"]),
-        )
-        for seam in seams
-    ]
-    return _aligned(head, rows, left=(0, 1))
-
-
-def _constraint_table(constraints: Iterable[Mapping[str, Any]]) -> str:
-    rows = [(held["name"], f"{held['amiss_mm']:.2f} mm", _price(held["price_j"])) for held in constraints]
-    return _aligned(("constraint", "amiss", "price"), rows)
-
-
 def _price(joules: float | None) -> str:
     return "" if joules is None else energy_words(joules, 3)
 
 
-def _rounded(value: float, digits: int) -> float:
-    """Return a rounded number without the sign of a negative zero."""
-    return round(value, digits) + 0.0
-
-
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
     """Return a line for each fault of a piece, of every size: not converged, flipped faces, overlap; and for a missing pattern."""
-    given_up = metrics.get("sewing", {}).get("contradictory", False)
-    lines = [
-        line for name, piece in metrics["pieces"].items() for line in _piece_warnings(name, piece, given_up=given_up)
-    ]
-    lines += [*_sewing_warnings(metrics), *_drape_warnings(metrics)]
+    lines, sewing = list[str](), metrics.get("sewing", {})
+    for name, piece in metrics["pieces"].items():
+        if not _converged(piece):
+            last = piece["stages"][-1]
+            asked = sewing.get("contradictory", False) and last["name"] == "sew"
+            remedy = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
+            # The work that `max_steps` limits: steps of the piece's mesh, or work units where coarser levels add to them.
+            steps, units = last["steps"], last["work_units"]
+            work = f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
+            # Crushed faces make forces infinite; then the strain energy says how far from rest it has ended.
+            if last["residual"] is None or not math.isfinite(last["residual"]):
+                remainder = f"strain energy {energy_words(last['strain_energy_j'], 3)}"
+            else:
+                remainder = f"residual {last['residual']:.1e}"
+            lines.append(f"{name} did not converge within {work} ({remainder}); the pattern is not final: {remedy}")
+        if piece["flipped_faces"]:
+            lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
+        if piece.get("overlap_m2"):
+            area = 1e6 * piece["overlap_m2"]
+            lines.append(f"{name} lies over itself by {area:.3g} mm2; the pattern cannot be cut as it is")
+    if not sewing.get("converged", True):
+        amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
+        amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]
+        lines += [
+            f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
+            for name, by in amiss
+            if by > _WARNED_MISS
+        ]
+    drape = metrics.get("drape", {"converged": True})
+    if not drape["converged"]:
+        left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
+        fallen = drape["distance_m"]["mean"] > _FALLEN
+        remedy = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
+        lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {remedy} in [drape]")
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
     lines += [
@@ -139,44 +154,6 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         if f"not_{done}" in metrics.get(what, {})
     ]
     return lines
-
-
-def _piece_warnings(name: str, piece: Mapping[str, Any], *, given_up: bool) -> list[str]:
-    lines, last = [], piece["stages"][-1]
-    if not _converged(piece):
-        asked = given_up and last["name"] == "sew"
-        way_out = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
-        lines.append(
-            f"{name} did not converge within {_work_words(last)} ({_remainder_words(last)}); the pattern is not final: {way_out}"
-        )
-    if piece["flipped_faces"]:
-        lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
-    if piece.get("overlap_m2"):
-        area = 1e6 * piece["overlap_m2"]
-        lines.append(f"{name} lies over itself by {area:.3g} mm2; the pattern cannot be cut as it is")
-    return lines
-
-
-def _sewing_warnings(metrics: Mapping[str, Any]) -> list[str]:
-    if metrics.get("sewing", {}).get("converged", True):
-        return []
-    amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
-    amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]
-    return [
-        f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
-        for name, by in amiss
-        if by > _WARNED_MISS
-    ]
-
-
-def _drape_warnings(metrics: Mapping[str, Any]) -> list[str]:
-    drape = metrics.get("drape", {"converged": True})
-    if drape["converged"]:
-        return []
-    left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
-    fallen = drape["distance_m"]["mean"] > _FALLEN
-    way_out = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
-    return [f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {way_out} in [drape]"]
 
 
 def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
@@ -318,7 +295,12 @@ def fabric_sheet(fabric: Fabric) -> str:
             continue
         origin = fabric.provenance.get(key, Provenance(source="default"))
         number = sources.setdefault(origin.source, f"[{len(sources) + 1}]")
-        value = _value_words(fabric, key, origin)
+        given = getattr(fabric, key)
+        value = f"{len(given)} points" if key.startswith("curve_") else f"{given:.6g}"
+        if origin.at_least:
+            value = f">= {value}"
+        if origin.spread is not None:
+            value += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
         rows.append((key, value, _UNITS.get(key, ""), origin.test_load or "-", origin.grade or "-", number))
     parts = [f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name]
     if fabric.aliases:
@@ -334,17 +316,6 @@ def fabric_sheet(fabric: Fabric) -> str:
     return "\n".join(parts)
 
 
-def _value_words(fabric: Fabric, key: str, origin: Provenance) -> str:
-    """Return a value as text: a curve as its number of points, a lower bound with >=, its spread in brackets."""
-    value = getattr(fabric, key)
-    words = f"{len(value)} points" if key.startswith("curve_") else f"{value:.6g}"
-    if origin.at_least:
-        words = f">= {words}"
-    if origin.spread is not None:
-        words += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
-    return words
-
-
 def fabric_data(fabric: Fabric) -> dict[str, Any]:
     """Return a fabric as plain data: its values, and the origin of each under `provenance`."""
     data = {field.name: getattr(fabric, field.name) for field in fields(fabric) if field.name != "provenance"}
@@ -353,20 +324,6 @@ def fabric_data(fabric: Fabric) -> dict[str, Any]:
 
 def _converged(piece: Mapping[str, Any]) -> bool:
     return all(stage["converged"] for stage in piece["stages"][-1:])
-
-
-def _work_words(stage: Mapping[str, Any]) -> str:
-    """Return the work of a stage, which `max_steps` limits: steps of the piece's mesh, or work units where coarser levels add to them."""
-    steps, units = stage["steps"], stage["work_units"]
-    return f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
-
-
-def _remainder_words(stage: Mapping[str, Any]) -> str:
-    """Return how far from rest a stage has ended: its residual, or its strain energy where crushed faces make forces infinite."""
-    residual = stage["residual"]
-    if residual is None or not math.isfinite(residual):
-        return f"strain energy {energy_words(stage['strain_energy_j'], 3)}"
-    return f"residual {residual:.1e}"
 
 
 def _estimate_sign(fabric: Fabric, key: str) -> str:
