@@ -95,7 +95,7 @@ def test_a_dent_is_pushed_out_smoothly_and_negative_ease_is_not() -> None:
     dented = body.vertices.copy()
     dented[row[2], 2] -= 0.002
     out = push_outside(dented, layout, body.vertices, used)
-    assert np.linalg.norm(BodySurface(layout, body.vertices).ways_out(out[used]), axis=1).max() < 0.0001
+    assert np.linalg.norm(BodySurface(layout, body.vertices).vectors_out(out[used]), axis=1).max() < 0.0001
     pushed = np.linalg.norm(out - dented, axis=1)
     assert pushed.argmax() == row[2]
     # Neighbours follow, less and less.

@@ -33,59 +33,45 @@ def write_body_picture(path: str | os.PathLike[str], patterns: Sequence[BodyPatt
     axes = figure.subplots(rows, len(BODY_GIRTHS), squeeze=False)
     for place, name in zip(axes, measures, strict=False):
         for ax, level in zip(place, BODY_GIRTHS, strict=True):
-            _draw_measure(ax, patterns, name, level)
+            unit, one = MEASURES[name]
+            kinds: dict[tuple[str, str], list[BodyPattern]] = {}
+            for pattern in patterns:
+                if name in pattern.measures:
+                    kinds.setdefault((pattern.row.task.scene, pattern.row.task.fabric), []).append(pattern)
+            several = len({scene for scene, _ in kinds}) > 1
+            for number, ((scene, fabric), members) in enumerate(kinds.items()):
+                x = np.array([pattern.girths[level] for pattern in members])
+                y = np.array([pattern.measures[name] for pattern in members])
+                colour = f"C{number % 10}"
+                trend = fit_trend(x, y)
+                label = f"{scene}, {fabric}" if several else fabric
+                if trend is not None:
+                    ends = np.array([x.min(), x.max()])
+                    ax.plot(100 * ends, (trend.slope * ends + trend.offset) / one, color=colour, linewidth=1)
+                    label += f": {trend.slope / one / 100:+.2g} {unit}/cm, R² {trend.determination:.2f}"
+                ax.scatter(100 * x, y / one, s=14, color=colour, label=label)
+            ax.set_xlabel(f"{level} [cm]")
+            ax.set_ylabel(f"{_WORDS[name]} [{unit.replace('cm2', 'cm²')}]")
+            _finish(ax)
     if graded:
         for ax, level in zip(axes[-1], BODY_GIRTHS, strict=True):
-            _draw_ease(ax, graded, level)
+            members = [pattern for pattern in graded if level in pattern.graded_ease and level in pattern.ease]
+            if not members:
+                ax.set_visible(False)
+                continue
+            x = np.array([100 * pattern.girths[level] for pattern in members])
+            made = [100 * p.ease[level] for p in members]
+            ax.scatter(x, made, s=18, facecolors="none", edgecolors=_GREY, label="made to measure")
+            for pays, colour, label in ((False, _GOOD, "nearest size"), (True, _BAD, "nearest size, fails")):
+                chosen = [(at, p) for at, p in zip(x, members, strict=True) if p.pays == pays]
+                if chosen:
+                    eases = [100 * p.graded_ease[level] for _, p in chosen]
+                    ax.scatter([at for at, _ in chosen], eases, s=14, color=colour, label=label)
+            ax.axhline(0.0, color=_INK, linewidth=0.6)
+            ax.set_xlabel(f"{level} [cm]")
+            ax.set_ylabel(f"ease at {level} [cm]")
+            _finish(ax)
     write_figure(path, figure)
-
-
-def _draw_measure(ax: Axes, patterns: Sequence[BodyPattern], name: str, level: str) -> None:
-    unit, one = MEASURES[name]
-    kinds: dict[tuple[str, str], list[BodyPattern]] = {}
-    for pattern in patterns:
-        if name in pattern.measures:
-            kinds.setdefault((pattern.row.task.scene, pattern.row.task.fabric), []).append(pattern)
-    several = len({scene for scene, _ in kinds}) > 1
-    for number, ((scene, fabric), members) in enumerate(kinds.items()):
-        x = np.array([pattern.girths[level] for pattern in members])
-        y = np.array([pattern.measures[name] for pattern in members])
-        colour = f"C{number % 10}"
-        trend = fit_trend(x, y)
-        label = f"{scene}, {fabric}" if several else fabric
-        if trend is not None:
-            ends = np.array([x.min(), x.max()])
-            ax.plot(100 * ends, (trend.slope * ends + trend.offset) / one, color=colour, linewidth=1)
-            label += f": {trend.slope / one / 100:+.2g} {unit}/cm, R² {trend.determination:.2f}"
-        ax.scatter(100 * x, y / one, s=14, color=colour, label=label)
-    ax.set_xlabel(f"{level} [cm]")
-    ax.set_ylabel(f"{_WORDS[name]} [{unit.replace('cm2', 'cm²')}]")
-    _finish(ax)
-
-
-def _draw_ease(ax: Axes, graded: Sequence[BodyPattern], level: str) -> None:
-    members = [pattern for pattern in graded if level in pattern.graded_ease and level in pattern.ease]
-    if not members:
-        ax.set_visible(False)
-        return
-    x = np.array([100 * pattern.girths[level] for pattern in members])
-    ax.scatter(
-        x, [100 * p.ease[level] for p in members], s=18, facecolors="none", edgecolors=_GREY, label="made to measure"
-    )
-    for pays, colour, label in ((False, _GOOD, "nearest size"), (True, _BAD, "nearest size, fails")):
-        chosen = [(at, p) for at, p in zip(x, members, strict=True) if p.pays == pays]
-        if chosen:
-            ax.scatter(
-                [at for at, _ in chosen],
-                [100 * p.graded_ease[level] for _, p in chosen],
-                s=14,
-                color=colour,
-                label=label,
-            )
-    ax.axhline(0.0, color=_INK, linewidth=0.6)
-    ax.set_xlabel(f"{level} [cm]")
-    ax.set_ylabel(f"ease at {level} [cm]")
-    _finish(ax)
 
 
 def _finish(ax: Axes) -> None:

@@ -7,7 +7,6 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -71,8 +70,7 @@ class BodyPattern:
     @property
     def misfit(self) -> dict[str, float]:
         """Ease of the nearest size's pattern less that of its own, by level [m]; negative where the size is tighter."""
-        own = self.ease
-        return {level: ease - own[level] for level, ease in self.graded_ease.items() if level in own}
+        return {level: ease - self.ease[level] for level, ease in self.graded_ease.items() if level in self.ease}
 
     @property
     def graded_strain(self) -> float:
@@ -124,27 +122,23 @@ def _read(row: Row, out: Path) -> BodyPattern | None:
         return None
     body = row.task.data.get("mannequin") or {}
     pieces = list(metrics["pieces"].values())
-    return BodyPattern(
-        row=row,
-        is_size=not {"scan", "measurements"} & {key for key, value in body.items() if value},
-        girths=girths,
-        measures=_measures(metrics, pieces),
-        pattern_girths={level: value for level, value in row.girths_m.items() if level in girths},
-        strain_limit=min((piece["wear"]["strain_limit"] for piece in pieces if piece.get("wear")), default=0.0),
-    )
-
-
-def _measures(metrics: Mapping[str, Any], pieces: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    found = {
+    measures = {
         "area": sum(piece["area_m2"] for piece in pieces),
         "strain_energy": sum(piece["strain_energy_j"] for piece in pieces),
     }
     if darts := [dart["intake_m"] for piece in pieces for dart in piece.get("darts", ())]:
-        found["dart_intake"] = sum(darts)
+        measures["dart_intake"] = sum(darts)
     sides = [seam for seam in metrics.get("seams", ()) if "side" in seam["name"] and "left" in seam["name"]]
     if sides:
-        found["side_seam"] = 1e-3 * sum(seam["length_mm"][0] for seam in sides)
-    return found
+        measures["side_seam"] = 1e-3 * sum(seam["length_mm"][0] for seam in sides)
+    return BodyPattern(
+        row=row,
+        is_size=not {"scan", "measurements"} & {key for key, value in body.items() if value},
+        girths=girths,
+        measures=measures,
+        pattern_girths={level: value for level, value in row.girths_m.items() if level in girths},
+        strain_limit=min((piece["wear"]["strain_limit"] for piece in pieces if piece.get("wear")), default=0.0),
+    )
 
 
 def compare_with_sizes(patterns: Sequence[BodyPattern]) -> list[BodyPattern]:

@@ -67,7 +67,20 @@ class BatchIndex:
             InputError: they cannot be written.
         """
         rows = self.rows
-        texts = {"index.csv": _table(rows), "index.html": _page(rows, bodies=bodies)}
+        levels, table = _levels(rows), io.StringIO()
+        writer = csv.writer(table)
+        head = ["key", "status", "scene", "body", "fabric", "override", "strain_energy_j", "fits"]
+        writer.writerow([*head, *(f"{level}_m" for level in levels), "seconds", "memory_mb", "message"])
+        for row in rows:
+            task = row.task
+            writer.writerow(
+                [
+                    *(task.key, row.status, task.scene, task.body, task.fabric, task.override),
+                    *(row.strain_energy_j, _FITS[row.fits], *(row.girths_m.get(level) for level in levels)),
+                    *(row.seconds, row.memory_mb, row.message),
+                ]
+            )
+        texts = {"index.csv": table.getvalue(), "index.html": _page(rows, bodies=bodies)}
         with output_folder(self._out, [*texts, "batch.json"], guard=True) as folder:
             for name, text in texts.items():
                 with atomic_path(folder / name) as temporary:
@@ -82,29 +95,18 @@ def _levels(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(level for row in rows for level in row.girths_m))
 
 
-def _table(rows: Sequence[Row]) -> str:
-    levels, text = _levels(rows), io.StringIO()
-    writer = csv.writer(text)
-    head = ["key", "status", "scene", "body", "fabric", "override", "strain_energy_j", "fits"]
-    writer.writerow([*head, *(f"{level}_m" for level in levels), "seconds", "memory_mb", "message"])
-    for row in rows:
-        task = row.task
-        writer.writerow(
-            [
-                *(task.key, row.status, task.scene, task.body, task.fabric, task.override),
-                *(row.strain_energy_j, _FITS[row.fits], *(row.girths_m.get(level) for level in levels)),
-                *(row.seconds, row.memory_mb, row.message),
-            ]
-        )
-    return text.getvalue()
-
-
 def _page(rows: Sequence[Row], *, bodies: bool) -> str:
     levels = _levels(rows)
+    statuses = [f'<span class="{_COLOURS.get(row.status, "")}">{row.status}</span>' for row in rows]
+    pictures = []
+    for row in rows:
+        key, target = row.task.key, "review.html" if "review.html" in row.files else ""
+        shown = f'<img loading="lazy" alt="{key}" src="{key}/picture.png">' if "picture.png" in row.files else key
+        pictures.append(f'<a href="{key}/{target}">{shown}</a>' if row.files else key)
     columns = [
-        _column("", [row.task.key for row in rows], [_picture(row) for row in rows]),
+        _column("", [row.task.key for row in rows], pictures),
         *(_column(name, [str(getattr(row.task, name)) for row in rows]) for name in _NAMES),
-        _column("status", [row.status for row in rows], [_status(row) for row in rows]),
+        _column("status", [row.status for row in rows], statuses),
         _numbers("strain energy [mJ]", [row.strain_energy_j for row in rows], 1e3, ".4g"),
         _column("fits", [_FITS[row.fits] for row in rows]),
         *(_numbers(f"{level} [cm]", [row.girths_m.get(level) for row in rows], 100.0, ".1f") for level in levels),
@@ -114,13 +116,13 @@ def _page(rows: Sequence[Row], *, bodies: bool) -> str:
     head, *lines = zip(*filter(None, columns), strict=True)
     body = "\n".join(f"<tr>{''.join(cells)}</tr>" for cells in lines)
     counts = {status: sum(row.status == status for row in rows) for status in (*_COLOURS, TO_DO)}
-    told = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
+    totals = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
     style = resources.files("warpflat.review").joinpath("data", "page.css").read_text(encoding="utf-8")
     script = resources.files("warpflat.batch").joinpath("data", "sort.js").read_text(encoding="utf-8")
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>warpflat batch</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}{_STYLE}</style></head>'
-        f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(told)}. '
+        f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(totals)}. '
         "Girths are of the pattern. A click on a heading sorts.</p>"
         f'<div class="scroll"><table><thead><tr>{"".join(head)}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
         f"{_BODIES if bodies else ''}</main>"
@@ -136,7 +138,7 @@ def _column(name: str, values: Sequence[str], shown: Sequence[str] | None = None
     kind = f"text {name}".strip()
     return [
         f'<th class="text">{name}</th>',
-        *(f'<td class="{kind}" data-value="{escape(value)}">{words}</td>' for value, words in cells),
+        *(f'<td class="{kind}" data-value="{escape(value)}">{text}</td>' for value, text in cells),
     ]
 
 
@@ -146,16 +148,3 @@ def _numbers(name: str, values: Sequence[float | None], unit: float, form: str) 
         return []
     cells = ['data-value="">' if value is None else f'data-value="{value!r}">{unit * value:{form}}' for value in values]
     return [f"<th>{escape(name)}</th>", *(f"<td {cell}</td>" for cell in cells)]
-
-
-def _picture(row: Row) -> str:
-    key = row.task.key
-    if not row.files:
-        return key
-    target = "review.html" if "review.html" in row.files else ""
-    shown = f'<img loading="lazy" alt="{key}" src="{key}/picture.png">' if "picture.png" in row.files else key
-    return f'<a href="{key}/{target}">{shown}</a>'
-
-
-def _status(row: Row) -> str:
-    return f'<span class="{_COLOURS.get(row.status, "")}">{row.status}</span>'

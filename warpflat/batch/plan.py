@@ -21,7 +21,6 @@ from warpflat.core.text import quote_value
 from warpflat.core.toml_file import Table, check_table, read_toml
 from warpflat.mannequin.table import MannequinTable
 from warpflat.scene.load import Scene, errors_named, expand_variables, make_scene
-from warpflat.scene.schema import SceneTable
 
 __all__ = ["BatchTable", "BodyTable", "Task", "TaskTable", "load_batch"]
 
@@ -149,14 +148,14 @@ def load_batch(path: str | Path) -> list[Task]:
     table = check_table(BatchTable, data, str(path))
     if table.count > _MOST_TASKS:
         raise InputError(f"{path}: has {table.count:,} tasks; a batch has at most {_MOST_TASKS:,}: make several of it")
-    read = functools.lru_cache(maxsize=None)(_read_scene)
+    read = functools.lru_cache(maxsize=None)(lambda file: _with_absolute_paths(read_toml(file), file.parent))
     digest = functools.lru_cache(maxsize=None)(
         lambda file: file_digest(file, "named", missing="cannot be read: no such file")
     )
     tasks: dict[str, Task] = {}
-    told = table.overrides is None or len(table.overrides) > 1  # one for all tells none apart
+    differ = table.overrides is None or len(table.overrides) > 1  # one for all tells none apart
     for entry in table.all_tasks():
-        task = _make_task(entry, path, read, digest, override=_label(entry.override) if told else "")
+        task = _make_task(entry, path, read, digest, override=_label(entry.override) if differ else "")
         tasks.setdefault(task.key, task)
     return list(tasks.values())
 
@@ -171,8 +170,8 @@ def _make_task(
 ) -> Task:
     folder = path.parent.absolute()
     source = entry.scene if entry.scene is not None else str(entry.form)
-    words = [source, "" if entry.body is None else entry.body.label, entry.fabric or "", override]
-    where = f"{path}: {', '.join(filter(None, words))}"
+    parts = [source, "" if entry.body is None else entry.body.label, entry.fabric or "", override]
+    where = f"{path}: {', '.join(filter(None, parts))}"
     with errors_named(where):
         if entry.scene is not None:
             file = folder / expand_variables(entry.scene)
@@ -182,41 +181,35 @@ def _make_task(
         if entry.body is not None:
             kept = {"resolution_mm"} & _table(data, "mannequin").keys()
             body = {key: _table(data, "mannequin")[key] for key in kept} | entry.body.as_mannequin()
-            data = data | {"mannequin": _absolute(body, "scan", folder)}
+            if body.get("scan"):
+                body["scan"] = _path(body["scan"], folder)
+            data = data | {"mannequin": body}
         if entry.fabric is not None:
             data = data | {"fabric": entry.fabric}
         data = _merge(data, _with_absolute_paths(entry.override, folder))
         scene = make_scene(data, name=name, folder=folder, where=where)
         settings = scene.settings
+        # The key is a hash of the version, the resolved scene, and the contents of the files that it names. Digests stand
+        # for paths: a file that is moved leaves the key as it is, a file that changes does not.
+        named = _map_paths(settings.model_dump(mode="json"), lambda file: digest(Path(file)))
+        text = json.dumps([__version__, scene.name, named], sort_keys=True)
+        if entry.body is not None:
+            label = entry.body.label
+        elif settings.mannequin is None:
+            label = ""
+        else:
+            scan = settings.mannequin.scan
+            label = settings.mannequin.size_name if scan is None else Path(scan).stem
         return Task(
-            key=_key(scene, data, digest),
+            key=hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS],
             name=name,
             scene=scene.name,
-            body=_body_label(entry, settings),
+            body=label,
             fabric=settings.fabric if isinstance(settings.fabric, str) else "own",
             override=override,
             data=data,
             where=where,
         )
-
-
-def _body_label(entry: TaskTable, settings: SceneTable) -> str:
-    if entry.body is not None:
-        return entry.body.label
-    own = settings.mannequin
-    return "" if own is None else own.size_name if own.scan is None else Path(own.scan).stem
-
-
-def _key(scene: Scene, data: Mapping[str, Any], digest: Callable[[Path], str]) -> str:
-    """Return the hash of the version, the resolved scene, and the contents of the files that it names."""
-    # Digests stand for paths: a file that is moved leaves the key as it is, a file that changes does not.
-    named = _map_paths(scene.settings.model_dump(mode="json"), lambda file: digest(Path(file)))
-    text = json.dumps([__version__, scene.name, named], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS]
-
-
-def _read_scene(file: Path) -> dict[str, Any]:
-    return _with_absolute_paths(read_toml(file), file.parent)
 
 
 def _with_absolute_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -237,10 +230,6 @@ def _map_paths(data: Mapping[str, Any], change: Callable[[str], str]) -> dict[st
     if isinstance(found.get("fabric_files"), list):
         found["fabric_files"] = [change(file) if isinstance(file, str) else file for file in found["fabric_files"]]
     return found
-
-
-def _absolute(table: Mapping[str, Any], key: str, folder: Path) -> dict[str, Any]:
-    return {**table, key: _path(table[key], folder)} if table.get(key) else dict(table)
 
 
 def _path(file: str, folder: Path) -> str:

@@ -72,24 +72,18 @@ def run_batch(
         raise
     finally:
         index.write()
-    _write_bodies(index, folder)
+    patterns = read_body_patterns(index.rows, folder)
+    if len({tuple(pattern.girths.values()) for pattern in patterns}) > 1:
+        from warpflat.batch.body_picture import write_body_picture
+
+        with output_folder(folder, ["bodies.csv", "bodies.png"], guard=True):
+            with atomic_path(folder / "bodies.csv") as temporary:
+                temporary.write_text(bodies_table(patterns), encoding="utf-8", newline="")
+            drawn = list[str]()
+            with optional_file(folder / "bodies.png", drawn) as path:
+                write_body_picture(path, patterns)
+            index.write(bodies=bool(drawn))
     return index.rows
-
-
-def _write_bodies(index: BatchIndex, out: Path) -> None:
-    """Write `bodies.csv` and `bodies.png` if the batch has several bodies."""
-    patterns = read_body_patterns(index.rows, out)
-    if len({tuple(pattern.girths.values()) for pattern in patterns}) < 2:
-        return
-    from warpflat.batch.body_picture import write_body_picture
-
-    with output_folder(out, ["bodies.csv", "bodies.png"], guard=True):
-        with atomic_path(out / "bodies.csv") as temporary:
-            temporary.write_text(bodies_table(patterns), encoding="utf-8", newline="")
-        drawn = list[str]()
-        with optional_file(out / "bodies.png", drawn) as path:
-            write_body_picture(path, patterns)
-        index.write(bodies=bool(drawn))
 
 
 def _results(

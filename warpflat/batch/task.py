@@ -86,29 +86,25 @@ def run_task(task: Task, out: Path) -> Row:
             return set_aside(task, out)
         _note_start(task, out)
         try:
-            return _run(task, out)
+            from warpflat.scene.run import run_scene
+
+            begin, folder = time.perf_counter(), out / task.key
+            try:
+                with output_folder(folder, ["task.json"], guard=True):
+                    run_scene(task.make_scene(), folder)
+                    spent = {"seconds": time.perf_counter() - begin, "memory_mb": _peak_memory()}
+                    write_sealed(folder / "task.json", {**_names(task), "scene": task.data, **spent})
+            except NotOursError as error:
+                raise NotOursError(f"{error}; the task is tried again once all of {folder} is moved away") from error
+            except InputError as error:
+                _write_error(task, out, ERROR, str(error))
+            except Exception as error:  # a fault of the program in one task does not end the others
+                _write_error(task, out, ERROR, f"{type(error).__name__}: {error}", traceback.format_exc())
+            return read_row(task, out) or Row(task=task)
         finally:
             forget_starts(task, out)
     except NotOursError as error:  # once that is moved away, the task is tried again
         return Row(task=task, status=ERROR, message=str(error))
-
-
-def _run(task: Task, out: Path) -> Row:
-    from warpflat.scene.run import run_scene
-
-    begin, folder = time.perf_counter(), out / task.key
-    try:
-        with output_folder(folder, ["task.json"], guard=True):
-            run_scene(task.make_scene(), folder)
-            own = {"scene": task.data, "seconds": time.perf_counter() - begin, "memory_mb": _peak_memory()}
-            write_sealed(folder / "task.json", {**_names(task), **own})
-    except NotOursError as error:
-        raise NotOursError(f"{error}; the task is tried again once all of {folder} is moved away") from error
-    except InputError as error:
-        _write_error(task, out, ERROR, str(error))
-    except Exception as error:  # a fault of the program in one task does not end the others
-        _write_error(task, out, ERROR, f"{type(error).__name__}: {error}", traceback.format_exc())
-    return read_row(task, out) or Row(task=task)
 
 
 def has_killed(task: Task, out: Path) -> bool:
@@ -186,31 +182,29 @@ def read_row(task: Task, out: Path) -> Row | None:
     if folder.is_symlink():
         return None
     with suppress(Exception):  # others may have changed it in any way
-        metrics, own = read_result(folder / "metrics.json"), read_result(folder / "task.json")
-        return _row_of_run(task, metrics, own, frozenset(os.listdir(folder)))
+        metrics, record = read_result(folder / "metrics.json"), read_result(folder / "task.json")
+        pieces = list(metrics["pieces"].values())
+        wear = metrics.get("wear") or pieces[0].get("wear") or {}
+        fits = metrics.get("drape", wear).get("fits")
+        if fits not in (None, True, False):
+            raise ValueError(fits)
+        return Row(
+            task=task,
+            status=AT_REST if _is_at_rest(metrics) else NOT_AT_REST,
+            strain_energy_j=sum(_number(piece["strain_energy_j"]) for piece in pieces),
+            fits=fits,
+            girths_m={
+                one_line(level): _number(girth["pattern_m"]) for level, girth in metrics.get("girths", {}).items()
+            },
+            seconds=_number(record["seconds"]),
+            memory_mb=None if record["memory_mb"] is None else _number(record["memory_mb"]),
+            files=frozenset(os.listdir(folder)),
+        )
     with suppress(Exception):
         error = read_result(error_file(task, out))
         if error["status"] in (ERROR, SET_ASIDE):
             return Row(task=task, status=error["status"], message=one_line(error["message"]) or "without a word")
     return None
-
-
-def _row_of_run(task: Task, metrics: Mapping[str, Any], own: Mapping[str, Any], files: frozenset[str]) -> Row:
-    pieces = list(metrics["pieces"].values())
-    wear = metrics.get("wear") or pieces[0].get("wear") or {}
-    fits = metrics.get("drape", wear).get("fits")
-    if fits not in (None, True, False):
-        raise ValueError(fits)
-    return Row(
-        task=task,
-        status=AT_REST if _is_at_rest(metrics) else NOT_AT_REST,
-        strain_energy_j=sum(_number(piece["strain_energy_j"]) for piece in pieces),
-        fits=fits,
-        girths_m={one_line(level): _number(girth["pattern_m"]) for level, girth in metrics.get("girths", {}).items()},
-        seconds=_number(own["seconds"]),
-        memory_mb=None if own["memory_mb"] is None else _number(own["memory_mb"]),
-        files=files,
-    )
 
 
 def _number(value: Any) -> float:

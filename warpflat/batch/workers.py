@@ -150,27 +150,24 @@ def _run_round(client: Client, todo: dict[str, Task], out: Path) -> Iterator[Row
             yield row
 
 
-def _start_warp() -> None:
-    """Start Warp without its greeting; what it says on standard error is no error of the task."""
-    import warp
-
-    from warpflat.core.compile import start_warp
-    from warpflat.core.native_output import native_errors
-
-    warp.config.log_level = warp.LOG_ERROR
-    with native_errors():
-        start_warp()
-
-
 def _work(task: Task, out: Path, version: str) -> Row:
     """Run a task on a worker.
 
     Raises:
         InputError: the worker does not see `out`, has another version, or cannot write the result.
     """
+    # The libraries read these when they are imported.
     for name, value in _ONE_THREAD.items():
         os.environ.setdefault(name, value)
-    _start_warp()
+    import warp
+
+    from warpflat.core.compile import start_warp
+    from warpflat.core.native_output import native_errors
+
+    # Warp starts without its greeting; what it says on standard error is no error of the task.
+    warp.config.log_level = warp.LOG_ERROR
+    with native_errors():
+        start_warp()
     if version != __version__:
         raise InputError(f"a worker on {platform.node()} has warpflat {__version__}, not {version}: install the same")
     if not out.is_dir():

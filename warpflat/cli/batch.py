@@ -5,14 +5,11 @@ from __future__ import annotations
 import sys
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand
-
-if TYPE_CHECKING:
-    from warpflat.batch.task import Row
 
 __all__ = ["batch"]
 
@@ -52,8 +49,10 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     """
     from warpflat.batch.plan import load_batch
     from warpflat.batch.run import run_batch
+    from warpflat.batch.task import NOT_AT_REST
     from warpflat.cli.run import start_warp_silently
     from warpflat.core.errors import InputError
+    from warpflat.core.text import one_line
 
     tasks = load_batch(file)
     if find_spec("distributed") is None:
@@ -73,13 +72,6 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
             on_progress=bar.show,
             on_note=lambda note: None if quiet else bar.note(note),
         )
-    return _report(rows, folder, quiet=quiet)
-
-
-def _report(rows: list[Row], folder: Path, *, quiet: bool) -> int:
-    from warpflat.batch.task import NOT_AT_REST
-    from warpflat.core.text import one_line
-
     failed = [row for row in rows if row.message]
     for row in failed[:_MOST_ERRORS]:
         click.echo(f"warpflat: {one_line(f'{row.task.key}: {row.message}')}", err=True)
@@ -89,13 +81,13 @@ def _report(rows: list[Row], folder: Path, *, quiet: bool) -> int:
     for row in rows:
         counts[row.status] = counts.get(row.status, 0) + 1
     if not quiet:
-        told = ", ".join(f"{count} {status}" for status, count in counts.items())
-        click.echo(f"{len(rows)} tasks: {told}; see {folder / 'index.html'}")
+        totals = ", ".join(f"{count} {status}" for status, count in counts.items())
+        click.echo(f"{len(rows)} tasks: {totals}; see {folder / 'index.html'}")
     return NOT_CONVERGED if failed or NOT_AT_REST in counts else DONE
 
 
-def _note(words: str) -> None:
-    click.echo(f"warpflat: note: {words}", err=True)
+def _note(text: str) -> None:
+    click.echo(f"warpflat: note: {text}", err=True)
 
 
 class _Bar:
@@ -124,8 +116,8 @@ class _Bar:
         elif self._bar is not None:
             self._bar.update(done - self._bar.n)
 
-    def note(self, words: str) -> None:
+    def note(self, text: str) -> None:
         """Print a note above the bar."""
         if self._bar is not None:
             self._bar.clear()
-        _note(words)
+        _note(text)

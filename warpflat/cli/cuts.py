@@ -114,11 +114,11 @@ def cuts(
     return DONE if result is None else report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
 
 
-def _write_toml(folder: Path, words: str, tables: Sequence[str]) -> None:
+def _write_toml(folder: Path, heading: str, tables: Sequence[str]) -> None:
     from warpflat.core.output import atomic_path
 
     with atomic_path(folder / "cuts.toml") as temporary:
-        temporary.write_text("\n".join([f"# {words}\n", *tables]), encoding="utf-8")
+        temporary.write_text("\n".join([f"# {heading}\n", *tables]), encoding="utf-8")
 
 
 def _edit(

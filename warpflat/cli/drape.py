@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, RUN_FILES, ComputingCommand, output_options
 from warpflat.cli.run import run_and_report, start_warp_silently
-
-if TYPE_CHECKING:
-    from warpflat.scene.run import SceneResult
 
 __all__ = ["drape"]
 
@@ -63,6 +59,7 @@ def drape(
     """
     from dataclasses import replace
 
+    from warpflat.cli.tables import drape_lines, warnings_of
     from warpflat.core.errors import InputError
     from warpflat.scene.load import load_scene
     from warpflat.scene.outside_pattern import OutsideJob, drape_outside, edge_table, is_pattern_file
@@ -78,7 +75,19 @@ def drape(
         job = OutsideJob.read(scene, sewing=seams, body=body)
         folder = out if out is not None else Path("out") / f"{job.name}-draped"
         result = drape_outside(job, folder, fabric=fabric, size=size, device=device)
-        return _report(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
+        warnings = warnings_of(result.metrics)
+        # What was left out has a line of its own at the end.
+        notes = [note for note in result.notes if note not in result.metrics.get("notes", ())]
+        for line in (*([] if quiet or as_json else notes), *warnings):
+            click.echo(f"warpflat: {line}", err=True)
+        if as_json:
+            click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
+        elif not quiet:
+            lines = drape_lines(result.metrics)
+            for line in lines if verbose else lines[:6]:
+                click.echo(line)
+            click.echo(f"files: {folder}: {', '.join(result.files)}")
+        return NOT_CONVERGED if warnings else DONE
     options = {"--body": body, "--fabric": fabric, "--seams": seams, "--size": size, "--edges": edges or None}
     for option, value in options.items():
         if value is not None:
@@ -93,22 +102,3 @@ def drape(
         table = table.model_copy(update={"correct": True})
     loaded = replace(loaded, settings=loaded.settings.model_copy(update={"drape": table}))
     return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
-
-
-def _report(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as_json: bool) -> int:
-    """Print what the drape of a pattern has found, and return the exit code."""
-    from warpflat.cli.tables import drape_lines, warnings_of
-
-    warnings = warnings_of(result.metrics)
-    # What was left out has a line of its own at the end.
-    notes = [note for note in result.notes if note not in result.metrics.get("notes", ())]
-    for line in (*([] if quiet or as_json else notes), *warnings):
-        click.echo(f"warpflat: {line}", err=True)
-    if as_json:
-        click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
-    elif not quiet:
-        lines = drape_lines(result.metrics)
-        for line in lines if verbose else lines[:6]:
-            click.echo(line)
-        click.echo(f"files: {folder}: {', '.join(result.files)}")
-    return NOT_CONVERGED if warnings else DONE

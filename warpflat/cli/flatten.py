@@ -153,16 +153,12 @@ def flatten(
         tables["cuts"] = [{"name": "opening", "from": int(start), "to": int(end)}]
     elif opening is not None:
         tables["cuts"] = [{"line": opening.rstrip("/").rpartition("/")[2]}]
-    scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
+    # "Ärmel (1).obj" gives files "Armel_1".
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-") or "piece"
+    scene = make_scene(tables, name=name, folder=Path(), where="command line")
     try:
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
     except InputError as error:
-        told = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
+        message = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
         # What is said of no option is about the mesh.
-        raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", told)) from None
-
-
-def _safe_name(mesh: Path) -> str:
-    """Return a name for a piece and its files from the file's name: "Ärmel (1).obj" gives "Armel_1"."""
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-")
-    return name or "piece"
+        raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", message)) from None

@@ -94,7 +94,11 @@ for _command in (run, flatten, batch, drape, mannequin, compare, fabrics, cuts, 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
-    _open_stderr()
+    # Standard error that is closed opens on the null device, so that no file takes its number.
+    if not _is_open(sys.stderr):
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open as long as the process)
+        if sys.stderr.fileno() != 2:
+            os.dup2(sys.stderr.fileno(), 2)
     try:
         source_date()
         code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
@@ -115,7 +119,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return DONE
     except Exception as error:
         if isinstance(error, MemoryError | RuntimeError | ImportError | OSError) and is_out_of_memory(error):
-            return _fail(f"not enough memory: {_memory_words(error)}; use a coarser mesh, or give it more memory")
+            reasons = ", ".join(filter(None, [str(error) or "no more is to be had", memory_limit()]))
+            return _fail(f"not enough memory: {reasons}; use a coarser mesh, or give it more memory")
         if not isinstance(error, OSError):
             return report_internal_error(error, sys.argv[1:] if arguments is None else arguments)
         reason = system_reason(error)
@@ -123,14 +128,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _discard_output()
             return _fail(f"cannot write to standard output: {reason}")
         return _fail(f"cannot read or write {error.filename or 'a temporary file'}: {reason}")
-
-
-def _open_stderr() -> None:
-    """Open standard error on the null device if it is closed, so that no file takes its number."""
-    if not _is_open(sys.stderr):
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open as long as the process)
-        if sys.stderr.fileno() != 2:
-            os.dup2(sys.stderr.fileno(), 2)
 
 
 def _is_open(stream: TextIO | None) -> bool:
@@ -156,14 +153,10 @@ def _discard_output() -> None:
 
 
 def _report_signal(code: int) -> int:
-    words = signal_message(code)
-    if words is not None:
-        click.echo(words, err=True)
+    message = signal_message(code)
+    if message is not None:
+        click.echo(message, err=True)
     return code
-
-
-def _memory_words(error: BaseException) -> str:
-    return ", ".join(filter(None, [str(error) or "no more is to be had", memory_limit()]))
 
 
 def _fail(message: str) -> int:

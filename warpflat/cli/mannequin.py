@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,17 @@ def mannequin(
 
     require_memory_for_usd()  # mannequin.usdc is always written
     tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}
-    _check_body(tables, size=size, measures=measures, landmarks=landmarks)
+    scan = tables.get("scan")
+    if (scan is None) == (size is None and not measures):
+        raise InputError(
+            "command line: give the body in one way: --size or --measure, or both, which replaces some of the size's; or --scan"
+        )
+    of_scan = [f"--{key.replace('_', '-')}" for key in tables if key not in ("scan", "table")]
+    of_scan += ["--landmark"] if landmarks else []
+    if scan is None and of_scan:
+        raise InputError(f"command line: {of_scan[0]} is about a --scan; leave it out")
+    if scan is not None and "table" in tables:
+        raise InputError("command line: --table completes measurements; a scan has its own: leave it out")
     if tables.pop("keep_sides", False):
         tables["symmetric"] = False
     if size is not None:
@@ -89,45 +99,21 @@ def mannequin(
     return DONE
 
 
-def _check_body(
-    options: Mapping[str, Any], *, size: str | None, measures: Sequence[str], landmarks: Sequence[str]
-) -> None:
-    """Check that the body is given in one way, without options of another one."""
-    scan = options.get("scan")
-    if (scan is None) == (size is None and not measures):
-        raise InputError(
-            "command line: give the body in one way: --size or --measure, or both, which replaces some of the size's; or --scan"
-        )
-    of_scan = [f"--{key.replace('_', '-')}" for key in options if key not in ("scan", "table")] + ["--landmark"] * bool(
-        landmarks
-    )
-    if scan is None and of_scan:
-        raise InputError(f"command line: {of_scan[0]} is about a --scan; leave it out")
-    if scan is not None and "table" in options:
-        raise InputError("command line: --table completes measurements; a scan has its own: leave it out")
-
-
 def _lengths(texts: Sequence[str], option: str) -> dict[str, float]:
     """Return the lengths of all NAME=METRES, each name once."""
     found: dict[str, float] = {}
     for text in texts:
-        name, value = _metres(text, option)
+        name, equals, value = (part.strip() for part in text.partition("="))
+        try:
+            metres = float(value)
+        except ValueError:
+            metres = math.nan
+        if not math.isfinite(metres):
+            shown = f"{name}=0.88" if equals else "bust=0.88"
+            raise InputError(f"command line: {option} {text!r} is not NAME=METRES, such as {shown}")
         if name in found:
             raise InputError(
-                f"command line: {option} {name} is given twice, {found[name]:g} and {value:g}; give it once"
+                f"command line: {option} {name} is given twice, {found[name]:g} and {metres:g}; give it once"
             )
-        found[name] = value
+        found[name] = metres
     return found
-
-
-def _metres(text: str, option: str) -> tuple[str, float]:
-    """Split NAME=METRES."""
-    name, equals, value = text.partition("=")
-    try:
-        metres = float(value)
-    except ValueError:
-        metres = math.nan
-    if not math.isfinite(metres):
-        shown = f"{name.strip()}=0.88" if equals else "bust=0.88"
-        raise InputError(f"command line: {option} {text!r} is not NAME=METRES, such as {shown}")
-    return name.strip(), metres

@@ -83,8 +83,8 @@ def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool,
     warnings = warnings_of(result.metrics)
     if not (quiet or as_json):
         # What was left out has a line of its own at the end.
-        told = {*warnings, *result.metrics.get("notes", ())}
-        notes = [note for note in result.notes if note not in told]
+        printed = {*warnings, *result.metrics.get("notes", ())}
+        notes = [note for note in result.notes if note not in printed]
         for line in [f"note: {note}" for note in notes] if verbose else filter(None, [notes_line(notes)]):
             click.echo(f"warpflat: {line}", err=True)
     for warning in warnings:

@@ -59,9 +59,9 @@ def end_at_once(code: int | None = None) -> None:
     """
 
     def end(number: int, _: object) -> None:
-        words = signal_message(128 + number) if code is None else None
-        if words is not None:
-            os.write(2, f"{words}\n".encode())
+        message = signal_message(128 + number) if code is None else None
+        if message is not None:
+            os.write(2, f"{message}\n".encode())
         os._exit(128 + number if code is None else code)
 
     for number in _ours():

@@ -31,11 +31,31 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         files: their names.
         folder: where they lie.
     """
-    lines = [_pieces_line(metrics["pieces"])]
-    if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
+    pieces = metrics["pieces"]
+    unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
+    flips = sum(piece["flipped_faces"] for piece in pieces.values())
+    parts = [
+        f"{sum(piece['vertices'] for piece in pieces.values()):,} vertices",
+        "converged" if not unfinished else f"NOT converged: {_some(unfinished)}",
+        *([format_count(flips, "flipped face")] if flips else []),
+        f"length within {100 * max(piece['length_error'] for piece in pieces.values()):.3g} %",
+        f"area within {100 * max(piece['area_error'] for piece in pieces.values()):.3g} %",
+        f"energy {energy_words(sum(piece['strain_energy_j'] for piece in pieces.values()))}",
+    ]
+    lines = [_clipped(f"pieces: {len(pieces)}; {', '.join(parts)}")]
+    if relaxed := relaxation_words(piece["stages"] for piece in pieces.values()):
         lines.append(f"relaxed: {relaxed}")
     if girths := metrics.get("girths"):
-        lines.append(_girths_line(girths))
+        # The girths of the pattern, each with the ease that it has, and the one wanted where that is another.
+        by_level: dict[str, str] = {}
+        for level, girth in girths.items():
+            got, wanted = (f"{100 * girth.get(key, girth['ease_m']):+.1f}" for key in ("ease_m", "ease_wanted_m"))
+            of = "" if got == wanted else f" of {wanted}"
+            by_level[level] = f"{level} {100 * girth['pattern_m']:.1f} ({got}{of})"
+        first = [level for level in girths if level in _MAIN_GIRTHS]
+        then = [level for level in girths if level not in first and "ease_wanted_m" in girths[level]]
+        rest = [level for level in girths if level not in (*first, *then)]
+        lines.append(_listed("girths [cm] (ease): ", [by_level[level] for level in (*first, *then, *rest)]))
     wearer = metrics.get("wear", {}).get("wearer")
     if wearer:
         lines.append(_clipped(wearer_words(wearer, draped="drape" in metrics)))
@@ -43,15 +63,37 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         head = "lies on the form" if wearer else "lies on the surface"
     else:
         head = "lies on the form" if wearer else "fit"
-    lines += _fit_lines(metrics["pieces"], head)
-    if metrics.get("seams") or metrics.get("constraints"):
-        lines.append(_seams_line(metrics.get("seams", ()), metrics.get("constraints", ())))
+    lines += _fit_lines(pieces, head)
+    seams, constraints = metrics.get("seams", ()), metrics.get("constraints", ())
+    if seams or constraints:
+        parts = []
+        if seams:
+            parts.append(f"{len(seams)}, sides equal within {_within(max(abs(s['difference_mm']) for s in seams))}")
+        if eased := [f"{seam['name']} {100 * seam['ease']:+.3g} %" for seam in seams if seam["ease"]]:
+            parts.append(f"eased: {_some(eased)}")
+        if constraints:
+            amiss = _within(max(held["amiss_mm"] for held in constraints))
+            parts.append(f"{format_count(len(constraints), 'constraint')} within {amiss}")
+        lines.append(_clipped(f"seams: {'; '.join(parts)}"))
     if metrics.get("rings"):
         lines.append(_clipped(rings_line(metrics["rings"])))
     if len(metrics.get("cloths", ())) > 1:
-        lines.append(_cloths_line(metrics["cloths"]))
+        # What is cut from each of several cloths.
+        parts = [
+            f"{cloth['name']}: " + ", ".join(f"{piece['title']} {piece['quantity']}" for piece in cloth["pieces"])
+            for cloth in metrics["cloths"]
+        ]
+        lines.append(_clipped(f"cut from {'; '.join(parts)}"))
     if "drape" in metrics:
-        lines.append(_drape_line(metrics["drape"]))
+        drape = metrics["drape"]
+        mean, misfit = 1e3 * drape["distance_m"]["mean"], drape["misfit_m"]
+        parts = [
+            f"fits: {'yes' if drape['fits'] else 'no'}; worn {mean:.1f} mm from the {drape['compared_with']}",
+            f"misfit {1e3 * misfit['mean']:.1f} mm",
+            f"at most {1e3 * misfit['max']:.1f} mm",
+        ]
+        places = [place["words"] for place in drape["places"][:1]]
+        lines.append(_clipped(f"drape: {'; '.join([', '.join(parts), *places])}"))
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
     return [*lines, _listed(f"files: {folder}: ", ordered)]
 
@@ -73,42 +115,6 @@ def notes_line(notes: Sequence[str]) -> str:
     return f"note: {parts[0]}{rest}" + ("; -v lists them" if rest else "") if parts else ""
 
 
-def _pieces_line(pieces: Mapping[str, Mapping[str, Any]]) -> str:
-    unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
-    flips = sum(piece["flipped_faces"] for piece in pieces.values())
-    parts = [
-        f"{sum(piece['vertices'] for piece in pieces.values()):,} vertices",
-        "converged" if not unfinished else f"NOT converged: {_some(unfinished)}",
-        *([format_count(flips, "flipped face")] if flips else []),
-        f"length within {100 * max(piece['length_error'] for piece in pieces.values()):.3g} %",
-        f"area within {100 * max(piece['area_error'] for piece in pieces.values()):.3g} %",
-        f"energy {energy_words(sum(piece['strain_energy_j'] for piece in pieces.values()))}",
-    ]
-    return _clipped(f"pieces: {len(pieces)}; {', '.join(parts)}")
-
-
-def _cloths_line(cloths: Sequence[Mapping[str, Any]]) -> str:
-    """Return what is cut from each cloth."""
-    parts = [
-        f"{cloth['name']}: " + ", ".join(f"{piece['title']} {piece['quantity']}" for piece in cloth["pieces"])
-        for cloth in cloths
-    ]
-    return _clipped(f"cut from {'; '.join(parts)}")
-
-
-def _girths_line(girths: Mapping[str, Mapping[str, float]]) -> str:
-    """Return the girths of the pattern, each with the ease that it has, and the one wanted where that is another."""
-    parts: dict[str, str] = {}
-    for level, girth in girths.items():
-        got, wanted = (f"{100 * girth.get(key, girth['ease_m']):+.1f}" for key in ("ease_m", "ease_wanted_m"))
-        of = "" if got == wanted else f" of {wanted}"
-        parts[level] = f"{level} {100 * girth['pattern_m']:.1f} ({got}{of})"
-    first = [level for level in parts if level in _MAIN_GIRTHS]
-    then = [level for level in parts if level not in first and "ease_wanted_m" in girths[level]]
-    rest = [level for level in parts if level not in (*first, *then)]
-    return _listed("girths [cm] (ease): ", [parts[level] for level in (*first, *then, *rest)])
-
-
 def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str) -> list[str]:
     """Return whether all pieces fit, with their ranges or the worst place, and the best advice where one does not."""
     worn = {name: piece for name, piece in pieces.items() if piece.get("wear")}
@@ -117,7 +123,15 @@ def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str) -> list[str]:
     all_of_it = garment_wear(worn)
     beyond = f"{100 * all_of_it['outside']:.1f} % beyond the limit"
     if all_of_it["fits"]:
-        return [_clipped(f"{head}: yes; {beyond}; {', '.join(_ranges([piece['wear'] for piece in worn.values()]))}")]
+        # The strains along both threads, 5 to 95 % of each piece's cloth, and the highest pressure.
+        wears, ranges = [piece["wear"] for piece in worn.values()], []
+        for thread in ("warp", "weft"):
+            low = 100 * min(wear[f"strain_{thread}"]["p05"] for wear in wears)
+            high = 100 * max(wear[f"strain_{thread}"]["p95"] for wear in wears)
+            ranges.append(f"{thread} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} %")
+        highest = max(wear["pressure"]["max"] for wear in wears)
+        ranges += [f"at most {highest:,.0f} Pa"] if highest >= 1.0 else []
+        return [_clipped(f"{head}: yes; {beyond}; {', '.join(ranges)}")]
     worst = max(
         (name for name in worn if not worn[name]["wear"]["fits"]),
         key=lambda name: worn[name]["wear"]["outside"] * worn[name]["area_m2"],
@@ -135,42 +149,8 @@ def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str) -> list[str]:
     return [_clipped(f"{head}: no: {_some(unfit)}; {beyond}; {worst} {place}"), _clipped(f"  {advice}")]
 
 
-def _ranges(worn: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the strains along both threads, 5 to 95 % of each piece's cloth, and the highest pressure."""
-    found = []
-    for thread in ("warp", "weft"):
-        low = 100 * min(wear[f"strain_{thread}"]["p05"] for wear in worn)
-        high = 100 * max(wear[f"strain_{thread}"]["p95"] for wear in worn)
-        found.append(f"{thread} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} %")
-    highest = max(wear["pressure"]["max"] for wear in worn)
-    return [*found, f"at most {highest:,.0f} Pa"] if highest >= 1.0 else found
-
-
-def _seams_line(seams: Sequence[Mapping[str, Any]], constraints: Sequence[Mapping[str, Any]]) -> str:
-    parts = []
-    if seams:
-        parts.append(f"{len(seams)}, sides equal within {_within(max(abs(s['difference_mm']) for s in seams))}")
-    if eased := [f"{seam['name']} {100 * seam['ease']:+.3g} %" for seam in seams if seam["ease"]]:
-        parts.append(f"eased: {_some(eased)}")
-    if constraints:
-        amiss = _within(max(held["amiss_mm"] for held in constraints))
-        parts.append(f"{format_count(len(constraints), 'constraint')} within {amiss}")
-    return _clipped(f"seams: {'; '.join(parts)}")
-
-
 def _within(millimetres: float) -> str:
     return f"{max(millimetres, 0.01):.2f} mm"
-
-
-def _drape_line(drape: Mapping[str, Any]) -> str:
-    mean, misfit = 1e3 * drape["distance_m"]["mean"], drape["misfit_m"]
-    parts = [
-        f"fits: {'yes' if drape['fits'] else 'no'}; worn {mean:.1f} mm from the {drape['compared_with']}",
-        f"misfit {1e3 * misfit['mean']:.1f} mm",
-    ]
-    parts.append(f"at most {1e3 * misfit['max']:.1f} mm")
-    places = [place["words"] for place in drape["places"][:1]]
-    return _clipped(f"drape: {'; '.join([', '.join(parts), *places])}")
 
 
 def _some(names: Sequence[str]) -> str:

@@ -70,29 +70,34 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
-        rows = [
+        columns = ("seam", "sides", "mm", "mm", "ease", "difference", "price")
+        seams = [
             (
                 seam["name"],
                 " = ".join(seam["sides"]),
                 *(f"{length:.1f}" for length in seam["length_mm"]),
                 f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
-                f"{round(seam['difference_mm'], 2) + 0.0:+.2f} mm",  # no negative zero
+                # Without the sign of a negative zero.
+                f"{round(seam['difference_mm'], 2) + 0.0:+.2f} mm",
                 _price(seam["price_j"]),
             )
             for seam in metrics["seams"]
         ]
-        tables.append(_aligned(("seam", "sides", "mm", "mm", "ease", "difference", "price"), rows, left=(0, 1)))
+        tables.append(_aligned(columns, seams, left=(0, 1)))
     if metrics.get("constraints"):
         held = [
             (each["name"], f"{each['amiss_mm']:.2f} mm", _price(each["price_j"])) for each in metrics["constraints"]
         ]
         tables.append(_aligned(("constraint", "amiss", "price"), held))
     if metrics.get("girths"):
+        # Of the pattern with darts and seams closed, the ease got and wanted.
         parts = []
         for level, girth in metrics["girths"].items():
             wanted = f" of {100 * girth['ease_wanted_m']:+.1f}" if "ease_wanted_m" in girth else ""
-            lengths = " / ".join(f"{100 * girth[f'{of}_m']:.1f}" for of in ("body", "form", "pattern"))
-            parts.append(f"{level} {lengths} ({100 * girth['ease_m']:+.1f}{wanted})")
+            parts.append(
+                f"{level} {100 * girth['body_m']:.1f} / {100 * girth['form_m']:.1f} / {100 * girth['pattern_m']:.1f} "
+                f"({100 * girth['ease_m']:+.1f}{wanted})"
+            )
         tables.append(f"girths [cm], body / form / pattern (ease): {'; '.join(parts)}")
     if metrics.get("rings"):
         from warpflat.garment.rings import rings_line
@@ -107,19 +112,21 @@ def _price(joules: float | None) -> str:
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
     """Return a line for each fault of a piece, of every size: not converged, flipped faces, overlap; and for a missing pattern."""
-    sewing, lines = metrics.get("sewing", {}), list[str]()
+    lines, sewing = list[str](), metrics.get("sewing", {})
     for name, piece in metrics["pieces"].items():
-        last = piece["stages"][-1]
         if not _converged(piece):
+            last = piece["stages"][-1]
             asked = sewing.get("contradictory", False) and last["name"] == "sew"
-            way_out = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
+            remedy = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
             # The work that `max_steps` limits: steps of the piece's mesh, or work units where coarser levels add to them.
             steps, units = last["steps"], last["work_units"]
             work = f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
-            residual, left = last["residual"], f"strain energy {energy_words(last['strain_energy_j'], 3)}"
-            if residual is not None and math.isfinite(residual):  # crushed faces make forces infinite
-                left = f"residual {residual:.1e}"
-            lines.append(f"{name} did not converge within {work} ({left}); the pattern is not final: {way_out}")
+            # Crushed faces make forces infinite; then the strain energy says how far from rest it has ended.
+            if last["residual"] is None or not math.isfinite(last["residual"]):
+                remainder = f"strain energy {energy_words(last['strain_energy_j'], 3)}"
+            else:
+                remainder = f"residual {last['residual']:.1e}"
+            lines.append(f"{name} did not converge within {work} ({remainder}); the pattern is not final: {remedy}")
         if piece["flipped_faces"]:
             lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
         if piece.get("overlap_m2"):
@@ -135,10 +142,10 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         ]
     drape = metrics.get("drape", {"converged": True})
     if not drape["converged"]:
-        fallen = drape["distance_m"]["mean"] > _FALLEN
-        way_out = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
         left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
-        lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {way_out} in [drape]")
+        fallen = drape["distance_m"]["mean"] > _FALLEN
+        remedy = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
+        lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {remedy} in [drape]")
     if refused := metrics.get("garment", {}).get("no_pattern"):
         lines.insert(0, refused)
     for size, other in metrics.get("sizes", {}).items():
@@ -290,7 +297,12 @@ def fabric_sheet(fabric: Fabric) -> str:
             continue
         origin = fabric.provenance.get(key, Provenance(source="default"))
         number = sources.setdefault(origin.source, f"[{len(sources) + 1}]")
-        value = _value_words(fabric, key, origin)
+        given = getattr(fabric, key)
+        value = f"{len(given)} points" if key.startswith("curve_") else f"{given:.6g}"
+        if origin.at_least:
+            value = f">= {value}"
+        if origin.spread is not None:
+            value += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
         rows.append((key, value, _UNITS.get(key, ""), origin.test_load or "-", origin.grade or "-", number))
     parts = [f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name]
     if fabric.aliases:
@@ -304,17 +316,6 @@ def fabric_sheet(fabric: Fabric) -> str:
     if grades := sorted({origin.grade for origin in fabric.provenance.values() if origin.grade}):
         parts += ["", f"grades: {', '.join(f'{grade} {GRADES[grade]}' for grade in grades)}"]
     return "\n".join(parts)
-
-
-def _value_words(fabric: Fabric, key: str, origin: Provenance) -> str:
-    """Return a value as text: a curve as its number of points, a lower bound with >=, its spread in brackets."""
-    value = getattr(fabric, key)
-    words = f"{len(value)} points" if key.startswith("curve_") else f"{value:.6g}"
-    if origin.at_least:
-        words = f">= {words}"
-    if origin.spread is not None:
-        words += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
-    return words
 
 
 def fabric_data(fabric: Fabric) -> dict[str, Any]:

@@ -76,7 +76,14 @@ class Correction:
     def moved(self) -> dict[str, FloatArray]:
         """Return how far each vertex of each piece (#P) has moved across the old outline, outwards [m]; 0 inside."""
         old, new = self.before.cloth, self.after.cloth
-        edges = _directed(outline_edges(old.flat_faces), old.flat_faces)
+        # Each edge of the outline in the direction in which its face, wound counter-clockwise, has it.
+        edges, faces = outline_edges(old.flat_faces), old.flat_faces
+        sides = []
+        for size, part in ((4, faces[faces[:, 3] >= 0]), (3, faces[faces[:, 3] < 0])):
+            sides += [part[:, [side, (side + 1) % size]] for side in range(size)]
+        stride = int(faces.max()) + 1
+        of_edge, of_side = (p[:, 0].astype(np.int64) * stride + p[:, 1] for p in (edges, np.concatenate(sides)))
+        edges = np.where(np.isin(of_edge, of_side)[:, None], edges, edges[:, ::-1])
         along = old.flat[edges[:, 1]] - old.flat[edges[:, 0]]
         outwards = np.zeros_like(old.flat)
         for end in range(2):
@@ -181,7 +188,7 @@ def correct_pattern(
         if history[-1].misfit <= wanted:
             reason = "the misfit is as wanted"
             break
-        step = _step(drape, seams, difference, bridging)
+        step = _gauss_newton_step(drape, seams, difference, bridging)
         best, share = None, largest_share(drape.cloth, step)
         for _ in range(_HALVINGS + 1):
             trial = wear(replace(drape.cloth, flat=drape.cloth.flat + share * step))
@@ -217,7 +224,7 @@ def _round(drape: Drape, share: float, bridging: bool) -> Round:
     )
 
 
-def _step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool) -> FloatArray:
+def _gauss_newton_step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool) -> FloatArray:
     """Return the displacement of the flat vertices (#P by 2 [m]) that follows best what the cells ask for.
 
     Args:
@@ -270,17 +277,6 @@ def _lengths(x: FloatArray, gradient: FloatArray) -> FloatArray:
     weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
     products = [0.5 * (warp * warp).sum(axis=1), 0.5 * (weft * weft).sum(axis=1), (warp * weft).sum(axis=1)]
     return np.stack(products, axis=1)
-
-
-def _directed(edges: IntArray, faces: IntArray) -> IntArray:
-    """Return outline edges (#B by 2) in the direction in which their faces, wound counter-clockwise, have them."""
-    sides = []
-    for size, part in ((4, faces[faces[:, 3] >= 0]), (3, faces[faces[:, 3] < 0])):
-        sides += [part[:, [side, (side + 1) % size]] for side in range(size)]
-    all_sides = np.concatenate(sides).astype(np.int64)
-    stride = int(faces.max()) + 1
-    forward = np.isin(edges[:, 0].astype(np.int64) * stride + edges[:, 1], all_sides[:, 0] * stride + all_sides[:, 1])
-    return np.where(forward[:, None], edges, edges[:, ::-1])
 
 
 def _length(points: FloatArray) -> float:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export.figure import new_figure, write_figure
 from warpflat.export.geometry import outline_edges
@@ -44,12 +44,22 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
     axis = figure.add_axes((0.01, 0.01, 0.98, 0.9 * (1.0 - 0.4 / size[1])))
     axis.set_axis_off()
     for points, colour, width in ((old.flat + shift, _BEFORE, 1.4), (new.flat + shift, _AFTER, 1.1)):
-        axis.plot(*_lines(points, edges), color=colour, linewidth=width)
+        # One line, broken after every edge.
+        ends = np.full((len(edges), 3, 2), np.nan)
+        ends[:, :2] = points[edges]
+        axis.plot(*ends.reshape(-1, 2).T, color=colour, linewidth=width)
     for name, rows in old.piece_vertices.items():
         points = old.flat[rows] + shift[rows]
         across, up = points.mean(axis=0).tolist()
         axis.text(across, up, name, ha="center", fontsize=10)
-        _label(axis, points, moved[name])
+        # The largest changes stand beside the outline, not too near to each other.
+        change, taken = moved[name], list[FloatArray]()
+        for i in np.argsort(-np.abs(change), kind="stable").tolist():
+            if len(taken) == _LABELS or abs(change[i]) < _LEAST:
+                break
+            if all(np.linalg.norm(points[i] - other) > _APART for other in taken):
+                taken.append(points[i])
+                axis.annotate(f"{1e3 * change[i]:+.1f}", points[i], fontsize=8, color=_AFTER)
     axis.set_aspect("equal")
     first, last = correction.rounds[0], correction.rounds[-1]
     figure.suptitle(
@@ -58,22 +68,3 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
         fontsize=11,
     )
     write_figure(path, figure)
-
-
-def _lines(points: FloatArray, edges: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return the coordinates of edges as one broken line."""
-    ends = np.full((len(edges), 3, 2), np.nan)
-    ends[:, :2] = points[edges]
-    flat = ends.reshape(-1, 2)
-    return flat[:, 0], flat[:, 1]
-
-
-def _label(axis: object, points: FloatArray, moved: FloatArray) -> None:
-    """Write the largest changes beside the outline, not too near to each other."""
-    taken: list[FloatArray] = []
-    for i in np.argsort(-np.abs(moved), kind="stable").tolist():
-        if len(taken) == _LABELS or abs(moved[i]) < _LEAST:
-            break
-        if all(np.linalg.norm(points[i] - other) > _APART for other in taken):
-            taken.append(points[i])
-            axis.annotate(f"{1e3 * moved[i]:+.1f}", points[i], fontsize=8, color=_AFTER)  # type: ignore[attr-defined]

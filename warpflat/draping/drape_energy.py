@@ -75,7 +75,11 @@ class DrapeEnergy:
             self._on(self.weight, wp.float64),
             self._on(held.astype(np.int8), wp.int8),
         )
-        self.contact = _contact(vertex_area, options, device)
+        self.contact = contact = Contact()
+        contact.centre, contact.normal, contact.rubbed, contact.anchor = (self._zeros(wp.vec3d) for _ in range(4))
+        contact.pressed, contact.most = self._zeros(wp.float64), self._zeros(wp.float64)
+        contact.friction, contact.longest_step = options.friction, _LONGEST_EXPLICIT_STEP
+        contact.skin, contact.grip = (self._on(each * vertex_area, wp.float64) for each in (_SKIN, _GRIP))
         bending = Bending()
         bending.offset, bending.neighbor = self._on(laplacian.indptr, wp.int32), self._on(laplacian.indices, wp.int32)
         bending.weight, bending.stiffness = self._on(laplacian.data, wp.float64), self._on(stiffness, wp.float64)
@@ -128,7 +132,7 @@ class DrapeEnergy:
         launch_each(kernel, self._count, inputs, [], device=self.device, least=512)
 
     def bound(self, start: FloatArray, longest: float) -> None:
-        """Let no vertex go farther than some way [m] from #V by 3 places [m]: the energy is infinite beyond."""
+        """Let no vertex go farther than a length [m] from #V by 3 places [m]: the energy is infinite beyond."""
         self._start, self._longest = start, longest
 
     def at(self, positions: FloatArray) -> Point:
@@ -184,23 +188,13 @@ def _law(fabric: Fabric, compression: float, device: wp.Device) -> Cloth:
     return make_cloth(soft, (np.array([0.0, 1.0]), np.array([1.0, 0.0])), device)
 
 
-def _contact(area: FloatArray, options: DrapeOptions, device: wp.Device) -> Contact:
-    contact = Contact()
-    for name in ("centre", "normal", "rubbed", "anchor"):
-        setattr(contact, name, wp.zeros(len(area), wp.vec3d, device))
-    contact.friction, contact.longest_step = options.friction, _LONGEST_EXPLICIT_STEP
-    contact.skin, contact.grip = (wp.array(each * area, dtype=wp.float64, device=device) for each in (_SKIN, _GRIP))
-    contact.pressed, contact.most = (wp.zeros(len(area), wp.float64, device) for _ in range(2))
-    return contact
-
-
 class _BlockPattern:
     """Where the blocks of cells and vertices go in a symmetric matrix of 3 by 3 blocks."""
 
     def __init__(self, corner: IntArray, count: int) -> None:
-        own = np.arange(count)
-        rows = np.concatenate([np.repeat(corner, 3, axis=1).ravel(), own])
-        columns = np.concatenate([np.tile(corner, (1, 3)).ravel(), own])
+        diagonal = np.arange(count)
+        rows = np.concatenate([np.repeat(corner, 3, axis=1).ravel(), diagonal])
+        columns = np.concatenate([np.tile(corner, (1, 3)).ravel(), diagonal])
         key = rows.astype(np.int64) * count + columns
         self._order = np.argsort(key, kind="stable")
         places, self._begin = np.unique(key[self._order], return_index=True)

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.arrays import BoolArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, nearest
 from warpflat.draping.body import Body
@@ -68,9 +68,14 @@ def drape(
     )  # fmt: skip
     worn.check_held()
     sources = tuple(source for piece in _pieces(garment) for source in piece.surface.sources)
+    # A cut that `warpflat.advise` has found on one side stands for that on the other side of the body, too.
+    cuts = {}
+    for piece in _pieces(garment):
+        paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
+        cuts[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
-        cuts=_advised_cuts(_pieces(garment)),
+        cuts=cuts,
     )  # fmt: skip
 
 
@@ -78,18 +83,6 @@ def _pieces(garment: Garment | Flattening | Sequence[Flattening]) -> list[Flatte
     if isinstance(garment, Garment):
         return list(garment.pieces.values())
     return [garment] if isinstance(garment, Flattening) else list(garment)
-
-
-def _advised_cuts(pieces: Sequence[Flattening]) -> dict[str, list[tuple[str, FloatArray]]]:
-    """Return by piece what to cut, and where on the designed surface, of the cuts that `warpflat.advise` has found.
-
-    A cut on one side stands for that on the other side of the body, too.
-    """
-    found = {}
-    for piece in pieces:
-        paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
-        found[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
-    return found
 
 
 def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:

@@ -15,7 +15,7 @@ from warpflat.core.errors import InputError
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
 from warpflat.draping.lift import Lift, whole_lifts
-from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
+from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
@@ -40,7 +40,7 @@ class Placement:
     Attributes:
         at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
         top: a level of the body or a height [m] for the highest point of what does not hang from the shoulders.
-        lifts: by piece the way to its designed surface, where there is one; it must be there for all of them or for none.
+        lifts: by piece the map to its designed surface, where there is one; it must be there for all of them or for none.
         size: of the pattern; its sample size if not given.
         spacing: wished edge of the mesh [m].
         hold: edges that stay where they are, as "piece.edge", or "edge" for every piece that has one.
@@ -81,8 +81,8 @@ def drape_pattern(
         The drape, and notes.
 
     Raises:
-        InputError: the pattern has no seams or no such size, a piece cannot be meshed or placed, an edge is unknown, or nothing
-            holds the garment.
+        InputError: the pattern has no seams, no such size or wrong units, a piece cannot be meshed or placed, an edge is unknown,
+            or nothing holds the garment.
     """
     placement, options = placement or Placement(), options or DrapeOptions()
     chosen = pattern.sample if placement.size is None else placement.size
@@ -92,7 +92,17 @@ def drape_pattern(
         raise InputError(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
-    _check_size(pieces)
+    # A garment of an impossible size comes from a file whose units are wrong.
+    sizes = {
+        name: np.ptp(np.concatenate([edge.points for edge in piece.edges]), axis=0) for name, piece in pieces.items()
+    }
+    name = max(sizes, key=lambda each: float(sizes[each].max()))
+    wide, high = sizes[name]
+    if not _SIZES[0] <= max(wide, high) <= _SIZES[1]:
+        raise InputError(
+            f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
+            f"and {1e3 * _SIZES[1]:.0f} mm long: {UNITS}"
+        )
     meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
     start_warp()
     where = wp.get_device(device)
@@ -104,7 +114,40 @@ def drape_pattern(
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
     else:
         placed = wrap_pieces(meshes, welds, body, at=placement.at, top=placement.top)
-    cloth = _sew(pieces, meshes, welds, placed, fabric)
+    # The meshes are joined along their seams; vertices that become one start in the middle of their places.
+    counts = [len(mesh.points) for mesh in meshes.values()]
+    ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
+    begins = dict(zip(meshes, ends[:-1], strict=True))
+    pairs = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    first, second = (np.array(column, dtype=np.int64) for column in zip(*pairs, strict=True))
+    welded = join_labels(ends[-1], first, second)
+    space = np.concatenate([placed[name] for name in meshes])
+    total = np.stack([np.bincount(welded, column) for column in space.T], axis=1)
+    flat_faces = np.concatenate(
+        [np.column_stack([m.triangles + begins[n], np.full(len(m.triangles), -1)]) for n, m in meshes.items()]
+    ).astype(np.int32)
+    cells = [len(mesh.triangles) for mesh in meshes.values()]
+    places = np.cumsum([0, *cells]).tolist()
+    warps = np.repeat([_grain(pieces[name]) for name in meshes], cells, axis=0)
+    lines = {
+        f"{name}.{edge}": welded[row + begins[name]] for name, m in meshes.items() for edge, row in m.edges.items()
+    }
+    inner = {
+        f"{name}.{line}": welded[row + begins[name]] for name, m in meshes.items() for line, row in m.lines.items()
+    }
+    cloth = SewnCloth(
+        fabric=fabric,
+        designed=total / np.bincount(welded)[:, None],
+        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
+        flat_faces=flat_faces,
+        flat=np.concatenate([mesh.points for mesh in meshes.values()]),
+        welded=welded,
+        warp=warps,
+        weft=np.column_stack([warps[:, 1], -warps[:, 0]]),
+        piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
+        piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(meshes)},
+        lines={**inner, **lines},
+    )
     surface = None if body is None else body.surface()
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
@@ -120,67 +163,6 @@ def drape_pattern(
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
-
-
-def _check_size(pieces: Mapping[str, Piece]) -> None:
-    """Refuse a pattern in the wrong units.
-
-    Raises:
-        InputError: its largest piece is smaller or larger than any garment's.
-    """
-    sizes = {
-        name: np.ptp(np.concatenate([edge.points for edge in piece.edges]), axis=0) for name, piece in pieces.items()
-    }
-    name = max(sizes, key=lambda each: float(sizes[each].max()))
-    wide, high = sizes[name]
-    if not _SIZES[0] <= max(wide, high) <= _SIZES[1]:
-        raise InputError(
-            f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
-            f"and {1e3 * _SIZES[1]:.0f} mm long: {UNITS}"
-        )
-
-
-def _sew(
-    pieces: Mapping[str, Piece],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    placed: Mapping[str, FloatArray],
-    fabric: Fabric,
-) -> SewnCloth:
-    """Join the meshes along their seams; vertices that become one start in the middle of their places."""
-    counts = [len(mesh.points) for mesh in meshes.values()]
-    ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
-    begins = dict(zip(meshes, ends[:-1], strict=True))
-    pairs = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
-    first, second = (np.array(column, dtype=np.int64) for column in zip(*pairs, strict=True))
-    welded = join_labels(ends[-1], first, second)
-    space = np.concatenate([placed[name] for name in meshes])
-    total = np.stack([np.bincount(welded, column) for column in space.T], axis=1)
-    flat_faces = np.concatenate(
-        [np.column_stack([m.triangles + begins[n], np.full(len(m.triangles), -1)]) for n, m in meshes.items()]
-    ).astype(np.int32)
-    sizes = [len(mesh.triangles) for mesh in meshes.values()]
-    places = np.cumsum([0, *sizes]).tolist()
-    warps = np.repeat([_grain(pieces[name]) for name in meshes], sizes, axis=0)
-    lines = {
-        f"{name}.{edge}": welded[row + begins[name]] for name, m in meshes.items() for edge, row in m.edges.items()
-    }
-    inner = {
-        f"{name}.{line}": welded[row + begins[name]] for name, m in meshes.items() for line, row in m.lines.items()
-    }
-    return SewnCloth(
-        fabric=fabric,
-        designed=total / np.bincount(welded)[:, None],
-        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
-        flat_faces=flat_faces,
-        flat=np.concatenate([mesh.points for mesh in meshes.values()]),
-        welded=welded,
-        warp=warps,
-        weft=np.column_stack([warps[:, 1], -warps[:, 0]]),
-        piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
-        piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(meshes)},
-        lines={**inner, **lines},
-    )
 
 
 def _grain(piece: Piece) -> FloatArray:

@@ -56,7 +56,7 @@ def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) ->
     if len(moving) <= count:
         return moving
     moves = [0.0, *(float(np.linalg.norm(frames[b] - frames[a], axis=1).mean()) for a, b in pairwise(moving))]
-    # Half by the way and half by time, for what creeps is worth a look too.
+    # Half by displacement and half by time, for what creeps is worth a look too.
     progress = np.cumsum(moves) / max(sum(moves), 1e-12) + np.linspace(0.0, 1.0, len(moving))
     return sorted({moving[int(np.abs(progress - share).argmin())] for share in np.linspace(0.0, 2.0, count)})
 

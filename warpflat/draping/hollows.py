@@ -33,17 +33,14 @@ def hollow_depths(points: FloatArray, normals: FloatArray, at: IntArray) -> Floa
     ):
         near = np.asarray(near)
         near = near[normals[near] @ normals[vertex] > 0.0]
-        if len(near) > 4:
-            depths[number] = _depth(points[near] - points[vertex], normals[vertex])
+        if len(near) <= 4:
+            continue
+        try:
+            equations = ConvexHull(points[near] - points[vertex], qhull_options="QJ").equations
+        except QhullError:  # all in one plane
+            continue
+        slope = equations[:, :3] @ normals[vertex]
+        up = slope > 1e-9
+        if up.any():
+            depths[number] = max(float((-equations[up, 3] / slope[up]).min()), 0.0)
     return depths
-
-
-def _depth(around: FloatArray, normal: FloatArray) -> float:
-    """Return how far the hull of points reaches from the origin along a direction."""
-    try:
-        equations = ConvexHull(around, qhull_options="QJ").equations
-    except QhullError:  # all in one plane
-        return 0.0
-    slope = equations[:, :3] @ normal
-    up = slope > 1e-9
-    return max(float((-equations[up, 3] / slope[up]).min()), 0.0) if up.any() else 0.0

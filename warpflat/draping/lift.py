@@ -24,7 +24,7 @@ _TRIED = 16
 
 
 def read_lift(path: Path) -> Lift:
-    """Return the way from a pattern to its surface in an OBJ file with the surface as `v` and the pattern as `vt`.
+    """Return the map from a pattern to its surface in an OBJ file with the surface as `v` and the pattern as `vt`.
 
     A point beside the pattern, where an edge was smoothed, belongs to the triangle next to it.
 

@@ -14,7 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import points_at_lengths
 from warpflat.draping.whole_pieces import hole_edges
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Piece, Seam
 
 __all__ = ["FlatMesh", "mesh_pieces"]
 
@@ -86,8 +86,8 @@ def mesh_pieces(
             joints.append(_divide(seam, edges, spacing, finer.get(number, 1), stations))
         meshes, missing = {}, set()
         for name, piece in pieces.items():
-            own = {edge.name: stations[name, edge.name] for ring in loops[name] for edge in ring}
-            meshes[name], lost = _mesh(piece, loops[name], own, spacing)
+            along = {edge.name: stations[name, edge.name] for ring in loops[name] for edge in ring}
+            meshes[name], lost = _mesh(piece, loops[name], along, spacing)
             missing |= {owner.get((name, edge), (name, edge)) for edge in lost}
         if not missing:
             return meshes, [[[(p, int(meshes[p].edges[e][k])) for p, e, k in joint] for joint in row] for row in joints]
@@ -137,15 +137,11 @@ def _divide(
     for chain, end, place in zip(seam.sides, ends, places, strict=True):
         for side, (low, high) in zip(chain, pairwise(end), strict=True):
             inside = np.flatnonzero((place >= low - 1e-12) & (place <= high + 1e-12))
-            _place_on(side, place[inside] - low, high - low, stations)
+            lengths = high - place[inside][::-1] if side.reversed else place[inside] - low
+            stations[side.piece, side.edge] = np.clip(lengths, 0.0, high - low)
             for count, k in enumerate(inside.tolist()):
                 joints[k].append((side.piece, side.edge, len(inside) - 1 - count if side.reversed else count))
     return joints
-
-
-def _place_on(side: SeamSide, lengths: FloatArray, whole: float, stations: dict[tuple[str, str], FloatArray]) -> None:
-    along = whole - lengths[::-1] if side.reversed else lengths
-    stations[side.piece, side.edge] = np.clip(along, 0.0, whole)
 
 
 def _mesh(
@@ -160,16 +156,25 @@ def _mesh(
     for loop in loops:
         begin = count
         for edge in loop:
-            own = points_at_lengths(edge.points, stations[edge.name])
-            points.append(own[:-1])
-            ids[edge.name] = np.arange(count, count + len(own), dtype=np.int32)
-            count += len(own) - 1
+            on_edge = points_at_lengths(edge.points, stations[edge.name])
+            points.append(on_edge[:-1])
+            ids[edge.name] = np.arange(count, count + len(on_edge), dtype=np.int32)
+            count += len(on_edge) - 1
         ids[loop[-1].name][-1] = begin
         rings.append(np.concatenate(points)[begin:])
     polygon = shapely.Polygon(rings[0], rings[1:])
     shapely.prepare(polygon)
     border = np.concatenate(points)
-    inner = _lattice(polygon, border, spacing)
+    # The points of a triangular lattice inside a polygon, symmetric about its vertical middle.
+    low, high = border.min(axis=0), border.max(axis=0)
+    middle, tall = 0.5 * (low[0] + high[0]), spacing * np.sqrt(0.75)
+    columns = np.arange(-int((high[0] - low[0]) / spacing) - 1, int((high[0] - low[0]) / spacing) + 2) * spacing
+    rows = np.arange(low[1] + 0.5 * tall, high[1], tall)
+    found = np.concatenate([np.column_stack([middle + columns + 0.5 * spacing * (k % 2), np.full_like(columns, y)])
+                            for k, y in enumerate(rows)])  # fmt: skip
+    found = found[shapely.contains_xy(polygon, *found.T)]
+    off = shapely.distance(shapely.boundary(polygon), shapely.points(found)) if len(found) else np.empty(0)
+    inner = np.asarray(found[off > _OFF_OUTLINE * spacing])
     everything = np.concatenate([border, inner])
     simplices = Delaunay(everything).simplices
     corner = everything[simplices]
@@ -188,18 +193,3 @@ def _mesh(
             row = tree.query(points_at_lengths(line, np.linspace(0.0, length, steps)))[1]
             lines[name] = np.asarray(list(dict.fromkeys(row.tolist())), dtype=np.int32)
     return FlatMesh(points=everything, triangles=triangles, edges=ids, lines=lines), lost
-
-
-def _lattice(polygon: object, border: FloatArray, spacing: float) -> FloatArray:
-    """Return the points of a triangular lattice inside a polygon, symmetric about its vertical middle."""
-    import shapely
-
-    low, high = border.min(axis=0), border.max(axis=0)
-    middle, tall = 0.5 * (low[0] + high[0]), spacing * np.sqrt(0.75)
-    columns = np.arange(-int((high[0] - low[0]) / spacing) - 1, int((high[0] - low[0]) / spacing) + 2) * spacing
-    rows = np.arange(low[1] + 0.5 * tall, high[1], tall)
-    found = np.concatenate([np.column_stack([middle + columns + 0.5 * spacing * (k % 2), np.full_like(columns, y)])
-                            for k, y in enumerate(rows)])  # fmt: skip
-    found = found[shapely.contains_xy(polygon, *found.T)]
-    off = shapely.distance(shapely.boundary(polygon), shapely.points(found)) if len(found) else np.empty(0)
-    return np.asarray(found[off > _OFF_OUTLINE * spacing])

@@ -47,8 +47,18 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
     figure = new_figure(PAGE_WIDTH, height)
     pen = Pen(figure)
     pen.open_page()
-    pen.write(0.3, height - 0.2, _title(drape), 11)
-    for row, (title, values, low, high, colours) in enumerate(_maps(drape)):
+    worst = next((place.words for place in drape.places if place.kind != "bridged"), "it lies as designed")
+    rest = "" if drape.converged else "NOT AT REST; "
+    pen.write(0.3, height - 0.2, f"{drape.cloth.fabric.name}; {rest}{worst}", 11)
+    gap, strain = 1e3 * _of_faces(drape, drape.gap), _strain(drape)
+    widest = max(5.0, weighted_percentile(gap, drape.face_areas, 0.98))
+    limit = 100.0 * drape.cloth.fabric.strain_limit
+    most = min(limit, max(0.5, weighted_percentile(np.abs(strain), drape.face_areas, 0.98)))
+    maps = [
+        ("gap to the body [mm]", gap, 0.0, widest, "YlOrRd"),
+        ("strain of the more strained thread [%]", strain, -most, most, "RdBu_r"),
+    ]
+    for row, (title, values, low, high, colours) in enumerate(maps):
         bottom = height - 0.2 - (row + 1) * (tall + _TOP)
         left = 0.3 + 0.5 * (room - scale * sum(float(view.size[0]) for view in views))
         shades = on_cloth(colours)(np.clip((values - low) / (high - low), 0.0, 1.0))[:, :3]
@@ -60,24 +70,6 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
         pen.write(0.3, bottom + tall + 0.3, title, 11, fontweight="bold")
         _draw_scale(figure, (PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall, height), low, high, colours)
     write_figure(path, figure)
-
-
-def _title(drape: Drape) -> str:
-    worst = next((place.words for place in drape.places if place.kind != "bridged"), "it lies as designed")
-    rest = "" if drape.converged else "NOT AT REST; "
-    return f"{drape.cloth.fabric.name}; {rest}{worst}"
-
-
-def _maps(drape: Drape) -> list[tuple[str, FloatArray, float, float, str]]:
-    """Return title, values per face, range and colours of each map."""
-    gap, strain = 1e3 * _of_faces(drape, drape.gap), _strain(drape)
-    widest = max(5.0, weighted_percentile(gap, drape.face_areas, 0.98))
-    limit = 100.0 * drape.cloth.fabric.strain_limit
-    most = min(limit, max(0.5, weighted_percentile(np.abs(strain), drape.face_areas, 0.98)))
-    return [
-        ("gap to the body [mm]", gap, 0.0, widest, "YlOrRd"),
-        ("strain of the more strained thread [%]", strain, -most, most, "RdBu_r"),
-    ]
 
 
 @all_letters()

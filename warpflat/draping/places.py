@@ -74,10 +74,35 @@ def find_places(
     for kind, values in (("misfit", misfit), ("bridged", bridged)):
         for part in _parts(cloth, values > _WORTH):
             if areas[part].sum() >= _LEAST_AREA:
-                found.append(_distance_place(cloth, areas, part, values=values, kind=kind, lift=lift, gap=gap))
+                worst = int(part[values[part].argmax()])
+                line, area, distance = _line_at(cloth, worst), float(areas[part].sum()), float(values[worst])
+                size = f"over {1e4 * area:.0f} cm2"
+                if kind == "bridged":
+                    words = f"{_called(line)} bridges a hollow, {1e3 * distance:.1f} mm off, {size}"
+                elif lift[worst] > 0.5 * distance:
+                    words = f"{_called(line)} gapes by {1e3 * gap[worst]:.1f} mm {size}"
+                elif lift[worst] < -0.5 * distance:
+                    words = f"{_called(line)} falls in by {1e3 * distance:.1f} mm {size}"
+                else:
+                    words = f"{_called(line)} has moved by {1e3 * distance:.1f} mm {size}"
+                found.append(
+                    Place(
+                        kind=kind,
+                        line=line,
+                        worst=distance,
+                        gap=float(gap[worst]),
+                        area=area,
+                        words=words,
+                        vertex=worst,
+                    )
+                )
     limit = cloth.fabric.strain_limit
     for direction, values in strains.items():
-        at_vertices = _means_at_vertices(cloth, values)
+        # The mean of the faces at each vertex.
+        used = cloth.faces >= 0
+        vertex, value = cloth.faces[used], np.broadcast_to(values[:, None], used.shape)[used]
+        count = np.bincount(vertex, minlength=len(cloth.designed))
+        at_vertices = np.bincount(vertex, value, minlength=len(cloth.designed)) / np.maximum(count, 1)
         for part in _parts(cloth, np.abs(at_vertices) > limit):
             if areas[part].sum() >= _LEAST_AREA:
                 worst = int(part[np.abs(at_vertices[part]).argmax()])
@@ -103,30 +128,6 @@ def find_places(
     return tuple(found[:_MOST])
 
 
-def _distance_place(
-    cloth: SewnCloth,
-    areas: FloatArray,
-    part: IntArray,
-    *,
-    values: FloatArray,
-    kind: str,
-    lift: FloatArray,
-    gap: FloatArray,
-) -> Place:
-    worst = int(part[values[part].argmax()])
-    line, area, distance = _line_at(cloth, worst), float(areas[part].sum()), float(values[worst])
-    size = f"over {1e4 * area:.0f} cm2"
-    if kind == "bridged":
-        words = f"{_called(line)} bridges a hollow, {1e3 * distance:.1f} mm off, {size}"
-    elif lift[worst] > 0.5 * distance:
-        words = f"{_called(line)} gapes by {1e3 * gap[worst]:.1f} mm {size}"
-    elif lift[worst] < -0.5 * distance:
-        words = f"{_called(line)} falls in by {1e3 * distance:.1f} mm {size}"
-    else:
-        words = f"{_called(line)} has moved by {1e3 * distance:.1f} mm {size}"
-    return Place(kind=kind, line=line, worst=distance, gap=float(gap[worst]), area=area, words=words, vertex=worst)
-
-
 def _parts(cloth: SewnCloth, chosen: BoolArray) -> list[IntArray]:
     """Return the chosen vertices (#V) in connected parts."""
     triangles, _ = triangulate(cloth.faces)
@@ -139,14 +140,6 @@ def _parts(cloth: SewnCloth, chosen: BoolArray) -> list[IntArray]:
     order = np.argsort(label[members], kind="stable")
     members = members[order]
     return np.split(members, np.flatnonzero(np.diff(label[members])) + 1)
-
-
-def _means_at_vertices(cloth: SewnCloth, values: FloatArray) -> FloatArray:
-    """Return #V, the mean of the values (#F) of the faces at each vertex."""
-    used = cloth.faces >= 0
-    vertex, value = cloth.faces[used], np.broadcast_to(values[:, None], used.shape)[used]
-    count = np.bincount(vertex, minlength=len(cloth.designed))
-    return np.asarray(np.bincount(vertex, value, minlength=len(cloth.designed)) / np.maximum(count, 1))
 
 
 def _line_at(cloth: SewnCloth, vertex: int) -> str:

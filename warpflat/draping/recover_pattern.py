@@ -3,7 +3,7 @@
 The places x of the cloth are given, and the flat vertices X are looked for, at which the forces f(x; X) of membrane, bending and
 weight vanish wherever the cloth is not held. A pattern that is draped again and again may come to hang in other folds each time;
 here the folds stay those that are given. Each step is one of Gauss and Newton's method: the displacement u of the flat vertices after
-which the cloth would have the least way y to rest, measured by its own stiffness H,
+which the cloth would have the least displacement y to rest, measured by its own stiffness H,
 
     minimise 1/2 y H y + 1/2 d u S u + seams,  where H y = f + J u,  J = df/dX, S the stiffness of the cloth in its plane,
 
@@ -46,7 +46,7 @@ class Recovery:
 
     Attributes:
         cloth: with the recovered pattern.
-        off: #V, the way of each vertex from the given shape to rest, by the linear stiffness [m].
+        off: #V, the displacement of each vertex from the given shape to rest, by the linear stiffness [m].
         strains: mean strain of the pattern in each step.
         converged: whether the last step was small.
     """
@@ -95,50 +95,41 @@ def recover_cloth(
     difference = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
     strains, off, converged = list[float](), np.zeros(len(held)), False
     while len(strains) < steps and not converged:
-        way, u = _step(cloth, DrapeEnergy(cloth, None, options, held), held, seams, difference)
-        off = np.linalg.norm(way, axis=1)
+        # Newton's method for the places of the cloth at rest and the displacement of its flat vertices.
+        energy = DrapeEnergy(cloth, None, options, held)
+        x, threads = cloth.designed, 0.5 * (cloth.fabric.stiffness_warp + cloth.fabric.stiffness_weft)
+        force = -energy.at(x).gradient
+        corner, corner_flat = cloth.cells()[0], corner_triangles(cloth.flat_faces)[0]
+        # The deformation gradient F of the designed shape, in the coordinates of the plane, #C by 3 by 2.
+        in_space, in_flat = (
+            np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
+            for p in (x[cloth.welded[corner_flat]], cloth.flat[corner_flat])
+        )
+        deformation = in_space @ np.linalg.inv(in_flat)
+        # J in cells: K F; and F K F, the cloth's stiffness in its plane.
+        by_flat = np.einsum("cijab,cbk->ciajk", energy.cell_stiffness(x), deformation)
+        in_plane = np.einsum("cal,ciajk->ciljk", deformation, by_flat)
+        space, flat = 3 * len(x), 2 * len(cloth.flat)
+        rows, columns = (3 * corner[:, :, None] + np.arange(3)), (2 * corner_flat[:, :, None] + np.arange(2))
+        free = diags_array(np.repeat((~held).astype(np.float64), 3))
+        jacobian = free @ _assembled(by_flat, rows, columns, (space, flat))
+        damping = _DAMPING * _assembled(in_plane, columns, columns, (flat, flat))
+        damping = damping + diags_array(np.full(flat, _HOLD * threads))
+        right = np.zeros(flat)
+        if len(seams):
+            sides = seam_rows(cloth.flat, seams)
+            now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
+            damping = damping + _SEAM * threads * (sides.T @ sides)
+            right = _SEAM * threads * (sides.T @ (difference - now))
+        matrix = csc_array(block_array([[energy.stiffness(x), -jacobian], [-jacobian.T, -damping]]))
+        found = factor_symmetric(matrix)(np.concatenate([force.ravel(), -right]))
+        off, u = np.linalg.norm(found[:space].reshape(-1, 3), axis=1), found[space:].reshape(-1, 2)
         moved = replace(cloth, flat=cloth.flat + largest_share(cloth, u) * u)
-        strains.append(_mean_strain(cloth, moved))
+        # The mean change of the sides of the cells, as a share.
+        edges = np.concatenate([corner_flat[:, [0, 1]], corner_flat[:, [1, 2]], corner_flat[:, [2, 0]]])
+        strains.append(float(np.abs(edge_lengths(moved.flat, edges) / edge_lengths(cloth.flat, edges) - 1.0).mean()))
         cloth, converged = moved, strains[-1] < _LEAST_STRAIN
     return Recovery(cloth=cloth, off=off, strains=tuple(strains), converged=converged)
-
-
-def _step(
-    cloth: SewnCloth, energy: DrapeEnergy, held: BoolArray, seams: IntArray, difference: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the way of the cloth to rest (#V by 3) after a displacement of its flat vertices, and that (#P by 2) [m]."""
-    x, threads = cloth.designed, 0.5 * (cloth.fabric.stiffness_warp + cloth.fabric.stiffness_weft)
-    force = -energy.at(x).gradient
-    # J in cells: K F; and F K F, the cloth's stiffness in its plane.
-    stiffness, along = energy.cell_stiffness(x), _gradients(cloth)
-    by_flat = np.einsum("cijab,cbk->ciajk", stiffness, along)
-    in_plane = np.einsum("cal,ciajk->ciljk", along, by_flat)
-    corner, corner_flat = cloth.cells()[0], corner_triangles(cloth.flat_faces)[0]
-    space, flat = 3 * len(x), 2 * len(cloth.flat)
-    rows, columns = (3 * corner[:, :, None] + np.arange(3)), (2 * corner_flat[:, :, None] + np.arange(2))
-    free = diags_array(np.repeat((~held).astype(np.float64), 3))
-    jacobian = free @ _assembled(by_flat, rows, columns, (space, flat))
-    damping = _DAMPING * _assembled(in_plane, columns, columns, (flat, flat))
-    damping = damping + diags_array(np.full(flat, _HOLD * threads))
-    right = np.zeros(flat)
-    if len(seams):
-        sides = seam_rows(cloth.flat, seams)
-        now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
-        damping = damping + _SEAM * threads * (sides.T @ sides)
-        right = _SEAM * threads * (sides.T @ (difference - now))
-    matrix = csc_array(block_array([[energy.stiffness(x), -jacobian], [-jacobian.T, -damping]]))
-    found = factor_symmetric(matrix)(np.concatenate([force.ravel(), -right]))
-    return found[:space].reshape(-1, 3), found[space:].reshape(-1, 2)
-
-
-def _gradients(cloth: SewnCloth) -> FloatArray:
-    """Return F, the gradient of the designed shape by the flat cloth, in the coordinates of the plane, #C by 3 by 2."""
-    corner, _, _ = corner_triangles(cloth.flat_faces)
-    space, flat = (
-        np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
-        for p in (cloth.designed[cloth.welded[corner]], cloth.flat[corner])
-    )
-    return np.asarray(space @ np.linalg.inv(flat))
 
 
 def _assembled(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> csr_array:
@@ -146,10 +137,3 @@ def _assembled(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tup
     of_rows = np.broadcast_to(rows[:, :, :, None, None], blocks.shape)
     of_columns = np.broadcast_to(columns[:, None, None], blocks.shape)
     return csr_array(coo_array((blocks.ravel(), (of_rows.ravel(), of_columns.ravel())), shape=shape))
-
-
-def _mean_strain(before: SewnCloth, after: SewnCloth) -> float:
-    """Return the mean change of the sides of the cells, as a share."""
-    corner, _, _ = corner_triangles(before.flat_faces)
-    edges = np.concatenate([corner[:, [0, 1]], corner[:, [1, 2]], corner[:, [2, 0]]])
-    return float(np.abs(edge_lengths(after.flat, edges) / edge_lengths(before.flat, edges) - 1.0).mean())

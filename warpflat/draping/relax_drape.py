@@ -49,7 +49,7 @@ _LONGEST_ROUND = 0.1
 _FALLEN = 0.4
 # Rounds of the augmented Lagrangian, after which dynamic relaxation goes on alone; steps of L-BFGS in each, and of Newton's method.
 _MOST_ROUNDS, _STEPS_PER_ROUND, _NEWTON_STEPS = 80, 40, 4
-# Corrections that L-BFGS remembers; hanging cloth has more soft ways than 8.
+# Corrections that L-BFGS remembers; hanging cloth has more soft modes than 8.
 _MEMORY = 20
 # A round ends when the mean force is at most this share of what is allowed; Newton's method takes over from so many times that.
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
@@ -101,7 +101,7 @@ class _DynamicRelaxation:
     def __init__(self, cloth: SewnCloth, energy: DrapeEnergy) -> None:
         self._energy, device, count = energy, energy.device, len(cloth.designed)
         self.pressing, self._power, self._residual = (wp.zeros(count, wp.float64, device) for _ in range(3))
-        energy.motion.mass = wp.array(_MASS_SCALE * _stiffness_sums(cloth), dtype=wp.float64, device=device)
+        energy.motion.mass = wp.array(_MASS_SCALE * _gershgorin_bounds(cloth), dtype=wp.float64, device=device)
         halted, blocks = wp.zeros(1, wp.int32, device), min(_BLOCKS, count)
         begin = wp.array(np.linspace(0, count, blocks + 1), dtype=wp.int32, device=device)
         sums = wp.zeros(blocks, wp.float64, device)
@@ -127,7 +127,7 @@ class _DynamicRelaxation:
         return float(left.mean()) / mean, float(left.max()) / mean
 
 
-def _stiffness_sums(cloth: SewnCloth) -> FloatArray:
+def _gershgorin_bounds(cloth: SewnCloth) -> FloatArray:
     """Return #V, bounds of the sums of the stiffness around each vertex [N/m], by Gershgorin's discs."""
     fabric, (corner, _, gradient, area), (laplacian, stiffness) = cloth.fabric, cloth.cells(), cloth.laplacian()
     along = np.stack([-(gradient[:, :2] + gradient[:, 2:]), gradient[:, :2], gradient[:, 2:]], axis=1)
@@ -140,9 +140,9 @@ def _stiffness_sums(cloth: SewnCloth) -> FloatArray:
         steepest.append(max(getattr(fabric, f"stiffness_{direction}"), *slopes.tolist(), 0.0))
     share = 1.0 / (1.0 - fabric.poisson_ratio**2 * fabric.stiffness_weft / fabric.stiffness_warp)
     k = share * (1.0 + fabric.poisson_ratio) * np.array(steepest) + 2.0 * fabric.shear_stiffness
-    own = (size * total) @ k
-    own += fabric.shear_stiffness * (size * total[:, :, ::-1]).sum(axis=2)
-    sums = np.bincount(corner.ravel(), (own * area[:, None]).ravel(), minlength=len(cloth.designed))
+    per_corner = (size * total) @ k
+    per_corner += fabric.shear_stiffness * (size * total[:, :, ::-1]).sum(axis=2)
+    sums = np.bincount(corner.ravel(), (per_corner * area[:, None]).ravel(), minlength=len(cloth.designed))
     entries = abs(laplacian)
     return np.asarray(sums + entries @ (stiffness * entries.sum(axis=1)))
 
@@ -176,31 +176,35 @@ def relax_drape(
     energy = DrapeEnergy(cloth, body, options, np.zeros(len(start), bool) if held is None else held)
     relaxation = _DynamicRelaxation(cloth, energy)
     energy.motion.position.assign(start)
-    steps, rounds, residual, left, converged = 0, 0, np.inf, np.inf, False
+    steps, rounds, residual, left = 0, 0, np.inf, np.inf
     observe = observer or (lambda _: None)
     observe(start)
     lowest = -np.inf if energy.is_held else float(start[:, 1].max()) - _FALLEN
-    fell_off = eases = False
-    while steps < options.max_steps and not (converged or fell_off):
-        if steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS and not eases:
+    fell_off, before = False, np.inf
+    while not fell_off:
+        relaxation.run(_STEPS_PER_CHECK)
+        steps += _STEPS_PER_CHECK
+        residual, worst = relaxation.check()
+        observe(energy.motion.position.numpy())
+        converged = steps > _STEPS_PER_CHECK and residual <= options.tolerance and worst <= _WORST * options.tolerance
+        if callback is not None:
+            callback(steps, residual)
+        if converged or steps >= options.max_steps:
+            break
+        # Dynamic relaxation goes on by itself as long as it serves.
+        if residual < _EASES * before:
+            before = residual
+            continue
+        before = np.inf
+        while steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS and not fell_off:
             if rounds == 0:
                 energy.load_contact()
             rounds += 1
             left = _minimise(energy, options.tolerance, near=left <= _NEARLY_AT_REST * options.tolerance)
             observe(energy.motion.position.numpy())
             fell_off = float(energy.motion.position.numpy()[:, 1].max()) < lowest
-            if fell_off or left > options.tolerance:
-                continue
-        before = residual if eases else np.inf
-        relaxation.run(_STEPS_PER_CHECK)
-        steps += _STEPS_PER_CHECK
-        residual, worst = relaxation.check()
-        # Dynamic relaxation goes on by itself as long as it serves.
-        eases = residual < _EASES * before
-        observe(energy.motion.position.numpy())
-        converged = steps > _STEPS_PER_CHECK and residual <= options.tolerance and worst <= _WORST * options.tolerance
-        if callback is not None:
-            callback(steps, residual)
+            if left <= options.tolerance:
+                break
     return DrapedCloth(
         positions=energy.motion.position.numpy().copy(), pressing=relaxation.pressing.numpy().copy(),
         residual=residual, converged=converged, fell_off=fell_off, steps=steps, rounds=rounds,
@@ -215,7 +219,7 @@ def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
         energy: of the cloth, which is moved.
         tolerance: as of the options.
         near: whether rest is near. Then each step has a factor of its own (Newton's method). L-BFGS over one factor goes
-            farther in the same time, but wanders along the soft ways of hanging cloth without lowering the force.
+            farther in the same time, but wanders along the soft modes of hanging cloth without lowering the force.
 
     Returns:
         the mean force that was left, over the mean weight of a vertex.

@@ -143,19 +143,19 @@ class Drape:
             self.cloth, self.areas, misfit=self.misfit, bridged=self.bridged, lift=self.gap - self.designed_gap, gap=self.gap,
             strains={name: self.strains[name] for name in ("warp", "weft")},
         )  # fmt: skip
-        return tuple(self._with_cut(place) for place in found)
-
-    def _with_cut(self, place: Place) -> Place:
-        """Return a place of misfit or strain with the nearest of its piece's advised cuts in its words."""
-        if place.kind == "bridged":
-            return place
-        at = self.cloth.designed[place.vertex]
-        near = [
-            (float(np.linalg.norm(path - at, axis=1).min()), words)
-            for words, path in self.cuts.get(place.line.partition(".")[0], ())
-        ]
-        distance, words = min(near, default=(np.inf, ""))
-        return replace(place, words=f"{place.words}; {words} may take it up") if distance <= _NEAR_CUT else place
+        places = []
+        for place in found:
+            at = self.cloth.designed[place.vertex]
+            near = [
+                (float(np.linalg.norm(path - at, axis=1).min()), words)
+                for words, path in self.cuts.get(place.line.partition(".")[0], ())
+            ]
+            distance, words = min(near, default=(np.inf, ""))
+            # A hollow that is bridged asks for no cut.
+            if place.kind != "bridged" and distance <= _NEAR_CUT:
+                place = replace(place, words=f"{place.words}; {words} may take it up")
+            places.append(place)
+        return tuple(places)
 
     @property
     def fits(self) -> bool:

@@ -121,10 +121,30 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
     else:
         given = [garment] if isinstance(garment, Flattening) else list(garment)
         pieces = {piece.surface.name: piece for piece in given}
-    _check_pieces(pieces)
+    if not pieces:
+        raise InputError("drape: there is no piece; give a garment or at least one flat piece")
+    fabrics = {piece.fabric for piece in pieces.values()}
+    if len(fabrics) > 1:
+        names = " and ".join(sorted({fabric.name for fabric in fabrics})[:2])
+        raise InputError(f"drape: the pieces are of different cloths ({names}); flatten them all in one")
+    for name, piece in pieces.items():
+        if piece.flipped_faces:
+            raise InputError(f"drape: piece {name} has {piece.flipped_faces} mirrored faces; relax it to the end first")
     counts = [len(piece.positions) for piece in pieces.values()]
     begins = dict(zip(pieces, np.concatenate([[0], np.cumsum(counts)])[:-1].tolist(), strict=True))
-    welded = join_labels(sum(counts), *_pairs(pieces, begins, seams))
+    # Pairs of vertices that are sewn together: along seams, and on the two sides of every cut.
+    pairs: list[tuple[IntArray, IntArray]] = []
+    of_surface: dict[str, IntArray] = {}
+    for name, piece in pieces.items():
+        origin = piece.vertex_origin
+        first = np.full(len(piece.surface.vertices), -1, dtype=np.int32)
+        first[origin[::-1]] = np.arange(len(origin), dtype=np.int32)[::-1]
+        of_surface[name] = first + np.int32(begins[name])
+        # The sides of a cut have doubled vertices of the surface.
+        pairs.append((np.arange(len(origin), dtype=np.int32) + np.int32(begins[name]), of_surface[name][origin]))
+    for (one, other), sides in seams:
+        pairs.append((of_surface[one][sides[0]], of_surface[other][sides[1]]))
+    welded = join_labels(sum(counts), np.concatenate([a for a, _ in pairs]), np.concatenate([b for _, b in pairs]))
     flat = np.concatenate([piece.positions for piece in pieces.values()])
     space = np.concatenate([piece.surface.vertices[piece.vertex_origin] for piece in pieces.values()])
     designed = np.empty((int(welded.max()) + 1, 3))
@@ -146,7 +166,11 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
         weft=np.repeat([weft for _, weft in axes], sizes, axis=0),
         piece_faces={name: slice(ends[k], ends[k + 1]) for k, name in enumerate(pieces)},
         piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(pieces)},
-        lines=_lines(pieces, begins, welded),
+        lines={
+            f"{name}.{line}": welded[ids + begins[name]]
+            for name, piece in pieces.items()
+            for line, ids in piece.network.surface.lines.items()
+        },
     )
 
 
@@ -159,42 +183,3 @@ def _seams_of_form(form: FormResult) -> list[Seam]:
         )
     runs = [(seam.pieces, run.vertices) for seam in form.seams for run in seam.runs]
     return [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(form))]
-
-
-def _check_pieces(pieces: Mapping[str, Flattening]) -> None:
-    if not pieces:
-        raise InputError("drape: there is no piece; give a garment or at least one flat piece")
-    fabrics = {piece.fabric for piece in pieces.values()}
-    if len(fabrics) > 1:
-        names = " and ".join(sorted({fabric.name for fabric in fabrics})[:2])
-        raise InputError(f"drape: the pieces are of different cloths ({names}); flatten them all in one")
-    for name, piece in pieces.items():
-        if piece.flipped_faces:
-            raise InputError(f"drape: piece {name} has {piece.flipped_faces} mirrored faces; relax it to the end first")
-
-
-def _pairs(
-    pieces: Mapping[str, Flattening], begins: Mapping[str, int], seams: Sequence[Seam]
-) -> tuple[IntArray, IntArray]:
-    """Return pairs of vertices of the patterns that are sewn together: along seams, and the two sides of every cut."""
-    pairs: list[tuple[IntArray, IntArray]] = []
-    of_surface: dict[str, IntArray] = {}
-    for name, piece in pieces.items():
-        origin = piece.vertex_origin
-        first = np.full(len(piece.surface.vertices), -1, dtype=np.int32)
-        first[origin[::-1]] = np.arange(len(origin), dtype=np.int32)[::-1]
-        of_surface[name] = first + np.int32(begins[name])
-        # The sides of a cut have doubled vertices of the surface.
-        pairs.append((np.arange(len(origin), dtype=np.int32) + np.int32(begins[name]), of_surface[name][origin]))
-    for names, sides in seams:
-        pairs.append((of_surface[names[0]][sides[0]], of_surface[names[1]][sides[1]]))
-    return np.concatenate([a for a, _ in pairs]), np.concatenate([b for _, b in pairs])
-
-
-def _lines(pieces: Mapping[str, Flattening], begins: Mapping[str, int], welded: IntArray) -> dict[str, IntArray]:
-    """Return the lines of all pieces by "piece.line" as vertices of the sewn mesh."""
-    return {
-        f"{name}.{line}": welded[ids + begins[name]]
-        for name, piece in pieces.items()
-        for line, ids in piece.network.surface.lines.items()
-    }

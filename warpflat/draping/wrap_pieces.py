@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import coo_array, diags_array
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, nearest
 from warpflat.core.sparse import factor_symmetric
 from warpflat.draping.body import Body
 from warpflat.draping.mesh_pieces import FlatMesh, Weld
@@ -36,7 +36,7 @@ _WIDTH_OVER_DEPTH = 1.4
 _FAR = 0.25
 # Pieces that hang from the shoulders start this much higher [m].
 _ABOVE = 0.01
-# Rounds at most, and the mean way in one of them after which it is still enough for a start [m].
+# Rounds at most, and the mean displacement in one of them after which it is still enough for a start [m].
 _ROUNDS, _STILL = 300, 1e-4
 # The cloth is kept this far off the body [m], with this stiffness over the cloth's, and drawn by this share to where it was.
 _OFF, _HOLD_OFF, _INERTIA = 0.001, 30.0, 0.02
@@ -81,13 +81,25 @@ def wrap_pieces(
     """
     at = dict(at or {})
     for name in meshes:
-        if name not in at and (side := _arm_of(name)):
-            at[name] = side
+        words = name.lower().replace("_", " ").split()
+        if name not in at and any(word.startswith("sleeve") for word in words):
+            at[name] = "right arm" if "right" in words or "mirrored" in words else "left arm"
     trunk = [name for name in meshes if not at.get(name, "").endswith(" arm")]
     if not trunk:
         raise InputError("there are sleeves alone; a garment needs a piece around the trunk")
     fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
-    joins = _joins(meshes, welds, set(trunk))
+    # What each seam joins of the pieces around the trunk, a piece to itself too.
+    joins: list[_Join] = []
+    for seam in welds:
+        pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
+        for (piece, vertex), *others in seam:
+            for other, its in others:
+                if piece in trunk and other in trunk:
+                    pairs.setdefault((piece, other), []).append((vertex, its))
+        for names, rows in pairs.items():
+            if len(rows) > 1:
+                first, second = np.array(rows, dtype=np.int32).T
+                joins.append(_Join(names, (first, second)))
     plane = _lay_out(meshes, joins, trunk, fronts or trunk[:1])
     hangs_from_shoulder, width, _ = _girth(plane, joins)
     points = np.concatenate(list(plane.values()))
@@ -95,7 +107,10 @@ def wrap_pieces(
     if hangs_from_shoulder and top is None:
         level = float(max(body.line(f"shoulder {side}")[:, 1].max() for side in ("left", "right"))) + _ABOVE
     else:
-        level = _height(body, "waist" if top is None else top)
+        levels, at_level = body.levels(), "waist" if top is None else top
+        if isinstance(at_level, str) and at_level not in levels:
+            raise InputError(f"top: level {at_level!r} is unknown: {nearest(at_level, levels)}")
+        level = levels[at_level].height if isinstance(at_level, str) else float(at_level)
     waist = body.line("waist")
     girth = float(np.linalg.norm(np.diff(waist, axis=0, append=waist[:1]), axis=1).sum())
     if width < _LEAST_GIRTH * girth:
@@ -105,26 +120,26 @@ def wrap_pieces(
     origin = np.array([0.0, level - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
     frame = _Frame(origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     placed: dict[str, FloatArray] = {}
-    for tier in _tiers(plane, joins):
-        own = {name: plane[name] for name in tier}
-        inner = [join for join in joins if set(join.pieces) <= own.keys()]
-        _, of_tier, meets = _girth(own, inner)
+    # The pieces in tiers above each other: those of one are joined by upright seams.
+    tiers = {name: {name} for name in plane}
+    for join in joins:
+        a, b = join.pieces
+        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane)):
+            merged = tiers[a] | tiers[b]
+            tiers |= dict.fromkeys(merged, merged)
+    for tier in {id(tier): sorted(tier) for tier in tiers.values()}.values():
+        laid = {name: plane[name] for name in tier}
+        inner = [join for join in joins if set(join.pieces) <= laid.keys()]
+        _, of_tier, meets = _girth(laid, inner)
         if meets:
-            centred = _centred(own, of_tier, [name for name in fronts if name in own])
+            centred = _centred(laid, of_tier, [name for name in fronts if name in laid])
             placed |= {name: frame.roll(flat, of_tier, _WIDTH_OVER_DEPTH) for name, flat in centred.items()}
         else:
-            placed |= {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in own.items()}
+            placed |= {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in laid.items()}
     for name, side in at.items():
         if side.endswith(" arm"):
             placed[name] = _around_arm(meshes[name].points, body, side.removesuffix(" arm"))
     return placed
-
-
-def _arm_of(name: str) -> str:
-    words = name.lower().replace("_", " ").split()
-    if not any(word.startswith("sleeve") for word in words):
-        return ""
-    return "right arm" if "right" in words or "mirrored" in words else "left arm"
 
 
 def _around_arm(flat: FloatArray, body: Mannequin, side: str) -> FloatArray:
@@ -153,21 +168,6 @@ class _Join:
     def points(self, points: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the points on both sides (#J by 2)."""
         return points[self.pieces[0]][self.vertices[0]], points[self.pieces[1]][self.vertices[1]]
-
-
-def _joins(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], trunk: set[str]) -> list[_Join]:
-    """Return what each seam joins of the pieces around the trunk, a piece to itself too."""
-    found = []
-    for seam in welds:
-        pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
-        for (piece, vertex), *others in seam:
-            for other, its in others:
-                if {piece, other} <= trunk:
-                    pairs.setdefault((piece, other), []).append((vertex, its))
-        for names, rows in pairs.items():
-            first, second = np.array(rows, dtype=np.int32).T
-            found.append(_Join(names, (first, second)))
-    return [join for join in found if len(join.vertices[0]) > 1]
 
 
 def _lay_out(
@@ -207,17 +207,6 @@ def _centred(plane: Mapping[str, FloatArray], width: float, fronts: Sequence[str
     return {name: points - [middle, 0.0] for name, points in plane.items()}
 
 
-def _tiers(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> list[list[str]]:
-    """Return the pieces in tiers above each other: those of one are joined by upright seams."""
-    tiers = {name: {name} for name in plane}
-    for join in joins:
-        a, b = join.pieces
-        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane)):
-            merged = tiers[a] | tiers[b]
-            tiers |= dict.fromkeys(merged, merged)
-    return [list(names) for names in {id(tier): sorted(tier) for tier in tiers.values()}.values()]
-
-
 def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[bool, float, bool]:
     """Return whether the pieces hang from seams over the shoulders, the way around, and whether an upright seam meets behind the body.
 
@@ -240,17 +229,6 @@ def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[boo
             )
             shoulders = shoulders or (flat and on_top)
     return shoulders, max(around, default=whole), bool(around)
-
-
-def _height(body: Mannequin, top: str | float) -> float:
-    if not isinstance(top, str):
-        return float(top)
-    levels = body.levels()
-    if top not in levels:
-        from warpflat.core.errors import nearest
-
-        raise InputError(f"top: level {top!r} is unknown: {nearest(top, levels)}")
-    return levels[top].height
 
 
 def draw_together(cloth: SewnCloth, start: FloatArray, body: Body) -> FloatArray:

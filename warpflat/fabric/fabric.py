@@ -146,7 +146,18 @@ class Fabric:
                 f"stretched; must be below sqrt(stiffness_warp / stiffness_weft) = {bound:.3g}"
             )
         for key in ("curve_warp", "curve_weft"):
-            _check_curve(self.name, key, getattr(self, key))
+            previous = (0.0, 0.0)
+            for number, point in enumerate(getattr(self, key)):
+                if len(point) != 2 or not all(math.isfinite(x) for x in point):
+                    raise InputError(
+                        f"fabric {self.name!r}: {key}[{number}] = {point}; must be strain and tension [N/m]"
+                    )
+                if point[0] <= previous[0] or point[1] <= previous[1]:
+                    raise InputError(
+                        f"fabric {self.name!r}: {key}[{number}] = ({point[0]:g}, {point[1]:g}) does not rise from "
+                        f"({previous[0]:g}, {previous[1]:g}); strain and tension must both increase from (0, 0)"
+                    )
+                previous = (point[0], point[1])
 
     @property
     def softness(self) -> float:
@@ -231,16 +242,3 @@ def _unit_hint(key: str, value: float) -> str:
     if key == "strain_limit" and 2.0 < value <= 200.0:
         return f" (if that is in percent, write {value / 100.0:g})"
     return ""
-
-
-def _check_curve(fabric: str, key: str, points: Curve) -> None:
-    previous = (0.0, 0.0)
-    for number, point in enumerate(points):
-        if len(point) != 2 or not all(math.isfinite(x) for x in point):
-            raise InputError(f"fabric {fabric!r}: {key}[{number}] = {point}; must be strain and tension [N/m]")
-        if point[0] <= previous[0] or point[1] <= previous[1]:
-            raise InputError(
-                f"fabric {fabric!r}: {key}[{number}] = ({point[0]:g}, {point[1]:g}) does not rise from "
-                f"({previous[0]:g}, {previous[1]:g}); strain and tension must both increase from (0, 0)"
-            )
-        previous = (point[0], point[1])

@@ -214,19 +214,70 @@ def fabric_from_table(
         values: dict[str, Any] = {}
         origins: dict[str, Provenance] = {}
         if table.base is not None:
-            base = _base(name, table.base, read_shipped_fabrics() if library is None else library)
+            try:
+                base = fabric_called(table.base, read_shipped_fabrics() if library is None else library)
+            except InputError as error:
+                raise InputError(f"fabric {name!r}: base: {error}") from None
             values = {f.name: getattr(base, f.name) for f in fields(Fabric) if f.name not in ("name", "aliases")}
             origins = dict(values.pop("provenance"))
-        given, given_origins = _readings(table)
-        own, own_origins = _own_values(name, table, sources or {})
-        if table.base is not None:
-            # A curve of the base would contradict a stiffness that is given here.
+        # Readings replace what comes from the base, and values that the table gives itself replace readings.
+        given: dict[str, tuple[Any, Provenance]] = {}
+        if table.kes is not None:
+            kes, load = table.kes, table.kes.max_load * GF_PER_CM
+            origin = Provenance(source=kes.source, grade=kes.grade or "")
             for direction in ("warp", "weft"):
-                if f"stiffness_{direction}" in {**given, **own}:
-                    values.pop(f"curve_{direction}", None)
-                    origins.pop(f"curve_{direction}", None)
-        values.update(given | own)
-        origins.update(given_origins | own_origins)
+                emt, linearity = getattr(kes, f"emt_{direction}"), getattr(kes, f"lt_{direction}")
+                at_load = replace(origin, unit="percent at load", test_load=f"{load:.0f} N/m")
+                given[f"stiffness_{direction}"] = stiffness_from_extension(emt, load), at_load
+                if linearity is not None:
+                    source = f"{kes.source}; power law that meets EMT and LT"
+                    of_curve = replace(origin, source=source, unit="N/m", test_load=f"up to {load:.0f} N/m")
+                    given[f"curve_{direction}"] = curve_from_kes(emt, linearity, load), of_curve
+            if kes.g is not None:
+                given["shear_stiffness"] = shear_stiffness_from_kes(kes.g), replace(origin, unit="gf/(cm deg)")
+            if kes.b is not None:
+                given["bending"] = kes.b * KES_BENDING_UNIT, replace(origin, unit="gf cm2/cm")
+            if kes.w is not None:
+                given["areal_density"] = kes.w * 0.01, replace(origin, unit="mg/cm2")
+        if table.fast is not None:
+            fast = table.fast
+            origin = Provenance(source=fast.source, grade=fast.grade or "")
+            for direction in ("warp", "weft"):
+                e5, e20, e100 = (getattr(fast, f"{key}_{direction}") for key in ("e5", "e20", "e100"))
+                at_load = replace(origin, unit="percent at load", test_load="98.1 N/m")
+                given[f"stiffness_{direction}"] = stiffness_from_extension(e100, FAST_LOADS["e100"]), at_load
+                if e5 is not None and e20 is not None:
+                    of_curve = replace(origin, unit="N/m", test_load="4.9, 19.6 and 98.1 N/m")
+                    given[f"curve_{direction}"] = curve_from_fast(e5, e20, e100), of_curve
+            if fast.eb5 is not None:
+                of_eb5 = replace(origin, unit="percent", test_load="EB5")
+                given["shear_stiffness"] = shear_stiffness_from_fast(fast.eb5), of_eb5
+            if fast.c is not None and fast.w is not None:
+                of_c = replace(origin, unit="mm", test_load="bending length")
+                given["bending"] = bending_from_fast(fast.c, fast.w), of_c
+            if fast.w is not None:
+                given["areal_density"] = fast.w * 1e-3, replace(origin, unit="g/m2")
+        for key, units in _UNITS.items():
+            value: float | ValueTable | None = getattr(table, key)
+            if isinstance(value, ValueTable):
+                factor = _factor(name, key, value.unit, units)
+                spread = (value.spread[0] * factor, value.spread[1] * factor) if value.spread else None
+                origin = replace(_provenance(value, value.unit, sources or {}), spread=spread, at_least=value.at_least)
+                given[key] = value.value * factor, origin
+            elif value is not None:
+                given[key] = value, Provenance(unit=next(iter(units)))
+        for key in ("curve_warp", "curve_weft"):
+            curve: CurveTable | None = getattr(table, key)
+            if curve is not None:
+                points = _curve(curve, _factor(name, key, curve.unit, _TENSILE))
+                given[key] = points, _provenance(curve, curve.unit, sources or {})
+        # A curve of the base would contradict a stiffness that is given here.
+        for direction in ("warp", "weft"):
+            if f"stiffness_{direction}" in given:
+                values.pop(f"curve_{direction}", None)
+                origins.pop(f"curve_{direction}", None)
+        values.update((key, value) for key, (value, _) in given.items())
+        origins.update((key, origin) for key, (_, origin) in given.items())
         for key in ("stiffness_warp", "stiffness_weft", "shear_stiffness", "areal_density"):
             if key not in values:
                 raise InputError(f"fabric {name!r}: {key} is missing; {_how_to_give(key)}")
@@ -234,36 +285,6 @@ def fabric_from_table(
         return Fabric(name=name, aliases=tuple(table.aliases), provenance=origins, **values)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-
-
-def _base(name: str, base: str, library: Mapping[str, Fabric]) -> Fabric:
-    try:
-        return fabric_called(base, library)
-    except InputError as error:
-        raise InputError(f"fabric {name!r}: base: {error}") from None
-
-
-def _own_values(
-    name: str, table: FabricTable, sources: Mapping[str, str]
-) -> tuple[dict[str, Any], dict[str, Provenance]]:
-    values: dict[str, Any] = {}
-    origins: dict[str, Provenance] = {}
-    for key, units in _UNITS.items():
-        given: float | ValueTable | None = getattr(table, key)
-        if isinstance(given, ValueTable):
-            factor = _factor(name, key, given.unit, units)
-            values[key] = given.value * factor
-            spread = (given.spread[0] * factor, given.spread[1] * factor) if given.spread else None
-            origins[key] = replace(_provenance(given, given.unit, sources), spread=spread, at_least=given.at_least)
-        elif given is not None:
-            values[key] = given
-            origins[key] = Provenance(unit=next(iter(units)))
-    for key in ("curve_warp", "curve_weft"):
-        curve: CurveTable | None = getattr(table, key)
-        if curve is not None:
-            values[key] = _curve(curve, _factor(name, key, curve.unit, _TENSILE))
-            origins[key] = _provenance(curve, curve.unit, sources)
-    return values, origins
 
 
 def _provenance(origin: _Origin, unit: str, sources: Mapping[str, str]) -> Provenance:
@@ -293,65 +314,6 @@ def _curve(curve: CurveTable, factor: float) -> Curve:
             strain = e0 + part * (e1 - e0)
             points.append((strain, (k0 + part * (k1 - k0)) * factor * strain))
     return tuple(points)
-
-
-def _readings(table: FabricTable) -> tuple[dict[str, Any], dict[str, Provenance]]:
-    values: dict[str, Any] = {}
-    origins: dict[str, Provenance] = {}
-    if table.kes is not None:
-        kes = table.kes
-        load = kes.max_load * GF_PER_CM
-        for direction in ("warp", "weft"):
-            emt = getattr(kes, f"emt_{direction}")
-            linearity = getattr(kes, f"lt_{direction}")
-            values[f"stiffness_{direction}"] = stiffness_from_extension(emt, load)
-            origins[f"stiffness_{direction}"] = Provenance(
-                source=kes.source, grade=kes.grade or "", unit="percent at load", test_load=f"{load:.0f} N/m"
-            )
-            if linearity is not None:
-                values[f"curve_{direction}"] = curve_from_kes(emt, linearity, load)
-                origins[f"curve_{direction}"] = Provenance(
-                    source=f"{kes.source}; power law that meets EMT and LT",
-                    grade=kes.grade or "",
-                    unit="N/m",
-                    test_load=f"up to {load:.0f} N/m",
-                )
-        if kes.g is not None:
-            values["shear_stiffness"] = shear_stiffness_from_kes(kes.g)
-            origins["shear_stiffness"] = Provenance(source=kes.source, grade=kes.grade or "", unit="gf/(cm deg)")
-        if kes.b is not None:
-            values["bending"] = kes.b * KES_BENDING_UNIT
-            origins["bending"] = Provenance(source=kes.source, grade=kes.grade or "", unit="gf cm2/cm")
-        if kes.w is not None:
-            values["areal_density"] = kes.w * 0.01
-            origins["areal_density"] = Provenance(source=kes.source, grade=kes.grade or "", unit="mg/cm2")
-    if table.fast is not None:
-        _fast(table.fast, values, origins)
-    return values, origins
-
-
-def _fast(fast: FastTable, values: dict[str, Any], origins: dict[str, Provenance]) -> None:
-    grade = fast.grade or ""
-    for direction in ("warp", "weft"):
-        e5, e20, e100 = (getattr(fast, f"{key}_{direction}") for key in ("e5", "e20", "e100"))
-        values[f"stiffness_{direction}"] = stiffness_from_extension(e100, FAST_LOADS["e100"])
-        origins[f"stiffness_{direction}"] = Provenance(
-            source=fast.source, grade=grade, unit="percent at load", test_load="98.1 N/m"
-        )
-        if e5 is not None and e20 is not None:
-            values[f"curve_{direction}"] = curve_from_fast(e5, e20, e100)
-            origins[f"curve_{direction}"] = Provenance(
-                source=fast.source, grade=grade, unit="N/m", test_load="4.9, 19.6 and 98.1 N/m"
-            )
-    if fast.eb5 is not None:
-        values["shear_stiffness"] = shear_stiffness_from_fast(fast.eb5)
-        origins["shear_stiffness"] = Provenance(source=fast.source, grade=grade, unit="percent", test_load="EB5")
-    if fast.c is not None and fast.w is not None:
-        values["bending"] = bending_from_fast(fast.c, fast.w)
-        origins["bending"] = Provenance(source=fast.source, grade=grade, unit="mm", test_load="bending length")
-    if fast.w is not None:
-        values["areal_density"] = fast.w * 1e-3
-        origins["areal_density"] = Provenance(source=fast.source, grade=grade, unit="g/m2")
 
 
 def _how_to_give(key: str) -> str:

@@ -39,7 +39,7 @@ class Adjustment:
 
     Attributes:
         like: another profile whose outline is mixed in by `weight`.
-        weight: 0 keeps the own outline, 1 takes all of the other's.
+        weight: 0 keeps the outline, 1 takes all of the other's.
         bridge: hollows are bridged, as cloth hangs from bust point to bust point.
         scale: blow-up about the profile's middle.
         offset_cm: distance that the profile moves outward [cm].
@@ -101,26 +101,6 @@ def adjusted_vertices(
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
     """
     ease = ease or {}
-    _check_levels(profiles, ease)
-    out = vertices.copy()
-    if profiles or ruled or ease or bridged:
-        changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
-        _move_rings(out, layout, vertices, changes, ruled)
-        for pair in bridged:
-            bridge_rows(out, layout.rings, layout.level_row, pair)
-        _move_sheet(out, layout, vertices, changes.get("chest"))
-        _move_arms(out, layout, vertices, changes, ruled)
-        _move_legs(out, layout, vertices, changes, ruled)
-        _move_neck(out, layout, vertices)
-    return out
-
-
-def _check_levels(profiles: Mapping[str, Adjustment], ease: Mapping[str, float]) -> None:
-    """Check that levels can be adjusted, and are like levels of the same part.
-
-    Raises:
-        InputError: one cannot, or is not.
-    """
     known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS]
     for level in ease:
         if level not in known or level == "crotch":
@@ -132,6 +112,19 @@ def _check_levels(profiles: Mapping[str, Adjustment], ease: Mapping[str, float])
         parts = [next((i for i, part in enumerate(_PARTS) if name in part), -1) for name in (level, change.like)]
         if change.like and (-1 in parts or parts[0] != parts[1]):
             raise InputError(f"form: profile {level} cannot be like {change.like}; take a level of the same part")
+    out = vertices.copy()
+    if profiles or ruled or ease or bridged:
+        changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
+        _move_rings(out, layout, vertices, changes, ruled)
+        for pair in bridged:
+            bridge_rows(out, layout.rings, layout.level_row, pair)
+        _move_sheet(out, layout, vertices, changes.get("chest"))
+        _move_arms(out, layout, vertices, changes, ruled)
+        _move_legs(out, layout, vertices, changes, ruled)
+        # The neck follows its base, its top stays.
+        share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
+        out[layout.neck] = vertices[layout.neck] + share * (out[layout.neck[0]] - vertices[layout.neck[0]])
+    return out
 
 
 def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
@@ -307,29 +300,24 @@ def _move_arms(
     ruled: Sequence[tuple[str, str]],
 ) -> None:
     from scipy.interpolate import PchipInterpolator
+    from scipy.ndimage import gaussian_filter1d
 
     for grid in layout.arms.values():
-        own = _level_moves(body, grid, layout.arm_row, ARM_LEVELS[1:], changes, _arm_move)
-        moves = [out[grid[0]] - body[grid[0]], *own]
+        at_levels = _level_moves(body, grid, layout.arm_row, ARM_LEVELS[1:], changes, _arm_move)
+        moves = [out[grid[0]] - body[grid[0]], *at_levels]
         rows = np.array([layout.arm_row[level] for level in ARM_LEVELS])
         out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
         if changes.get("elbow", (None, 0.0))[1] > 0.0:
-            _round_elbow(out, layout, grid)
+            # The rows of a loose sleeve go around the elbow in a bow: cloth does not follow the crease of a bent arm.
+            first, elbow, last = (layout.arm_row[level] for level in ("biceps", "elbow", "wrist"))
+            bent = out[grid[first : last + 1]]
+            apart = np.linalg.norm(np.diff(bent.mean(axis=1), axis=0), axis=1)[: 2 * (elbow - first)].mean()
+            smooth = gaussian_filter1d(bent, _ELBOW_BOW / max(apart, 1e-9), axis=0, mode="nearest")
+            near = np.interp(np.arange(first, last + 1), [first, elbow, last], [0.0, 1.0, 0.0])[:, None, None]
+            out[grid[first : last + 1]] = bent + near * near * (3.0 - 2.0 * near) * (smooth - bent)
         for pair in ruled:
             if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
                 rule_rows(out, grid, layout.arm_row, pair, None)
-
-
-def _round_elbow(out: FloatArray, layout: Layout, grid: IntArray) -> None:
-    """Lead the rows of a loose sleeve around the elbow in a bow: cloth does not follow the crease of a bent arm."""
-    from scipy.ndimage import gaussian_filter1d
-
-    first, elbow, last = (layout.arm_row[level] for level in ("biceps", "elbow", "wrist"))
-    rows = out[grid[first : last + 1]]
-    apart = np.linalg.norm(np.diff(rows.mean(axis=1), axis=0), axis=1)[: 2 * (elbow - first)].mean()
-    smooth = gaussian_filter1d(rows, _ELBOW_BOW / max(apart, 1e-9), axis=0, mode="nearest")
-    near = np.interp(np.arange(first, last + 1), [first, elbow, last], [0.0, 1.0, 0.0])[:, None, None]
-    out[grid[first : last + 1]] = rows + near * near * (3.0 - 2.0 * near) * (smooth - rows)
 
 
 def _move_legs(
@@ -391,8 +379,3 @@ def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment, eas
     if factor <= 0.2:
         raise InputError(f"form: an arm profile of {length * 100:.0f} cm cannot shrink to {factor:.0%}")
     return middle + factor * shape - row
-
-
-def _move_neck(out: FloatArray, layout: Layout, body: FloatArray) -> None:
-    share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
-    out[layout.neck] = body[layout.neck] + share * (out[layout.neck[0]] - body[layout.neck[0]])

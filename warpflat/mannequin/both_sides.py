@@ -11,7 +11,7 @@ from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 
 __all__ = ["average_sides", "sides_note"]
 
-# Left and right may differ by so much [m] before it is told.
+# Left and right may differ by so much [m] before a note says so.
 _TOLD = 0.010
 
 
@@ -40,15 +40,15 @@ def sides_note(vertices: FloatArray, layout: Layout, *, averaged: bool) -> tuple
     limbs = {"arms": list(layout.arms.values()), "legs": list(layout.legs.values())}
     parts = {name: np.unique(np.concatenate([grid.ravel() for grid in grids])) for name, grids in limbs.items()}
     parts = {"trunk": np.setdiff1d(np.arange(layout.vertex_count), np.concatenate([*parts.values()])), **parts}
-    told = []
+    unlike = []
     for name, of_part in parts.items():
         worst = of_part[np.argmax(apart[of_part])]
         if apart[worst] > _TOLD:
-            told.append(f"{name} by up to {1000.0 * apart[worst]:.0f} mm at a height of {vertices[worst, 1]:.2f} m")
-    if not told:
+            unlike.append(f"{name} by up to {1000.0 * apart[worst]:.0f} mm at a height of {vertices[worst, 1]:.2f} m")
+    if not unlike:
         return ()
     done = "their average is taken; symmetric = false keeps them" if averaged else "they are kept"
-    return (f"left and right differ: {', '.join(told)}; {done}",)
+    return (f"left and right differ: {', '.join(unlike)}; {done}",)
 
 
 def _mirror_image(vertices: FloatArray, layout: Layout) -> FloatArray:

@@ -87,24 +87,19 @@ def select_bricks(layout: Layout, patterns: Iterable[str]) -> list[str]:
     """
     chosen: set[str] = set()
     for pattern in patterns:
-        chosen |= _expand(layout, pattern)
+        band, slash, column = pattern.strip().partition("/")
+        for alias, level in _ALIASES.items():
+            band = band.replace(alias, level)
+        upper, dash, lower = band.partition("-")
+        if not slash or not dash or not column:
+            raise InputError(f"brick {pattern!r}: write upper-lower/column, as waist-hip/front-left-centre")
+        bands = _bands(upper, lower, pattern)
+        columns = {name.partition("/")[2] for name in layout.bricks if name.partition("/")[0] in bands}
+        matching = fnmatch.filter(columns, column)
+        if not matching:
+            raise InputError(f"brick {pattern!r}: no column {column!r} there: {nearest(column, columns)}")
+        chosen |= {f"{b}/{c}" for b in bands for c in matching} & set(layout.bricks)
     return [name for name in layout.bricks if name in chosen]
-
-
-def _expand(layout: Layout, pattern: str) -> set[str]:
-    band, slash, column = pattern.strip().partition("/")
-    for alias, level in _ALIASES.items():
-        band = band.replace(alias, level)
-    upper, dash, lower = band.partition("-")
-    if not slash or not dash or not column:
-        raise InputError(f"brick {pattern!r}: write upper-lower/column, as waist-hip/front-left-centre")
-    bands = _bands(upper, lower, pattern)
-    columns = {name.partition("/")[2] for name in layout.bricks if name.partition("/")[0] in bands}
-    matching = fnmatch.filter(columns, column)
-    if not matching:
-        raise InputError(f"brick {pattern!r}: no column {column!r} there: {nearest(column, columns)}")
-    names = {f"{b}/{c}" for b in bands for c in matching}
-    return names & set(layout.bricks)
 
 
 def _bands(upper: str, lower: str, pattern: str) -> set[str]:

@@ -21,8 +21,8 @@ def bridge_row(row: FloatArray) -> FloatArray:
     s = arc_lengths(row, closed=True)
     at = np.append(s[touch], s[-1] + s[touch[0]])
     around = np.vstack([row[touch], row[touch[:1]]])
-    own = np.where(s[:-1] < at[0], s[:-1] + s[-1], s[:-1])
-    return np.column_stack([np.interp(own, at, around[:, i]) for i in range(3)])
+    places = np.where(s[:-1] < at[0], s[:-1] + s[-1], s[:-1])
+    return np.column_stack([np.interp(places, at, around[:, i]) for i in range(3)])
 
 
 def bridge_rows(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str]) -> None:

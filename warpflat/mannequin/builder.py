@@ -1,4 +1,4 @@
-"""Laying the grid on a blueprint: rings by their profiles, the shoulders as a smooth sheet between their curves."""
+"""Laying the grid on a blueprint: rings by their profiles, the crotch curve and the legs, the shoulders as a smooth sheet."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths, polyline_length, resample
-from warpflat.mannequin.blueprint import Blueprint, Profile, QuarterCurves
-from warpflat.mannequin.layout import QUARTERS, RING_LEVELS, Layout
-from warpflat.mannequin.leg_builder import set_legs
+from warpflat.mannequin.blueprint import Blueprint, LegCurves, LegProfile, Profile
+from warpflat.mannequin.layout import LEG_LEVELS, QUARTERS, RING_LEVELS, Layout
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
-from warpflat.mannequin.sheet import sheet_laplacian
+from warpflat.mannequin.sheet import fill_fork, sheet_laplacian
 
 __all__ = ["build_trunk", "build_vertices", "girth_ring", "quarter_fractions"]
+
 
 # How strongly the sheet is drawn to the across-chest rows and centre lines, and to a scan, against one for its own
 # smoothness, on a grid of 10 mm. The operator shrinks with the square of the edge; a curve's and a sheet's count of
@@ -27,7 +27,12 @@ _ATTRACT_ROUNDS = 4
 def build_trunk(layout: Layout, blueprint: Blueprint) -> FloatArray:
     """Return the grid's vertices with the rings up to the bust and the legs in their places (layout.vertex_count by 3 [m]), others NaN."""
     vertices = np.full((layout.vertex_count, 3), np.nan)
-    _set_rings(vertices, layout, blueprint)
+    for low, high in itertools.pairwise(RING_LEVELS):
+        first, last = layout.level_row[low], layout.level_row[high]
+        for row in range(first, last + 1):
+            share = (row - first) / (last - first)
+            height = (1.0 - share) * blueprint.heights[low] + share * blueprint.heights[high]
+            vertices[layout.rings[row]] = girth_ring(layout, blueprint.profile(height), height)
     set_legs(vertices, layout, blueprint.legs)
     return vertices
 
@@ -44,11 +49,64 @@ def build_vertices(layout: Layout, blueprint: Blueprint, trunk: FloatArray | Non
         layout.vertex_count by 3, positions [m].
     """
     vertices = build_trunk(layout, blueprint) if trunk is None else trunk.copy()
-    _dip_sides(vertices, layout, blueprint)
-    _set_bounds(vertices, layout, blueprint)
-    _set_sides(vertices, layout)
+    # At the sides the rows from the underbust to the bust are lowered, so that all rows up to the underarm share its height:
+    # a bust lies level with the armpits on many bodies, and the armhole ends below them. A tape still reads each row's girth.
+    first, bust, chest = (layout.level_row[level] for level in ("underbust", "bust", "chest"))
+    base = vertices[layout.rings[: bust + 1]].copy()
+    heights = base[:, 0, 1]
+    quarter, count = layout.quarter, layout.rings.shape[1]
+    reach = quarter - layout.to_princess
+    for side, name in ((quarter, "front-left"), (3 * quarter, "front-right")):
+        under = float(blueprint.quarters[name].armhole[-1, 1])
+        for row in range(first + 1, bust + 1):
+            even = heights[first] + (under - heights[first]) * (row - first) / (chest - first)
+            dip = max(0.0, heights[row] - even)
+            for column in range(side - reach + 1, side + reach):
+                near = 1.0 - abs(column - side) / reach
+                height = heights[row] - near * near * (3.0 - 2.0 * near) * dip
+                line = base[:, column % count]
+                vertices[layout.rings[row, column % count]] = [np.interp(height, heights, line[:, k]) for k in range(3)]
+    for row in range(first + 1, bust + 1):
+        ring = layout.rings[row]
+        vertices[ring] = scale_to_girth(vertices[ring], convex_girth(base[row]))
+    # Neckline, shoulder seams and armholes.
+    n0, n1, n2, n3 = layout.columns
+    m2, m3 = len(layout.front) - 1, len(layout.yokes["front-left"]) - 1
+    for name in QUARTERS:
+        c = blueprint.quarters[name]
+        vertices[_quarter_ids(layout, name)[0]] = _pieces(c.neckline, [0.0, c.bend, 1.0], [n0, m3])
+    loop = layout.neck[0]
+    vertices[loop] = _to_length(vertices[loop], blueprint.neck)
+    for name in QUARTERS:
+        c = blueprint.quarters[name]
+        neckline, shoulder, armhole, _, _ = _quarter_ids(layout, name)
+        seam = _pieces(c.shoulder, [0.0, 0.5, 1.0], [n1, n2])
+        # The neck base was a little too short as a polygon; the seam's start follows it.
+        follow = np.linspace(1.0, 0.0, len(seam))[:, None] * (vertices[neckline[-1]] - seam[0])
+        vertices[shoulder] = seam + follow
+        # The yoke row ends as far down the armhole as the neckline's bend lies below the shoulder seam, within what leaves
+        # both strips of rows room.
+        upper = c.notch * polyline_length(c.armhole)
+        drop = (1.0 - c.bend) * polyline_length(c.neckline)
+        yoke = c.notch * float(np.clip(0.9 * drop / max(upper, 1e-9), 0.22, 0.5))
+        vertices[armhole] = _pieces(c.armhole, [0.0, yoke, c.notch, 1.0], [m3, m2, n3])
+    # The side lines go straight on from the rows below the bust to the underarm points, without a kink.
+    for column in (quarter, 3 * quarter):
+        ids = layout.rings[bust : chest + 1, column]
+        start, end = vertices[ids[0]], vertices[ids[-1]]
+        along = start - vertices[layout.rings[bust - 3, column]]
+        corner = start + 0.5 * np.linalg.norm(end - start) / np.linalg.norm(along) * along
+        t = np.linspace(0.0, 1.0, len(ids))[1:-1, None]
+        vertices[ids[1:-1]] = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * corner + t**2 * end
     _set_arms(vertices, layout, blueprint)
-    _set_neck(vertices, layout, blueprint)
+    base = vertices[layout.neck[0]]
+    s = arc_lengths(base, closed=True)
+    top = resample(blueprint.collar, s[:-1] / s[-1], closed=True)
+    rows = len(layout.neck) - 1
+    t = (np.arange(1, rows + 1) / rows)[:, None, None]
+    # Concave towards the shoulder: the neck leaves its base slanting inwards and ends upright.
+    swing = 0.35 * (top.mean(axis=0) - base.mean(axis=0)) * (t - t**2)
+    vertices[layout.neck[1:]] = (1 - t) * base + t * top + swing
     _set_sheet(vertices, layout, blueprint)
     return vertices
 
@@ -84,40 +142,6 @@ def girth_ring(layout: Layout, profile: Profile, height: float) -> FloatArray:
     return scale_to_girth(row, profile.girth)
 
 
-def _set_rings(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
-    for low, high in itertools.pairwise(RING_LEVELS):
-        first, last = layout.level_row[low], layout.level_row[high]
-        for row in range(first, last + 1):
-            share = (row - first) / (last - first)
-            height = (1.0 - share) * blueprint.heights[low] + share * blueprint.heights[high]
-            vertices[layout.rings[row]] = girth_ring(layout, blueprint.profile(height), height)
-
-
-def _dip_sides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
-    """Lower the rows from the underbust to the bust at the sides, so that all rows up to the underarm share its height.
-
-    A bust lies level with the armpits on many bodies, and the armhole ends below them. A tape still reads each row's girth.
-    """
-    first, bust, chest = (layout.level_row[level] for level in ("underbust", "bust", "chest"))
-    base = vertices[layout.rings[: bust + 1]].copy()
-    heights = base[:, 0, 1]
-    quarter, count = layout.quarter, layout.rings.shape[1]
-    reach = quarter - layout.to_princess
-    for side, name in ((quarter, "front-left"), (3 * quarter, "front-right")):
-        under = float(blueprint.quarters[name].armhole[-1, 1])
-        for row in range(first + 1, bust + 1):
-            even = heights[first] + (under - heights[first]) * (row - first) / (chest - first)
-            dip = max(0.0, heights[row] - even)
-            for column in range(side - reach + 1, side + reach):
-                near = 1.0 - abs(column - side) / reach
-                height = heights[row] - near * near * (3.0 - 2.0 * near) * dip
-                line = base[:, column % count]
-                vertices[layout.rings[row, column % count]] = [np.interp(height, heights, line[:, k]) for k in range(3)]
-    for row in range(first + 1, bust + 1):
-        ring = layout.rings[row]
-        vertices[ring] = scale_to_girth(vertices[ring], convex_girth(base[row]))
-
-
 def _pieces(curve: FloatArray, knots: list[float], counts: list[int]) -> FloatArray:
     """Return points of a curve: `counts` cells between consecutive `knots` (shares of the length), ends included."""
     spans = zip(knots[:-1], knots[1:], counts, strict=True)
@@ -147,52 +171,10 @@ def _quarter_ids(layout: Layout, name: str) -> tuple[IntArray, IntArray, IntArra
     return neckline, yoke[-1], armhole, half[0], centre
 
 
-def _set_bounds(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
-    """Set the vertices of neckline, shoulder seams and armholes."""
-    n0, n1, n2, n3 = layout.columns
-    m2, m3 = len(layout.front) - 1, len(layout.yokes["front-left"]) - 1
-    for name in QUARTERS:
-        c = blueprint.quarters[name]
-        vertices[_quarter_ids(layout, name)[0]] = _pieces(c.neckline, [0.0, c.bend, 1.0], [n0, m3])
-    loop = layout.neck[0]
-    vertices[loop] = _to_length(vertices[loop], blueprint.neck)
-    for name in QUARTERS:
-        c = blueprint.quarters[name]
-        neckline, shoulder, armhole, _, _ = _quarter_ids(layout, name)
-        seam = _pieces(c.shoulder, [0.0, 0.5, 1.0], [n1, n2])
-        # The neck base was a little too short as a polygon; the seam's start follows it.
-        follow = np.linspace(1.0, 0.0, len(seam))[:, None] * (vertices[neckline[-1]] - seam[0])
-        vertices[shoulder] = seam + follow
-        yoke = c.notch * _yoke_share(c)
-        vertices[armhole] = _pieces(c.armhole, [0.0, yoke, c.notch, 1.0], [m3, m2, n3])
-
-
-def _set_sides(vertices: FloatArray, layout: Layout) -> None:
-    """Set the side lines from the bust to the underarm points: straight on from the rows below, without a kink."""
-    bust, chest = layout.level_row["bust"], layout.level_row["chest"]
-    for column in (layout.quarter, 3 * layout.quarter):
-        ids = layout.rings[bust : chest + 1, column]
-        start, end = vertices[ids[0]], vertices[ids[-1]]
-        way = start - vertices[layout.rings[bust - 3, column]]
-        corner = start + 0.5 * np.linalg.norm(end - start) / np.linalg.norm(way) * way
-        t = np.linspace(0.0, 1.0, len(ids))[1:-1, None]
-        vertices[ids[1:-1]] = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * corner + t**2 * end
-
-
 def _to_length(loop: FloatArray, length: float) -> FloatArray:
     """Return a closed polygon, #P by 3, blown up about its middle until it is `length` [m] long."""
     middle = loop.mean(axis=0)
     return middle + (loop - middle) * (length / polyline_length(loop, closed=True))
-
-
-def _yoke_share(c: QuarterCurves) -> float:
-    """Return share of the upper armhole, from the shoulder point down to the notch, at which the yoke row ends.
-
-    As far down as the neckline's bend lies below the shoulder seam, within what leaves both strips of rows room.
-    """
-    upper = c.notch * polyline_length(c.armhole)
-    drop = (1.0 - c.bend) * polyline_length(c.neckline)
-    return float(np.clip(0.9 * drop / max(upper, 1e-9), 0.22, 0.5))
 
 
 def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
@@ -234,17 +216,6 @@ def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
         vertices[grid[1 : rows["biceps"]]] = h00 * hole + h10 * reach * leave + h01 * rings[0] + h11 * reach * axis
 
 
-def _set_neck(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
-    base = vertices[layout.neck[0]]
-    s = arc_lengths(base, closed=True)
-    top = resample(blueprint.collar, s[:-1] / s[-1], closed=True)
-    rows = len(layout.neck) - 1
-    t = (np.arange(1, rows + 1) / rows)[:, None, None]
-    # Concave towards the shoulder: the neck leaves its base slanting inwards and ends upright.
-    swing = 0.35 * (top.mean(axis=0) - base.mean(axis=0)) * (t - t**2)
-    vertices[layout.neck[1:]] = (1 - t) * base + t * top + swing
-
-
 def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
     """Set the vertices of chest, blades and shoulders: the smoothest sheet through the bounds that continues the bust's rows."""
     from scipy import sparse
@@ -260,32 +231,26 @@ def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
         bounds[local[neckline]] = bounds[local[armhole]] = True
     bounds[local[layout.rings[bust - 3]]] = True
     operator = laplacian[~bounds]
+    smooth = np.zeros((operator.shape[0], 3))
     coarse = layout.resolution / 0.010
-    guide_weight, attract_weight = _GUIDE * coarse**1.5, _ATTRACT * coarse**2
+    guide_weight = _GUIDE * coarse**1.5
     guides, targets = _guides(vertices, layout, blueprint)
     guide = sparse.identity(n).tocsr()[local[guides]] * guide_weight
-    free = np.flatnonzero(~known)
-    pull = sparse.identity(n).tocsr()[free] * (attract_weight if blueprint.attract else 1e-6)
-    matrix = sparse.vstack([operator, guide, pull]).tocsr()
-    unknown, fixed = matrix[:, free], matrix[:, np.flatnonzero(known)]
-    solve = factorized((unknown.T @ unknown).tocsc())
-    constant = fixed @ vertices[ids[known]]
-    position = np.zeros((len(free), 3))
-    for round_ in range(1 + (_ATTRACT_ROUNDS if blueprint.attract else 0)):
-        if round_ == 0:
-            # The first sheet follows the guides alone: there is none yet to draw to the body.
-            first = sparse.vstack([operator, guide * 5.0]).tocsr()
-            u, f = first[:, free], first[:, np.flatnonzero(known)]
-            right = (
-                np.vstack([np.zeros((operator.shape[0], 3)), 5.0 * guide_weight * targets]) - f @ vertices[ids[known]]
-            )
-            position = factorized((u.T @ u).tocsc())(np.asarray(u.T @ right))
-            continue
-        assert blueprint.attract is not None
-        drawn = blueprint.attract(position)
-        right = np.vstack([np.zeros((operator.shape[0], 3)), 0.0 * targets, attract_weight * drawn]) - constant
-        right[operator.shape[0] : operator.shape[0] + len(guides)] += guide_weight * targets
-        position = solve(np.asarray(unknown.T @ right))
+    free, fixed = np.flatnonzero(~known), np.flatnonzero(known)
+    # The first sheet follows the guides alone: there is none yet to draw to the body.
+    matrix = sparse.vstack([operator, guide * 5.0]).tocsr()
+    unknown, constant = matrix[:, free], matrix[:, fixed] @ vertices[ids[fixed]]
+    right = np.vstack([smooth, 5.0 * guide_weight * targets]) - constant
+    position = factorized((unknown.T @ unknown).tocsc())(np.asarray(unknown.T @ right))
+    if blueprint.attract is not None:
+        attract_weight = _ATTRACT * coarse**2
+        matrix = sparse.vstack([operator, guide, sparse.identity(n).tocsr()[free] * attract_weight]).tocsr()
+        unknown, constant = matrix[:, free], matrix[:, fixed] @ vertices[ids[fixed]]
+        solve = factorized((unknown.T @ unknown).tocsc())
+        for _ in range(_ATTRACT_ROUNDS):
+            drawn = attract_weight * blueprint.attract(position)
+            right = np.vstack([smooth, guide_weight * targets, drawn]) - constant
+            position = solve(np.asarray(unknown.T @ right))
     vertices[ids[free]] = position
 
 
@@ -313,3 +278,51 @@ def _guides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> tuple
             ids.append(centre[inner])
             places.append(line[inner])
     return np.concatenate(ids).astype(np.int32), np.concatenate(places)
+
+
+def set_legs(vertices: FloatArray, layout: Layout, legs: LegCurves) -> None:
+    """Set the vertices of crotch curve and legs; those of the rings are there.
+
+    Args:
+        vertices: layout.vertex_count by 3 [m], changed in place.
+        layout: the grid.
+        legs: the curves.
+    """
+    point, cells = layout.crotch_point, len(layout.crotch) - 1
+    shares = [np.linspace(0.0, legs.point, point + 1), np.linspace(legs.point, 1.0, cells - point + 1)[1:]]
+    curve = resample(legs.crotch, np.concatenate(shares))
+    # The curve was drawn to a profile; its ends follow the finished row.
+    ends = vertices[layout.crotch[[0, -1]]] - curve[[0, -1]]
+    along = np.linspace(0.0, 1.0, len(curve))[:, None]
+    vertices[layout.crotch[1:-1]] = (curve + (1.0 - along) * ends[0] + along * ends[1])[1:-1]
+    for side, grid in layout.legs.items():
+        rows = layout.leg_row
+        for high, low in itertools.pairwise(LEG_LEVELS[1:]):
+            for row in range(rows[high], rows[low] + 1):
+                share = (row - rows[high]) / (rows[low] - rows[high])
+                height = (1.0 - share) * legs.heights[high] + share * legs.heights[low]
+                vertices[grid[row]] = leg_ring(layout, legs.profile(side, height), height)
+    fill_fork(vertices, layout, legs.attract)
+
+
+def leg_ring(layout: Layout, profile: LegProfile, height: float) -> FloatArray:
+    """Return one closed row of a leg, #columns by 3 [m]; a tape around it reads exactly the profile's girth."""
+    inner, outer = layout.to_outseam - layout.quarter + layout.to_princess, layout.quarter - layout.to_princess
+    back = len(layout.crotch) - 1 - layout.crotch_point + layout.to_princess
+    a, b, c = profile.crease_front, profile.outseam, profile.crease_back
+    # Next to the inseam the columns keep the wider spacing that they have on the crotch curve.
+    near, far = _widened(inner, profile.spread), 1.0 - _widened(back, profile.spread)[::-1]
+    shares = [
+        a * near[:-1],
+        np.linspace(a, b, outer, endpoint=False),
+        np.linspace(b, c, outer, endpoint=False),
+        c + (1.0 - c) * far[:-1],
+    ]
+    flat = resample(profile.curve, np.concatenate(shares), closed=True)
+    return scale_to_girth(np.column_stack([flat[:, 0], np.full(len(flat), height), flat[:, 1]]), profile.girth)
+
+
+def _widened(cells: int, spread: float) -> FloatArray:
+    """Return `cells` + 1 shares from 0 to 1, the first steps 1 + `spread` times the mean one and the last 1 - `spread` times."""
+    u = np.linspace(0.0, 1.0, cells + 1)
+    return (1.0 + spread) * u - spread * u * u

@@ -118,7 +118,7 @@ def place_darts(
     """
     if not darts:
         return ()
-    cloths = {name: _cloth(layout, own, (opened or {}).get(name, ())) for name, own in bricks.items()}
+    cloths = {name: _cloth(layout, chosen, (opened or {}).get(name, ())) for name, chosen in bricks.items()}
     found: list[PlacedDart] = []
     for dart in darts:
         where = f"dart {dart.name!r}"
@@ -151,8 +151,8 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
         bricks: by piece, both sides of the body.
     """
     found: list[FormDart] = []
-    for piece, own in bricks.items():
-        cloth = _cloth(layout, own)
+    for piece, chosen in bricks.items():
+        cloth = _cloth(layout, chosen)
         if _bust_mouth(layout, cloth, "bust") is not None:
             found.append(FormDart(name="bust dart", piece=piece, line="bust"))
         for face in ("front", "back"):
@@ -214,8 +214,8 @@ def _grid_line(layout: Layout, dart: FormDart) -> list[int]:
     return layout.rings[:, round((1.0 - dart.between) * ends[0] + dart.between * ends[1])].tolist()
 
 
-def _runs(line: Sequence[int], cloth: _Cloth) -> list[list[int]]:
-    """Return the stretches of a line inside a piece; those of a closed line join over its first vertex."""
+def _longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
+    """Return the longest stretch of a line inside a piece; those of a closed line join over its first vertex."""
     runs: list[list[int]] = []
     for a, b in itertools.pairwise(line):
         if (a, b) not in cloth.inner:
@@ -226,11 +226,7 @@ def _runs(line: Sequence[int], cloth: _Cloth) -> list[list[int]]:
             runs.append([a, b])
     if len(runs) > 1 and line[0] == line[-1] and runs[-1][-1] == runs[0][0]:
         runs[0] = [*runs.pop(), *runs[0][1:]]
-    return runs
-
-
-def _longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
-    return max(_runs(line, cloth), key=len, default=[])
+    return max(runs, key=len, default=[])
 
 
 def _place(layout: Layout, vertices: FloatArray, cloth: _Cloth, dart: FormDart) -> PlacedDart:
@@ -321,12 +317,12 @@ def dart_along(
     for wanted in (layout.mirror[row].tolist(), ids) if not _lies_left(layout, row) else (ids,):
         for line in layout.lines:
             run = _longest_run(layout.lines[line].tolist(), cloth)
-            for end, way in ((0.0, run), (1.0, run[::-1])):
-                if way[: len(wanted)] != wanted:
+            for end, directed in ((0.0, run), (1.0, run[::-1])):
+                if directed[: len(wanted)] != wanted:
                     continue
-                if len(wanted) == len(way):
+                if len(wanted) == len(directed):
                     return FormDart(name=name, piece=piece, line=line, part=(0.0, 1.0))
-                arc = arc_lengths(vertices[way])
+                arc = arc_lengths(vertices[directed])
                 share = round(float(arc[len(wanted) - 1] / arc[-1]), 3)
                 return FormDart(name=name, piece=piece, line=line, part=(end, abs(end - share)))
     return None
@@ -368,7 +364,17 @@ def _default_run(
     """Return a run from the mouth, the vertex that the dart points to (None for a plain length), and the dart's length [m]."""
     waist = set(layout.lines["waist"].tolist())
     if dart.at is not None:
-        run = _from_line(layout, run, dart, dart.at)
+        # The run begins on the line on which the mouth of the dart is to lie.
+        if dart.at not in layout.lines:
+            raise InputError(f"dart {dart.name!r}: line {dart.at!r} is unknown: {nearest(dart.at, layout.lines)}")
+        there = set(layout.lines[dart.at].tolist())
+        if not {run[0], run[-1]} & there:
+            ends = sorted({name for end in (run[0], run[-1]) for name in _lines_at(layout, end)} - {dart.line})
+            raise InputError(
+                f"dart {dart.name!r}: line {dart.line!r} does not end at {dart.at!r} in piece {dart.piece!r}; it ends at "
+                f"{', '.join(ends)}"
+            )
+        run = run if run[0] in there else run[::-1]
     elif dart.line == "bust":
         run = _bust_mouth(layout, cloth, "bust") or run
     elif run[-1] in waist and run[0] not in waist:
@@ -377,7 +383,12 @@ def _default_run(
     shoulder = any(line.startswith("shoulder") for line in _lines_at(layout, run[0]))
     if shoulder and face == "back":
         return run, None, _tip(dart, "back shoulder")
-    if (point := _point_of(layout, run, dart)) is not None and (dart.line == "bust" or shoulder or run[0] in waist):
+    # Darts point to a vertex inside the run: a bust point along the bust line, else that of the bust's level.
+    row = layout.rings[layout.level_row["bust"]]
+    apexes = {int(row[layout.to_princess]), int(layout.mirror[row[layout.to_princess]])}
+    pointed = apexes if dart.line == "bust" else set(layout.lines["bust"].tolist())
+    point = next((vertex for vertex in run[2:-1] if vertex in pointed), None)
+    if point is not None and (dart.line == "bust" or shoulder or run[0] in waist):
         reach = float(arc_lengths(vertices[run[: run.index(point) + 1]])[-1])
         return run, point, reach - _tip(dart, "bust" if dart.line == "bust" else face)
     if run[0] in waist and point is None:
@@ -387,32 +398,6 @@ def _default_run(
         f"dart {dart.name!r}: no usual dart lies along {dart.line!r} in piece {dart.piece!r}; give its part, "
         "from the mouth to the tip, as part = [0, 0.3]"
     )
-
-
-def _point_of(layout: Layout, run: list[int], dart: FormDart) -> int | None:
-    """Return the vertex inside a run to which darts point: a bust point along the bust line, else that of the bust's level."""
-    row = layout.rings[layout.level_row["bust"]]
-    apexes = {int(row[layout.to_princess]), int(layout.mirror[row[layout.to_princess]])}
-    there = apexes if dart.line == "bust" else set(layout.lines["bust"].tolist())
-    return next((vertex for vertex in run[2:-1] if vertex in there), None)
-
-
-def _from_line(layout: Layout, run: list[int], dart: FormDart, line: str) -> list[int]:
-    """Return a run in the direction from the line on which the mouth of the dart is to lie.
-
-    Raises:
-        InputError: that line is unknown, or the run does not end on it.
-    """
-    if line not in layout.lines:
-        raise InputError(f"dart {dart.name!r}: line {line!r} is unknown: {nearest(line, layout.lines)}")
-    there = set(layout.lines[line].tolist())
-    if not {run[0], run[-1]} & there:
-        ends = sorted({name for end in (run[0], run[-1]) for name in _lines_at(layout, end)} - {dart.line})
-        raise InputError(
-            f"dart {dart.name!r}: line {dart.line!r} does not end at {line!r} in piece {dart.piece!r}; it ends at "
-            f"{', '.join(ends)}"
-        )
-    return run if run[0] in there else run[::-1]
 
 
 def _lines_at(layout: Layout, vertex: int) -> list[str]:

@@ -28,16 +28,12 @@ def elbow_darts(layout: Layout, bricks: Mapping[str, Sequence[str]], vertices: F
         bricks: by piece, both sides of the body.
         vertices: the body's, #V by 3 [m].
     """
-    if _elbow_bend(layout, vertices) <= _BENT:
-        return ()
-    around = {"biceps-elbow/arm-left-back", "elbow-forearm/arm-left-back"}
-    sleeves = [piece for piece, own in bricks.items() if around <= set(own)]
-    return tuple(FormDart(name="elbow dart", piece=s, line=ELBOW, part=(1.0, _ELBOW_TIP)) for s in sleeves)
-
-
-def _elbow_bend(layout: Layout, vertices: FloatArray) -> float:
-    """Return the angle [degrees] between upper arm and forearm of the left arm; 0 is straight."""
     rows = [layout.arms["left"][layout.arm_row[level]] for level in ("biceps", "elbow", "wrist")]
     upper, lower = np.diff([vertices[row].mean(axis=0) for row in rows], axis=0)
     cosine = upper @ lower / (np.linalg.norm(upper) * np.linalg.norm(lower))
-    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    # The angle between upper arm and forearm; 0 is straight.
+    if np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))) <= _BENT:
+        return ()
+    around = {"biceps-elbow/arm-left-back", "elbow-forearm/arm-left-back"}
+    sleeves = [piece for piece, chosen in bricks.items() if around <= set(chosen)]
+    return tuple(FormDart(name="elbow dart", piece=s, line=ELBOW, part=(1.0, _ELBOW_TIP)) for s in sleeves)

@@ -176,13 +176,13 @@ def _step(
     from scipy.spatial import cKDTree
 
     posed, jacobian = model.jacobian(person)
-    own = model.turned(person, normals)
+    turned = model.turned(person, normals)
     found, _, place = scan.mesh.closest(posed)
     _, near = cKDTree(posed).query(scan.points)
     hit = np.concatenate([np.arange(model.count), near])
     directions = np.concatenate([scan.mesh.normals[found], scan.normals])
     away = posed[hit] - np.concatenate([place, scan.points])
-    alike = np.einsum("pa,pa->p", own[hit], directions) > _ALIKE
+    alike = np.einsum("pa,pa->p", turned[hit], directions) > _ALIKE
     squared = np.einsum("pa,pa->p", away, away) / reach**2
     weight = np.where(alike, 1.0 / (1.0 + squared) ** 2, 0.0)
     weight *= np.repeat([_VERTICES / model.count, _FROM_SCAN], [model.count, len(near)])

@@ -110,17 +110,20 @@ def _runs(pieces: Mapping[str, FormPiece]) -> list[tuple[tuple[str, str], SeamRu
             for i in range(len(ids) - 1):
                 here = (name, edge, i)
                 other = pairs.get(here)
-                if row and (other is None or not _goes_on(row[-1], here, other)):
+                # A run goes on while its segments follow each other along the same two edges.
+                last = row[-1] if row else None
+                goes_on = (
+                    last is not None
+                    and other is not None
+                    and (here[:2], other[:2]) == (last[0][:2], last[1][:2])
+                    and abs(other[2] - last[1][2]) == 1
+                )
+                if row and not goes_on:
                     found.append(_run(pieces, row))
                     row = []
                 if other is not None:
                     row.append((here, other))
     return [*found, _run(pieces, row)] if row else found
-
-
-def _goes_on(last: tuple[_Place, _Place], here: _Place, other: _Place) -> bool:
-    """Return whether two segments follow the last ones along the same two edges."""
-    return here[:2] == last[0][:2] and other[:2] == last[1][:2] and abs(other[2] - last[1][2]) == 1
 
 
 def _run(pieces: Mapping[str, FormPiece], row: Sequence[tuple[_Place, _Place]]) -> tuple[tuple[str, str], SeamRun]:

@@ -124,8 +124,8 @@ class FormResult:
 
     def has_rows(self, piece: str, rows: Mapping[str, Mapping[str, IntArray]]) -> bool:
         """Return whether darts run along the same vertices of a piece here."""
-        own, other = _rows_of(self.darts).get(piece, {}), rows.get(piece, {})
-        return own.keys() == other.keys() and all(np.array_equal(own[name], other[name]) for name in own)
+        placed, other = _rows_of(self.darts).get(piece, {}), rows.get(piece, {})
+        return placed.keys() == other.keys() and all(np.array_equal(placed[name], other[name]) for name in placed)
 
 
 @functools.cache
@@ -165,33 +165,8 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     where = f"form {name}"
     _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like", "ease", "neckline"}, where)
     base = shipped_form(str(data["like"])) if "like" in data else None
-    pieces = _pieces_from(data.get("pieces", {}), where)
-    if base and "pieces" not in data:
-        pieces = dict(base.pieces)
-    if not pieces:
-        raise InputError(f"{where}: pieces is missing; give at least one [pieces.NAME] with its bricks")
-    profiles = dict(base.profiles) if base else {}
-    known = {f.name for f in fields(Adjustment)}
-    for level, values in _table(data.get("profiles", {}), f"{where}: profiles").items():
-        _check_keys(_table(values, f"{where}: profile {level}"), known, f"{where}: profile {level}")
-        profiles[level] = _adjustment(values, f"{where}: profile {level}")
-    ruled = (*(base.ruled if base else ()), *_ruled_from(data.get("ruled", []), where))
-    blend = base.blend if base else None
-    if "blend" in data:
-        blend = _blend_from(data["blend"], where)
-    ease = ease_from(data.get("ease", {}), where, base=base.ease if base else {})
-    neckline = base.neckline if base else None
-    if "neckline" in data:
-        values, ranges = _table(data["neckline"], f"{where}: neckline"), Neckline.ranges()
-        _check_keys(values, set(ranges), f"{where}: neckline")
-        neckline = Neckline(**{k: _number(v, f"{where}: neckline: {k}", *ranges[k]) for k, v in values.items()})
-    return Form(name=name, pieces=pieces, profiles=profiles, ruled=ruled, blend=blend, ease=ease, neckline=neckline)
-
-
-def _pieces_from(value: object, where: str) -> dict[str, PieceRecipe]:
-    """Read the ``pieces`` of a form's table."""
     pieces = {}
-    for piece, recipe in _table(value, f"{where}: pieces").items():
+    for piece, recipe in _table(data.get("pieces", {}), f"{where}: pieces").items():
         _check_keys(_table(recipe, f"{where}: piece {piece}"), {"bricks", "datum", "open"}, f"{where}: piece {piece}")
         bricks = _strings(recipe.get("bricks"), f"{where}: piece {piece}: bricks")
         if not bricks:
@@ -200,32 +175,49 @@ def _pieces_from(value: object, where: str) -> dict[str, PieceRecipe]:
             bricks=bricks, datum=str(recipe.get("datum", "")),
             open=_strings(recipe.get("open", []), f"{where}: piece {piece}: open"),
         )  # fmt: skip
-    return pieces
-
-
-def _ruled_from(pairs: object, where: str) -> list[tuple[str, str]]:
-    """Read the ``ruled`` pairs of levels of a form's table."""
+    if base and "pieces" not in data:
+        pieces = dict(base.pieces)
+    if not pieces:
+        raise InputError(f"{where}: pieces is missing; give at least one [pieces.NAME] with its bricks")
+    profiles = dict(base.profiles) if base else {}
+    known = {f.name for f in fields(Adjustment)}
+    for level, values in _table(data.get("profiles", {}), f"{where}: profiles").items():
+        _check_keys(_table(values, f"{where}: profile {level}"), known, f"{where}: profile {level}")
+        at, ranges = f"{where}: profile {level}", Adjustment.ranges()
+        numbers = {k: _number(v, f"{at}: {k}", *ranges[k]) for k, v in values.items() if k in ranges}
+        bridge = values.get("bridge", False)
+        if not isinstance(bridge, bool):
+            raise InputError(f"{at}: bridge = {quote_value(bridge)}: true or false is needed")
+        like = str(values["like"]) if "like" in values else None
+        profiles[level] = Adjustment(like=like, bridge=bridge, **numbers)
+    pairs = data.get("ruled", [])
     if not isinstance(pairs, (list, tuple)):
         raise InputError(
             f"{where}: ruled = {quote_value(pairs)}: a list of pairs of levels is needed, as [['hip', 'knee']]"
         )
-    ruled = []
+    ruled = list(base.ruled) if base else []
     for pair in pairs:
         levels = _strings(pair, f"{where}: ruled")
         if len(levels) != 2:
             raise InputError(f"{where}: ruled: each entry is a pair of levels, as ['hip', 'knee']; got {list(levels)}")
         ruled.append((levels[0], levels[1]))
-    return ruled
-
-
-def _blend_from(value: object, where: str) -> tuple[Form, float]:
-    """Read the other form of a ``blend`` and its weight."""
-    mix = _table(value, f"{where}: blend")
-    _check_keys(mix, {"with", "weight"}, f"{where}: blend")
-    if "with" not in mix:
-        raise InputError(f"{where}: blend: with is missing; name a form: {', '.join(form_names())}")
-    weight = _number(mix.get("weight", 0.5), f"{where}: blend: weight", 0.0, 1.0)
-    return shipped_form(str(mix["with"])), weight
+    blend = base.blend if base else None
+    if "blend" in data:
+        mix = _table(data["blend"], f"{where}: blend")
+        _check_keys(mix, {"with", "weight"}, f"{where}: blend")
+        if "with" not in mix:
+            raise InputError(f"{where}: blend: with is missing; name a form: {', '.join(form_names())}")
+        weight = _number(mix.get("weight", 0.5), f"{where}: blend: weight", 0.0, 1.0)
+        blend = (shipped_form(str(mix["with"])), weight)
+    ease = ease_from(data.get("ease", {}), where, base=base.ease if base else {})
+    neckline = base.neckline if base else None
+    if "neckline" in data:
+        values, ranges = _table(data["neckline"], f"{where}: neckline"), Neckline.ranges()
+        _check_keys(values, set(ranges), f"{where}: neckline")
+        neckline = Neckline(**{k: _number(v, f"{where}: neckline: {k}", *ranges[k]) for k, v in values.items()})
+    return Form(
+        name=name, pieces=pieces, profiles=profiles, ruled=tuple(ruled), blend=blend, ease=ease, neckline=neckline
+    )
 
 
 def realise(
@@ -248,7 +240,7 @@ def realise(
         before = None
     bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
     if before is None:
-        faces = layout.faces_of([brick for own in bricks.values() for brick in own])
+        faces = layout.faces_of([brick for chosen in bricks.values() for brick in chosen])
         vertices = _surface(layout, body, form, np.unique(layout.faces[faces]), form.neckline)
     else:
         vertices = before.vertices
@@ -262,7 +254,18 @@ def realise(
         {} if before is None else {name: before.pieces[name] for name in before.pieces if before.has_rows(name, rows)}
     )
     pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half, known=known)
-    ease = {level: cm for level, cm in form.ease.items() if _keeps_ease(form, level)}
+    # A level of the trunk with an outline of its own, neither ruled nor bridged, gets the ease that is asked of it.
+    spans = [
+        sorted(map(RING_LEVELS.index, pair)) for pair in (*form.ruled, *_bridged(form)) if set(pair) <= set(RING_LEVELS)
+    ]
+    alike = {level for level, change in form.profiles.items() if change.like is not None}
+    ease = {
+        level: cm
+        for level, cm in form.ease.items()
+        if level in RING_LEVELS
+        and level not in alike
+        and not any(low < RING_LEVELS.index(level) < high for low, high in spans)
+    }
     return FormResult(
         name=form.name, recipe=form, body=body, half=half,
         vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease,
@@ -275,17 +278,6 @@ def _rows_of(placed: Sequence[PlacedDart]) -> dict[str, dict[str, IntArray]]:
     for dart in placed:
         rows.setdefault(dart.piece, {})[dart.name] = dart.row
     return rows
-
-
-def _keeps_ease(form: Form, level: str) -> bool:
-    """Return whether a level of the trunk has its own outline, so that what is asked of its ease is what it gets."""
-    if level not in RING_LEVELS or (level in form.profiles and form.profiles[level].like is not None):
-        return False
-    at = RING_LEVELS.index(level)
-    pairs = [
-        sorted(map(RING_LEVELS.index, pair)) for pair in (*form.ruled, *_bridged(form)) if set(pair) <= set(RING_LEVELS)
-    ]
-    return not any(low < at < high for low, high in pairs)
 
 
 def _bridged(form: Form) -> tuple[tuple[str, str], ...]:
@@ -307,15 +299,6 @@ def _surface(
         # It moves vertices within the form's faces, which are chords of the body's hollows.
         vertices = widen_neck(layout, vertices, neckline)
     return vertices if tight else push_outside(vertices, layout, body, used)
-
-
-def _adjustment(values: Mapping[str, Any], where: str) -> Adjustment:
-    ranges = Adjustment.ranges()
-    numbers = {k: _number(v, f"{where}: {k}", *ranges[k]) for k, v in values.items() if k in ranges}
-    bridge = values.get("bridge", False)
-    if not isinstance(bridge, bool):
-        raise InputError(f"{where}: bridge = {quote_value(bridge)}: true or false is needed")
-    return Adjustment(like=str(values["like"]) if "like" in values else None, bridge=bridge, **numbers)
 
 
 def _number(value: object, where: str, low: float, high: float) -> float:

@@ -39,7 +39,13 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
     used = {b for bricks, _, _ in pieces.values() for b in bricks}
     for name, (bricks, datum, opened) in pieces.items():
         if lies_on_both(bricks):
-            _check_symmetric(name, bricks)
+            image = {_mirrored(b) for b in bricks}
+            if image != set(bricks):
+                lone = [b for b in bricks if b not in image]
+                raise InputError(
+                    f"form: half = true mirrors the left half, but in piece {name} {_listed(lone)} "
+                    f"{'has' if len(lone) == 1 else 'have'} no mirror image; {_WHOLE}"
+                )
             partner = name
         else:
             partner = _mirror_image(name, bricks, pieces, used)
@@ -55,17 +61,6 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
                 f"form: half = true mirrors the left half, but piece {name} has its datum along {datum!r} and piece {partner} "
                 f"along {their_datum!r}; make them mirror images, or {_WHOLE}"
             )
-
-
-def _check_symmetric(name: str, bricks: Sequence[str]) -> None:
-    """See that a piece on both sides of the body is its own mirror image."""
-    image = {_mirrored(b) for b in bricks}
-    if image != set(bricks):
-        lone = [b for b in bricks if b not in image]
-        raise InputError(
-            f"form: half = true mirrors the left half, but in piece {name} {_listed(lone)} "
-            f"{'has' if len(lone) == 1 else 'have'} no mirror image; {_WHOLE}"
-        )
 
 
 def _mirror_image(name: str, bricks: Sequence[str], pieces: Mapping[str, Cut], used: set[str]) -> str:

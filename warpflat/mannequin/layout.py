@@ -171,7 +171,8 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
         raise InputError(f"mannequin resolution {resolution_mm:g} mm: valid range 2 to 40 mm")
     strips = _strips(resolution_mm / 1000.0)
     bricks = _bricks(strips)
-    faces = np.concatenate([_grid_faces(grid) for grid in bricks.values()])
+    quads = [np.stack([g[:-1, :-1], g[:-1, 1:], g[1:, 1:], g[1:, :-1]], axis=-1) for g in bricks.values()]
+    faces = np.concatenate([each.reshape(-1, 4) for each in quads])
     face_brick = np.repeat(np.arange(len(bricks)), [(g.shape[0] - 1) * (g.shape[1] - 1) for g in bricks.values()])
     tube = set(strips.rings[: strips.level_row["hip"]].ravel().tolist())
     around = [bool(tube & set(grid.ravel().tolist())) for grid in bricks.values()]
@@ -202,7 +203,19 @@ def _strips(resolution: float) -> Strips:
     m2, m3 = cells(_YOKE_GAP), cells(_SHOULDER_GAP)
     front = np.vstack([rings[-1][np.arange(-k, k + 1) % n], fresh(m2, 2 * k + 1)])
     back = np.vstack([rings[-1][np.arange(2 * q - k, 2 * q + k + 1)], fresh(m2, 2 * k + 1)])
-    yokes = _yokes(front[-1], back[-1], n0, k, m3, fresh)
+    # The four patches under the shoulder seams; front and back share the seam's vertices.
+    width = k - n0 + 1
+    starts = {
+        "front-left": front[-1, k + n0 :],
+        "back-left": back[-1, :width],
+        "back-right": back[-1, k + n0 :],
+        "front-right": front[-1, :width],
+    }
+    yokes = {name: np.vstack([row, fresh(m3 - 1, width)]) for name, row in starts.items()}
+    for side in ("left", "right"):
+        seam = fresh(1, width)
+        yokes[f"front-{side}"] = np.vstack([yokes[f"front-{side}"], seam])
+        yokes[f"back-{side}"] = np.vstack([yokes[f"back-{side}"], seam[:, ::-1]])
 
     fl, bl, br, fr = (yokes[name] for name in QUARTERS)
     neck_loop = np.concatenate([
@@ -240,28 +253,6 @@ def _strips(resolution: float) -> Strips:
         yokes=yokes, neck=neck, arms=arms, arm_row=arm_row, crotch=crotch, crotch_point=to_point, legs=legs,
         leg_row=leg_row, vertex_count=next(counter),
     )  # fmt: skip
-
-
-def _yokes(front_top: IntArray, back_top: IntArray, n0: int, k: int, rows: int, fresh: object) -> dict[str, IntArray]:
-    """Return the four patches under the shoulder seams; front and back share the seam's vertices."""
-    assert callable(fresh)
-    width = k - n0 + 1
-    starts = {
-        "front-left": front_top[k + n0 :],
-        "back-left": back_top[:width],
-        "back-right": back_top[k + n0 :],
-        "front-right": front_top[:width],
-    }
-    grids = {name: np.vstack([row, fresh(rows - 1, width)]) for name, row in starts.items()}
-    for side in ("left", "right"):
-        seam = fresh(1, width)
-        grids[f"front-{side}"] = np.vstack([grids[f"front-{side}"], seam])
-        grids[f"back-{side}"] = np.vstack([grids[f"back-{side}"], seam[:, ::-1]])
-    return grids
-
-
-def _grid_faces(grid: IntArray) -> IntArray:
-    return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
 def _bricks(strips: Strips) -> dict[str, IntArray]:

@@ -262,30 +262,27 @@ class Mannequin:
             levels[name] = {"height_m": level.height, "girth_m": level.girth}
             if level.section is not None:
                 levels[name]["section_m"] = level.section
-        told: dict[str, Any] = {"source": self.source, "notes": list(self.notes), "levels": levels}
+        entry: dict[str, Any] = {"source": self.source, "notes": list(self.notes), "levels": levels}
         difference = self.size_difference()
         if difference is not None:
-            told["nearest_size"] = difference.size
+            entry["nearest_size"] = difference.size
             for name, girth in difference.girths.items():
                 levels[name]["girth_over_size_m"] = girth
             for name, height in difference.heights.items():
                 levels[name]["height_over_size_m"] = height
         over = self.measure_difference()
         if over is not None:
-            told["measures"] = self._measures_told(over)
-        return told
-
-    def _measures_told(self, over: SizeDifference) -> dict[str, dict[str, float | str]]:
-        told: dict[str, dict[str, float | str]] = {}
-        for name, measure in self.measures.items():
-            told[name] = {"height_m": measure.height, "girth_m": measure.girth}
-            if measure.guess is not None:
-                told[name]["guess"] = measure.guess
-            if name in over.heights:
-                told[name]["height_over_size_m"] = over.heights[name]
-            if name in over.girths:
-                told[name]["girth_over_size_m"] = over.girths[name]
-        return told
+            measures: dict[str, dict[str, float | str]] = {}
+            for name, measure in self.measures.items():
+                measures[name] = {"height_m": measure.height, "girth_m": measure.girth}
+                if measure.guess is not None:
+                    measures[name]["guess"] = measure.guess
+                if name in over.heights:
+                    measures[name]["height_over_size_m"] = over.heights[name]
+                if name in over.girths:
+                    measures[name]["girth_over_size_m"] = over.girths[name]
+            entry["measures"] = measures
+        return entry
 
     def size_difference(self) -> SizeDifference | None:
         """Return what a scan has more than the nearest size of the tables; None without a scan."""

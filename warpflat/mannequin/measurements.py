@@ -96,7 +96,14 @@ def measurements_from_size(size: str, **given: float) -> Measurements:
     replaced = {k: float(v) for k, v in given.items()}
     label = title + (f" with {_listed(replaced)}" if given else "") + f" ({table['source']}; grade {table['grade']})"
     if tall:
-        replaced["stature"] = _stature(tall, size)
+        low, high = size_tables()["valid"]["range"]["stature"]
+        try:
+            value = float(tall)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise InputError(f"size {size!r}: stature after '/' must be {low:g} to {high:g} cm")
+        replaced["stature"] = value / 100.0
     values = {k: v / 100.0 for k, v in table["sizes"][name].items()}
     return _Completion(key, replaced, values, title=title).measurements(label)
 
@@ -157,17 +164,6 @@ def _listed(values: Mapping[str, float]) -> str:
     return ", ".join(f"{name} = {value * 100:g} cm" for name, value in values.items())
 
 
-def _stature(text: str, size: str) -> float:
-    low, high = size_tables()["valid"]["range"]["stature"]
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        raise InputError(f"size {size!r}: stature after '/' must be {low:g} to {high:g} cm")
-    return value / 100.0
-
-
 class _Completion:
     """Completion of measurements that a size or a user gives by a table's proportions.
 
@@ -214,12 +210,30 @@ class _Completion:
         Raises:
             InputError: two that are given go together on no body.
         """
-        self._check_ratios()
+        for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
+            if not {top, bottom} <= self._known or not {top, bottom} & set(self._given):
+                continue
+            if low <= self._lengths[top] / self._lengths[bottom] <= high:
+                continue
+            name, other = (top, bottom) if top in self._given else (bottom, top)
+            least, most = _ends(name, top, low, high, self._lengths[other])
+            whose = "" if other in self._given else f" of {self._title}"
+            raise InputError(
+                f"measurement {name} = {self._lengths[name]:g} m does not go with {other} = {self._lengths[other]:.3g} m{whose}: "
+                f"valid range {least:.2f} to {most:.2f} m"
+            )
         lengths, rows = self._lengths, self._rows["sizes"].values()
         for name in next(iter(rows)):
             if name not in lengths and name not in self._between:
                 key = next(k for k in ("bust", "waist", "hip") if k in lengths)
-                value = self._at_stature(name, _along_table(self._rows, key, lengths[key], name))
+                # Linear between the table's sizes and beyond its ends [cm].
+                x, y = (np.array([size[each] for size in rows], float) for each in (key, name))
+                at = lengths[key] * 100.0
+                inside = float(np.interp(at, x, y))
+                slope = (y[-1] - y[0]) / (x[-1] - x[0])
+                beyond = at - min(max(at, x[0]), x[-1])
+                # Bones grow less than girths: what lies beyond the table's ends must not run off to nothing or to a giant.
+                value = self._at_stature(name, float(max(inside + slope * beyond, 0.55 * y[0])) / 100.0)
                 self._fill(name, value, f"from {key} by the {self._name} table")
         for name, rule in self._body["complete"].items():
             if name in lengths:
@@ -233,8 +247,31 @@ class _Completion:
             if not low <= value <= high:
                 value, how = min(max(value, low), high), f"lies within {' and '.join(rule['within'])}"
             self._fill(name, value, how)
+        # The height of every level and landmark above the floor [m].
+        stature = lengths["stature"]
+        if "heights_mm" in self._body:
+            by = (stature * 100.0 - 176.0) / 6.0
+            h = {k: (base + by * step) / 1000.0 for k, (base, step) in self._body["heights_mm"].items()}
+            h["underarm"] = h["nape"] - lengths["armscye_depth"]
+            h["bust"] = min(h["bust"], h["underarm"] - 0.03)
+        else:
+            h = {k: share * stature for k, share in self._body["heights"].items()}
+            # The nape-waist tape follows the back's curve, so the waist lies a little less deep than its length.
+            h["waist"] = h["nape"] - 0.985 * lengths["nape_to_waist"]
+            h["underarm"] = h["nape"] - lengths["armscye_depth"]
+            h["bust"] = min(h["bust"], h["underarm"] - 0.032)
+            h["side_neck"] = h["nape"] - 0.008 * stature
+            h["front_neck"] = h["nape"] - 0.0385 * stature
+        h["hip"] = min(h["hip"], h["waist"] - 0.11)
+        # The crotch curve needs room below the hip, the rows above the thigh's girth below the crotch.
+        h["crotch"] = min(lengths["inside_leg"], h["hip"] - 0.02 * stature)
+        h["leg_thigh"] = h["crotch"] - 0.03 * stature
+        h["leg_knee"], h["leg_calf"], h["leg_ankle"] = h["knee"], 0.205 * stature, h["ankle"]
+        h["thigh"] = min(h["thigh"], h["hip"] - 0.05)
+        h["underbust"] = h["bust"] - 0.40 * (h["bust"] - h["waist"])
+        h["abdomen"] = h["waist"] - 0.42 * (h["waist"] - h["hip"])
         return Measurements(
-            lengths=lengths, heights=_heights(lengths, self._body), body=self._own["body"], source=source,
+            lengths=lengths, heights=h, body=self._own["body"], source=source,
             notes=tuple(self._notes),
         )  # fmt: skip
 
@@ -258,60 +295,7 @@ class _Completion:
             return float(value + (self._lengths["stature"] - of_table) / step["per"] * step[name])
         return value * self._lengths["stature"] / of_table if name in self._rows.get("with_stature", ()) else value
 
-    def _check_ratios(self) -> None:
-        for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
-            if not {top, bottom} <= self._known or not {top, bottom} & set(self._given):
-                continue
-            if low <= self._lengths[top] / self._lengths[bottom] <= high:
-                continue
-            name, other = (top, bottom) if top in self._given else (bottom, top)
-            least, most = _ends(name, top, low, high, self._lengths[other])
-            whose = "" if other in self._given else f" of {self._title}"
-            raise InputError(
-                f"measurement {name} = {self._lengths[name]:g} m does not go with {other} = {self._lengths[other]:.3g} m{whose}: "
-                f"valid range {least:.2f} to {most:.2f} m"
-            )
-
 
 def _ends(name: str, top: str, low: float, high: float, other: float) -> tuple[float, float]:
     """Return the bounds [m] of the first or the second length of a ratio, given the other [m]."""
     return (low * other, high * other) if name == top else (other / high, other / low)
-
-
-def _along_table(table: Mapping[str, Any], key: str, value: float, name: str) -> float:
-    """Return the measurement `name` [m] where `key` is `value` [m], linear between the table's sizes and beyond its ends."""
-    x = np.array([s[key] for s in table["sizes"].values()], float)
-    y = np.array([s[name] for s in table["sizes"].values()], float)
-    at = value * 100.0
-    inside = float(np.interp(at, x, y))
-    slope = (y[-1] - y[0]) / (x[-1] - x[0])
-    beyond = at - min(max(at, x[0]), x[-1])
-    # Bones grow less than girths: what lies beyond the table's ends must not run off to nothing or to a giant.
-    return float(max(inside + slope * beyond, 0.55 * y[0])) / 100.0
-
-
-def _heights(lengths: Mapping[str, float], body: Mapping[str, Any]) -> dict[str, float]:
-    """Return height of every level and landmark above the floor [m]."""
-    stature = lengths["stature"]
-    if "heights_mm" in body:
-        by = (stature * 100.0 - 176.0) / 6.0
-        h = {k: (base + by * step) / 1000.0 for k, (base, step) in body["heights_mm"].items()}
-        h["underarm"] = h["nape"] - lengths["armscye_depth"]
-        h["bust"] = min(h["bust"], h["underarm"] - 0.03)
-    else:
-        h = {k: share * stature for k, share in body["heights"].items()}
-        # The nape-waist tape follows the back's curve, so the waist lies a little less deep than its length.
-        h["waist"] = h["nape"] - 0.985 * lengths["nape_to_waist"]
-        h["underarm"] = h["nape"] - lengths["armscye_depth"]
-        h["bust"] = min(h["bust"], h["underarm"] - 0.032)
-        h["side_neck"] = h["nape"] - 0.008 * stature
-        h["front_neck"] = h["nape"] - 0.0385 * stature
-    h["hip"] = min(h["hip"], h["waist"] - 0.11)
-    # The crotch curve needs room below the hip, the rows above the thigh's girth below the crotch.
-    h["crotch"] = min(lengths["inside_leg"], h["hip"] - 0.02 * stature)
-    h["leg_thigh"] = h["crotch"] - 0.03 * stature
-    h["leg_knee"], h["leg_calf"], h["leg_ankle"] = h["knee"], 0.205 * stature, h["ankle"]
-    h["thigh"] = min(h["thigh"], h["hip"] - 0.05)
-    h["underbust"] = h["bust"] - 0.40 * (h["bust"] - h["waist"])
-    h["abdomen"] = h["waist"] - 0.42 * (h["waist"] - h["hip"])
-    return h

@@ -59,7 +59,14 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     for side in ("left", "right"):
         seam = layout.yokes[f"front-{side}"][-1]
         seams.append(seam if seam[0] in neck else seam[::-1])
-        out[seams[-1]] = _along_seam(vertices[seams[-1]], 0.01 * neckline.side_cm)
+        # The seam begins later; its outer end stays.
+        points, start = vertices[seams[-1]], 0.01 * neckline.side_cm
+        at = arc_lengths(points)
+        if start > at[-1] - 0.02:
+            raise InputError(
+                f"form: neckline: side_cm is {100 * start:g}, but the shoulder is {100 * at[-1]:.1f} cm long"
+            )
+        out[seams[-1]] = points_at_lengths(points, start + (at[-1] - start) * at / at[-1])
     for face, row, column, depth in (
         ("front", layout.front, 0, neckline.front_cm),
         ("back", layout.back, layout.rings.shape[1] // 2, neckline.back_cm),
@@ -70,9 +77,27 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
         centres.append(np.concatenate([row[:0:-1, middle], layout.rings[::-1, column]]))
         out[row[-1, middle]] = points_at_lengths(vertices[centres[-1]], [0.01 * depth])[0]
         for seam in seams:
-            quarter = _quarter(neck, row[-1, middle], seam[0])
+            # The shorter part of the neck's closed row between the centre line and the seam.
+            first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (row[-1, middle], seam[0]))
+            parts = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
+            quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
             share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
-            out[quarter[1:-1]] = _quarter_curve(half, out[quarter[0]], out[quarter[-1]], share[1:-1], _POWER[face])
+            # There they become a quarter of the superellipse of that power.
+            centre, shoulder, power = out[quarter[0]], out[quarter[-1]], _POWER[face]
+            level = float(half.vertices[:, 1].min()) + _ABOVE
+            turn = 0.5 * np.pi * share[1:-1]
+            across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
+            # Just beside the seams, so that the sections do not run along edges of the mesh.
+            sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
+            sections = [half.upright(float(x), level) for x in sides]
+            lengths = [arc_lengths(section) for section in sections]
+            low, high = (
+                float(np.interp(end[1], section[:, 1], length))
+                for end, section, length in ((centre, sections[0], lengths[0]), (shoulder, sections[-1], lengths[-1]))
+            )
+            wished = zip(sections[1:-1], low + (high - low) * up, strict=True)
+            on_sections = np.array([points_at_lengths(section, [length])[0] for section, length in wished])
+            out[quarter[1:-1]] = half.nearest(on_sections)
     fixed = np.unique(
         np.concatenate(
             [neck, *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
@@ -116,49 +141,6 @@ class _Surface:
         line = np.concatenate(ends)
         line = line[np.argsort(line[:, 1])]
         return line[line[:, 1] > level]
-
-
-def _quarter_curve(
-    surface: _Surface, centre: FloatArray, shoulder: FloatArray, shares: FloatArray, power: float
-) -> FloatArray:
-    """Return points of a quarter of the neckline at `shares` of its way from the centre line to the shoulder seam, #P by 3 [m].
-
-    It is the superellipse of that `power`.
-    """
-    level = float(surface.vertices[:, 1].min()) + _ABOVE
-    turn = 0.5 * np.pi * shares
-    across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
-    # Just beside the seams, so that the sections do not run along edges of the mesh.
-    sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
-    sections = [surface.upright(float(x), level) for x in sides]
-    lengths = [arc_lengths(section) for section in sections]
-    low, high = (
-        float(np.interp(end[1], section[:, 1], length))
-        for end, section, length in ((centre, sections[0], lengths[0]), (shoulder, sections[-1], lengths[-1]))
-    )
-    wished = low + (high - low) * up
-    return surface.nearest(
-        np.array([points_at_lengths(section, [at])[0] for section, at in zip(sections[1:-1], wished, strict=True)])
-    )
-
-
-def _quarter(neck: IntArray, start: int, end: int) -> IntArray:
-    """Return the shorter way along the closed row of the neck from one of its vertices to another."""
-    first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (start, end))
-    ways = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
-    return np.asarray(neck[(first + min(ways, key=len)) % len(neck)])
-
-
-def _along_seam(points: FloatArray, start: float) -> FloatArray:
-    """Return points of a shoulder seam that begins later [m]; its outer end stays.
-
-    Raises:
-        InputError: nothing of it is left.
-    """
-    at = arc_lengths(points)
-    if start > at[-1] - 0.02:
-        raise InputError(f"form: neckline: side_cm is {100 * start:g}, but the shoulder is {100 * at[-1]:.1f} cm long")
-    return points_at_lengths(points, start + (at[-1] - start) * at / at[-1])
 
 
 def _filled(

@@ -41,9 +41,9 @@ class BodySurface:
         self.splits = [(triangles, Closest(vertices, triangles)) for triangles in splits]
         self.near = 0.5 * layout.resolution
 
-    def ways_out(self, points: FloatArray) -> FloatArray:
-        """Return for each point (#P by 3) the way to the nearest place of the surface [m]; zero for points outside."""
-        ways = np.zeros_like(points)
+    def vectors_out(self, points: FloatArray) -> FloatArray:
+        """Return for each point (#P by 3) the vector to the nearest place of the surface [m]; zero for points outside."""
+        vectors = np.zeros_like(points)
         # Most points lie clearly outside, off the nearest vertex along its normal: no need to look for their place.
         vertex = self.used[self.tree.query(points)[1]]
         rise = np.einsum("nk,nk->n", points - self.vertices[vertex], self.normals[vertex])
@@ -51,12 +51,12 @@ class BodySurface:
         for triangles, closest in self.splits if len(near) else ():
             triangle, weights, _ = closest(points[near])
             corners = triangles[triangle]
-            way = np.einsum("nk,nkd->nd", weights, self.vertices[corners]) - points[near]
+            vector = np.einsum("nk,nkd->nd", weights, self.vertices[corners]) - points[near]
             outward = np.einsum("nk,nkd->nd", weights, self.normals[corners])
-            way[np.einsum("nk,nk->n", way, outward) <= 0.0] = 0.0
-            longer = np.linalg.norm(way, axis=1) > np.linalg.norm(ways[near], axis=1)
-            ways[near[longer]] = way[longer]
-        return ways
+            vector[np.einsum("nk,nk->n", vector, outward) <= 0.0] = 0.0
+            longer = np.linalg.norm(vector, axis=1) > np.linalg.norm(vectors[near], axis=1)
+            vectors[near[longer]] = vector[longer]
+        return vectors
 
 
 def push_outside(vertices: FloatArray, layout: Layout, body: FloatArray, used: IntArray) -> FloatArray:
@@ -71,6 +71,8 @@ def push_outside(vertices: FloatArray, layout: Layout, body: FloatArray, used: I
         body: #V by 3, the body's [m].
         used: the vertices of the form's pieces.
     """
+    from scipy.spatial import cKDTree
+
     # The tube around both legs is no part of the body's surface: it may cut through a leg where it has not moved.
     off = np.abs(vertices - body)[used].max(axis=1) > _DEEP
     moved = used[off | ~np.isin(used, layout.body_faces)]
@@ -79,30 +81,21 @@ def push_outside(vertices: FloatArray, layout: Layout, body: FloatArray, used: I
     out = vertices
     surface = BodySurface(layout, body)
     for _ in range(_ROUNDS):
-        ways = surface.ways_out(out[moved])
-        depth = np.linalg.norm(ways, axis=1)
+        vectors = surface.vectors_out(out[moved])
+        depth = np.linalg.norm(vectors, axis=1)
         deep = depth > _DEEP
         if not deep.any():
             break
         if out is vertices:
             out = vertices.copy()
-        out[used] += _spread(out, layout, used, moved[deep], ways[deep])
+        normals, tree = vertex_normals(out, layout.faces), cKDTree(out[used])
+        amount, direction = np.zeros(len(used)), np.zeros((len(used), 3))
+        for vertex, vector, pushed in zip(moved[deep], vectors[deep], depth[deep], strict=True):
+            near = np.array(tree.query_ball_point(out[vertex], _REACH))
+            away = np.linalg.norm(out[used[near]] - out[vertex], axis=1) / _REACH
+            alike = np.maximum(normals[used[near]] @ normals[vertex], 0.0)
+            share = pushed * (1.0 - away * away) ** 2 * alike
+            amount[near] = np.maximum(amount[near], share)
+            direction[near] += share[:, None] * vector
+        out[used] += amount[:, None] * direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
     return out
-
-
-def _spread(vertices: FloatArray, layout: Layout, used: IntArray, pushed: IntArray, ways: FloatArray) -> FloatArray:
-    """Return displacements of the vertices `used`: of those `pushed` their ways, of others shares of the ways around."""
-    from scipy.spatial import cKDTree
-
-    normals = vertex_normals(vertices, layout.faces)
-    depth = np.linalg.norm(ways, axis=1)
-    tree = cKDTree(vertices[used])
-    amount, direction = np.zeros(len(used)), np.zeros((len(used), 3))
-    for vertex, way, deep in zip(pushed, ways, depth, strict=True):
-        near = np.array(tree.query_ball_point(vertices[vertex], _REACH))
-        away = np.linalg.norm(vertices[used[near]] - vertices[vertex], axis=1) / _REACH
-        alike = np.maximum(normals[used[near]] @ normals[vertex], 0.0)
-        share = deep * (1.0 - away * away) ** 2 * alike
-        amount[near] = np.maximum(amount[near], share)
-        direction[near] += share[:, None] * way
-    return amount[:, None] * direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)

@@ -46,12 +46,22 @@ def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequenc
     for name, recipe in form.pieces.items():
         parts_of[name] = _parts(layout, vertices, name, recipe, lines[name]) if name in lines else {name: recipe}
         pieces |= parts_of[name]
-    darts = [
-        dart if dart.piece not in lines else _in_a_part(layout, vertices, dart, parts_of[dart.piece])
-        for dart in form.darts
-        if dart.line not in lines.get(dart.piece, [])
-    ]
-    return replace(form, pieces=pieces, darts=tuple(dart for dart in darts if dart is not None))
+    darts = []
+    for dart in form.darts:
+        if dart.piece not in lines:
+            darts.append(dart)
+        elif dart.line not in lines[dart.piece]:
+            # It goes on in the first part of its piece in which it has a place; without one it goes.
+            bricks = {name: select_bricks(layout, part.bricks) for name, part in parts_of[dart.piece].items()}
+            for name in bricks:
+                moved = replace(dart, piece=name)
+                try:
+                    place_darts(layout, vertices, bricks, [moved])
+                except InputError:
+                    continue
+                darts.append(moved)
+                break
+    return replace(form, pieces=pieces, darts=tuple(darts))
 
 
 def taken_over(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> list[FormDart]:
@@ -88,19 +98,6 @@ def _mirror_line(line: str) -> str:
     return line
 
 
-def _in_a_part(layout: Layout, vertices: FloatArray, dart: FormDart, parts: dict[str, PieceRecipe]) -> FormDart | None:
-    """Return a dart in the first part of its piece in which it has a place; None if there is none."""
-    bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in parts.items()}
-    for name in parts:
-        moved = replace(dart, piece=name)
-        try:
-            place_darts(layout, vertices, bricks, [moved])
-        except InputError:
-            continue
-        return moved
-    return None
-
-
 def _parts(
     layout: Layout, vertices: FloatArray, name: str, recipe: PieceRecipe, lines: Sequence[str]
 ) -> dict[str, PieceRecipe]:
@@ -115,13 +112,26 @@ def _parts(
         raise InputError(
             f"{' and '.join(repr(line) for line in lines)} do not part piece {name!r}; name lines that cross it"
         )
-    groups = [[brick for brick, own in zip(bricks, label, strict=True) if own == one] for one in dict.fromkeys(label)]
+    groups = [[brick for brick, of in zip(bricks, label, strict=True) if of == part] for part in dict.fromkeys(label)]
     found: dict[str, PieceRecipe] = {}
-    for own, words in zip(groups, _names(layout, vertices, groups), strict=True):
-        bounds = _edges_of(layout, own)
+    # Parts are named by where they lie to each other: centre and side_left, left and right, lower and upper.
+    sides = [
+        next((side for side in ("left", "right") if all(is_side(brick, side) for brick in part)), "") for part in groups
+    ]
+    centre = "" in sides and any(sides)
+    across = [("side_" + side if centre else side) if side else ("centre" if centre else "") for side in sides]
+    heights = [float(np.mean([vertices[layout.bricks[brick], 1].mean() for brick in part])) for part in groups]
+    names = []
+    for number, word in enumerate(across):
+        alike = sorted((k for k in range(len(across)) if across[k] == word), key=lambda k: heights[k])
+        at = alike.index(number)
+        place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
+        names.append("_".join(part for part in (word, place) if part))
+    for part, ending in zip(groups, names, strict=True):
+        bounds = _edges_of(layout, part)
         through = [line for line in (recipe.datum, *lines) if line and _edges_along(layout, line) & bounds]
         inner = [line for line in recipe.open if _edges_along(layout, line) & bounds]
-        found[f"{name}_{words}"] = PieceRecipe(bricks=tuple(own), datum=(through or [""])[0], open=tuple(inner))
+        found[f"{name}_{ending}"] = PieceRecipe(bricks=tuple(part), datum=(through or [""])[0], open=tuple(inner))
     return found
 
 
@@ -145,20 +155,3 @@ def _edges_of(layout: Layout, bricks: Sequence[str]) -> set[tuple[int, int]]:
 def _edges_along(layout: Layout, line: str) -> set[tuple[int, int]]:
     ids = layout.lines[line]
     return {(min(a, b), max(a, b)) for a, b in zip(ids[:-1].tolist(), ids[1:].tolist(), strict=True)}
-
-
-def _names(layout: Layout, vertices: FloatArray, groups: Sequence[Sequence[str]]) -> list[str]:
-    """Name parts by where they lie to each other: centre and side_left, left and right, lower and upper."""
-    sides = [
-        next((side for side in ("left", "right") if all(is_side(brick, side) for brick in own)), "") for own in groups
-    ]
-    centre = "" in sides and any(sides)
-    words = [("side_" + side if centre else side) if side else ("centre" if centre else "") for side in sides]
-    heights = [float(np.mean([vertices[layout.bricks[brick], 1].mean() for brick in own])) for own in groups]
-    names = []
-    for number, word in enumerate(words):
-        alike = sorted((k for k in range(len(words)) if words[k] == word), key=lambda k: heights[k])
-        at = alike.index(number)
-        place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
-        names.append("_".join(part for part in (word, place) if part))
-    return names

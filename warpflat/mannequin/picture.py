@@ -56,30 +56,26 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
             edges = np.column_stack([ids[:-1], ids[1:]])
             drawn.draw_segments(pen.axes, edges[towards[edges].all(axis=1)], width=0.9, colour=_LINE, zorder=5)
         if title == "left side":
-            _label_levels(pen, drawn, mannequin, middle)
+            # Names and girths [cm] of the profiles stand behind the side view, on short leaders, spread so that none overlap.
+            levels = mannequin.levels()
+            trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
+            names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
+            height = drawn.box[3] - drawn.box[1]
+            ends = []
+            for name in names:
+                line = drawn.to_page(drawn.view.points[mannequin.layout.lines[name]])
+                ends.append(line[int(np.argmax(line[:, 0]))])
+            places = space_out([float(end[1]) for end in ends], 0.028 * height, drawn.box[1], drawn.box[3])
+            x = middle + 0.17 * height
+            for name, end, y in zip(names, ends, places, strict=True):
+                shown = {"neck": "neck base", "chest back": "across back"}.get(name, name)
+                pen.line(np.array([(float(end[0]) + 0.03, float(end[1])), (x - 0.06, y)]), width=0.5, colour=_LEADER)
+                pen.write(x, y, f"{shown} {levels[name].girth * 100:.1f} cm", 8)
         else:
             _label_lines(pen, drawn, mannequin, title)
         pen.write(middle, drawn.box[3] + 0.03 * span * scale, title, 11, ha="center")
     pen.write(0.5 * pen.page_width, 0.98 * _HEIGHT, f"Mannequin: {mannequin.source}", 12, ha="center")
     write_figure(path, figure)
-
-
-def _label_levels(pen: Pen, drawn: DrawnView, mannequin: Mannequin, middle: float) -> None:
-    """Write names and girths [cm] of the profiles behind the side view, on short leaders, spread so that none overlap."""
-    levels = mannequin.levels()
-    trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
-    names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
-    height = drawn.box[3] - drawn.box[1]
-    ends = []
-    for name in names:
-        line = drawn.to_page(drawn.view.points[mannequin.layout.lines[name]])
-        ends.append(line[int(np.argmax(line[:, 0]))])
-    places = space_out([float(end[1]) for end in ends], 0.028 * height, drawn.box[1], drawn.box[3])
-    x = middle + 0.17 * height
-    for name, end, y in zip(names, ends, places, strict=True):
-        words = {"neck": "neck base", "chest back": "across back"}.get(name, name)
-        pen.line(np.array([(float(end[0]) + 0.03, float(end[1])), (x - 0.06, y)]), width=0.5, colour=_LEADER)
-        pen.write(x, y, f"{words} {levels[name].girth * 100:.1f} cm", 8)
 
 
 def _label_lines(pen: Pen, drawn: DrawnView, mannequin: Mannequin, view: str) -> None:

@@ -144,12 +144,22 @@ def _piece(
     if folded:
         bricks = [b for b in bricks if is_side(b, "left")]
     rows = layout.faces_of(bricks)
-    own = set(np.unique(layout.faces[rows]).tolist())
-    darts = {dart: row for dart, row in darts.items() if own.issuperset(row.tolist())}
+    inside = set(np.unique(layout.faces[rows]).tolist())
+    darts = {dart: row for dart, row in darts.items() if inside.issuperset(row.tolist())}
     slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}
     corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened) | slits)
     loop, holes = _borders(corners, name, opened=bool(opened), darts=darts)
-    fisheyes = _fisheyes(holes, grid_vertices, darts)
+    # A fish-eye dart is a hole; its legs run from its first tip to its second.
+    fisheyes = {}
+    for hole in holes:
+        on_grid = grid_vertices[hole]
+        for dart, row in darts.items():
+            if not np.array_equal(np.unique(on_grid), np.unique(row)):
+                continue
+            ids = np.roll(hole, -int(np.flatnonzero(on_grid == row[0])[0])).astype(np.int32)
+            middle = len(row)
+            # Along the border the cloth lies on the left, and so the wedge on the right of the left leg.
+            fisheyes[dart] = ids[:middle], np.concatenate([ids[:1], ids[middle - 1 :][::-1]])
     if len(fisheyes) != len(holes):
         raise InputError(_not_one_disk(name, opened=bool(opened), darts=darts))
     darts = {dart: row for dart, row in darts.items() if dart not in fisheyes}
@@ -161,23 +171,6 @@ def _piece(
         vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
         input_index=np.arange(len(grid_vertices), dtype=np.int32),
     )  # fmt: skip
-    line = _datum_line(name, datum, lines, edges, fold)
-    names = list(layout.bricks)
-    return FormPiece(
-        surface=surface, edges=edges, datum=line, fold=fold, grid_vertices=grid_vertices,
-        face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
-        darts={dart: _legs(dart) for dart in darts}, fisheyes=fisheyes,
-    )  # fmt: skip
-
-
-def _datum_line(
-    name: str, datum: str, lines: Mapping[str, IntArray], edges: Mapping[str, IntArray], fold: str | None
-) -> str:
-    """Return the line of a piece that is its datum.
-
-    Raises:
-        InputError: the line that was asked for does not run through the piece, or runs across its fold.
-    """
     wished = datum or fold
     along = [line for line in lines if is_part_of(line, wished)] if wished else list(lines)[:1]
     if not along:
@@ -187,7 +180,13 @@ def _datum_line(
             f"form: piece {name}: its datum {datum!r} runs across the fold, {fold}, along which a half piece is laid: "
             f"datum = {fold!r}, or cut it whole: half = false"
         )
-    return max(along, key=lambda line: len(lines[line]))
+    line = max(along, key=lambda line: len(lines[line]))
+    names = list(layout.bricks)
+    return FormPiece(
+        surface=surface, edges=edges, datum=line, fold=fold, grid_vertices=grid_vertices,
+        face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
+        darts={dart: _legs(dart) for dart in darts}, fisheyes=fisheyes,
+    )  # fmt: skip
 
 
 def _edge_set(layout: Layout, lines: Sequence[str]) -> set[tuple[int, int]]:
@@ -277,31 +276,6 @@ def _not_one_disk(name: str, *, opened: bool, darts: Collection[str]) -> str:
     )
 
 
-def _fisheyes(
-    holes: Sequence[NDArray[np.int64]], grid_vertices: IntArray, darts: Mapping[str, IntArray]
-) -> dict[str, tuple[IntArray, IntArray]]:
-    """Return by fish-eye dart the vertices along its left and right leg, both from its first tip to its second."""
-    found = {}
-    for hole in holes:
-        on_grid = grid_vertices[hole]
-        for dart, row in darts.items():
-            if not np.array_equal(np.unique(on_grid), np.unique(row)):
-                continue
-            ids = np.roll(hole, -int(np.flatnonzero(on_grid == row[0])[0])).astype(np.int32)
-            middle = len(row)
-            # Along the border the cloth lies on the left, and so the wedge on the right of the left leg.
-            found[dart] = ids[:middle], np.concatenate([ids[:1], ids[middle - 1 :][::-1]])
-    return found
-
-
-def _line_of_edge(layout: Layout) -> dict[tuple[int, int], str]:
-    found: dict[tuple[int, int], str] = {}
-    for line, ids in layout.lines.items():
-        for a, b in itertools.pairwise(ids.tolist()):
-            found.setdefault((min(a, b), max(a, b)), line)
-    return found
-
-
 def _legs(dart: str) -> tuple[str, str]:
     """Return the names of a dart's two edges."""
     return f"{dart}.left", f"{dart}.right"
@@ -314,7 +288,10 @@ def _edges(
 
     The first part, counter-clockwise, has the name of the whole; names of all other edges are as without darts.
     """
-    line_of = _line_of_edge(layout)
+    line_of: dict[tuple[int, int], str] = {}
+    for line, ids in layout.lines.items():
+        for a, b in itertools.pairwise(ids.tolist()):
+            line_of.setdefault((min(a, b), max(a, b)), line)
     leg_of: dict[tuple[int, int], str] = {}
     for dart, row in darts.items():
         for a, b in itertools.pairwise(row.tolist()):
@@ -334,13 +311,6 @@ def _edges(
         (labels[a % len(loop)], loop[np.arange(a, b + 1) % len(loop)].astype(np.int32))
         for a, b in itertools.pairwise([*starts, starts[0] + len(loop)])
     ]
-    return _named_stretches(stretches, legs)
-
-
-def _named_stretches(
-    stretches: Sequence[tuple[str, IntArray]], legs: set[str]
-) -> tuple[dict[str, IntArray], dict[str, str]]:
-    """Give the stretches of a border their names; see :func:`_edges`."""
     wholes: list[str] = []
     last, taken = "", set[str]()
     for number, (label, _) in enumerate(stretches):
@@ -368,9 +338,9 @@ def _lines(
     """
     lines = dict(edges)
     for line, runs in _inner_runs(layout, corners, grid_vertices).items():
-        own = [edge for edge in edges if is_part_of(edge, line)]
+        along = [edge for edge in edges if is_part_of(edge, line)]
         for run in sorted(runs, key=len, reverse=True):
-            whole, border = _with_edges(run, {edge: lines[edge].tolist() for edge in own})
+            whole, border = _with_edges(run, {edge: lines[edge].tolist() for edge in along})
             lines[border or find_unused_name(line, lines)] = np.array(whole, np.int32)
     return lines
 

@@ -32,37 +32,27 @@ def name_seams(
     names = list(lines)
     for line in dict.fromkeys(lines):
         group = [number for number, name in enumerate(lines) if name == line]
-        words = [_words(pieces[number], line) for number in group]
-        ways = [_shared_words(words), _own_words(words)]
+        known = line.split(" ")
+        pairs = [
+            [[word for word in name.replace("_", " ").split(" ") if word not in known] for name in pieces[number]]
+            for number in group
+        ]
+        both = [list(dict.fromkeys([*first, *second])) for first, second in pairs]
+        common = set.intersection(*map(set, both))
+        choices = [
+            [" ".join(word for word in first if word in second) for first, second in pairs],
+            [" ".join(word for word in row if word not in common) for row in both],
+        ]
         if points is not None:
-            ways.append(_positions([np.mean(points[number], axis=0) for number in group]))
-        told = next((way for way in ways if all(way) and len(set(way)) == len(group)), None)
-        if told is not None and len(group) > 1:
-            for number, word in zip(group, told, strict=True):
+            choices.append(_positions([np.mean(points[number], axis=0) for number in group]))
+        chosen = next((choice for choice in choices if all(choice) and len(set(choice)) == len(group)), None)
+        if chosen is not None and len(group) > 1:
+            for number, word in zip(group, chosen, strict=True):
                 names[number] = f"{word} {line}"
     taken: list[str] = []
     for name in names:
         taken.append(find_unused_name(name, taken))
     return tuple(taken)
-
-
-def _words(pieces: tuple[str, str], line: str) -> tuple[list[str], list[str]]:
-    """Return the words of the two pieces' names that the line's name does not have."""
-    known = line.split(" ")
-    first, second = ([word for word in name.replace("_", " ").split(" ") if word not in known] for name in pieces)
-    return first, second
-
-
-def _shared_words(words: Sequence[tuple[list[str], list[str]]]) -> list[str]:
-    """Return for each seam the words that both of its pieces have."""
-    return [" ".join(word for word in first if word in second) for first, second in words]
-
-
-def _own_words(words: Sequence[tuple[list[str], list[str]]]) -> list[str]:
-    """Return for each seam the words of its pieces that not all of the seams have."""
-    rows = [list(dict.fromkeys([*first, *second])) for first, second in words]
-    common = set.intersection(*map(set, rows))
-    return [" ".join(word for word in row if word not in common) for row in rows]
 
 
 def _positions(centres: Sequence[FloatArray]) -> list[str]:

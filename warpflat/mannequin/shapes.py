@@ -69,14 +69,14 @@ def _parted(name: str, recipe: PieceRecipe, bricks: list[str]) -> dict[str, Piec
     centre = [b for b in bricks if b.endswith("-centre")]
     parts = {f"{name}_centre": (centre, recipe.datum)}
     for side in ("left", "right"):
-        own = [b for b in bricks if b.endswith("-side") and is_side(b, side)]
-        faces = {b.partition("/")[2].split("-")[0] for b in own}
+        at_side = [b for b in bricks if b.endswith("-side") and is_side(b, side)]
+        faces = {b.partition("/")[2].split("-")[0] for b in at_side}
         if len(faces) == 1:
-            parts[f"{name}_side_{side}"] = (own, f"princess {faces.pop()} {side}")
-    if not centre or sum(len(own) for own, _ in parts.values()) != len(bricks) or len(parts) == 1:
+            parts[f"{name}_side_{side}"] = (at_side, f"princess {faces.pop()} {side}")
+    if not centre or sum(len(chosen) for chosen, _ in parts.values()) != len(bricks) or len(parts) == 1:
         return {name: recipe}
     return {
-        part: replace(recipe, bricks=tuple(own), datum=datum, open=recipe.open if own is centre else ())
-        for part, (own, datum) in parts.items()
-        if own
+        part: replace(recipe, bricks=tuple(chosen), datum=datum, open=recipe.open if chosen is centre else ())
+        for part, (chosen, datum) in parts.items()
+        if chosen
     }

@@ -43,11 +43,13 @@ def fill_fork(values: FloatArray, layout: Layout, attract: Callable[[FloatArray]
     from scipy import sparse
     from scipy.sparse.linalg import factorized, spsolve
 
-    ids, laplacian, local = _fork_laplacian(layout, 2)
+    # The fork reaches from two rows above the hip to two below the thighs.
+    hip, thigh = layout.level_row["hip"], layout.leg_row[LEG_LEVELS[1]]
+    legs = [_closed(grid[: thigh + 3]) for grid in layout.legs.values()]
+    ids, laplacian, local = _umbrella(layout, [_closed(layout.rings[hip : hip + 3]), *legs])
     last = layout.leg_row["leg_thigh"]
     free = local[np.concatenate([grid[1:last].ravel() for grid in layout.legs.values()])]
     # The outermost rows have no neighbours beyond them, so nothing can be smooth there.
-    hip = layout.level_row["hip"]
     rims = [layout.rings[hip + 2], *(grid[last + 2] for grid in layout.legs.values())]
     inner = np.setdiff1d(np.arange(len(ids)), local[np.concatenate(rims)])
     known = np.setdiff1d(np.arange(len(ids)), free)
@@ -62,13 +64,6 @@ def fill_fork(values: FloatArray, layout: Layout, attract: Callable[[FloatArray]
     solve = factorized((unknown.T @ unknown + pull * sparse.identity(len(free))).tocsc())
     for _ in range(_ATTRACT_ROUNDS):
         values[ids[free]] = solve(np.asarray(right + pull * attract(values[ids[free]])))
-
-
-def _fork_laplacian(layout: Layout, rows: int) -> tuple[IntArray, Any, NDArray[np.int64]]:
-    """Return the umbrella operator of the fork, from `rows` rows above the hip to as many below the thighs, as `sheet_laplacian`."""
-    hip, thigh = layout.level_row["hip"], layout.leg_row[LEG_LEVELS[1]]
-    legs = [_closed(grid[: thigh + rows + 1]) for grid in layout.legs.values()]
-    return _umbrella(layout, [_closed(layout.rings[hip : hip + rows + 1]), *legs])
 
 
 def _closed(grid: IntArray) -> IntArray:

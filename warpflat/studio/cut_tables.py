@@ -70,9 +70,21 @@ def cut_along(solution: Solution, piece: str, line: str, part: tuple[float, floa
         return {"name": name, "line": line, **({} if part is None or part == _WHOLE else {"part": _shares(part)})}
     row = cuttable_lines(solution, piece)[line]
     if part is None:
-        usual = _usual(solution, piece, line)
-        if usual is not None:
-            return usual
+        # The dart that a pattern book has along the line, unless the piece has it already.
+        plan = solution.plan
+        assert plan is not None
+        recipe = scene_recipe(plan.scene, plan.mannequin)[1]
+        layout, taken = plan.mannequin.layout, {dart.place for dart in recipe.darts}
+        bricks = {name: select_bricks(layout, each.bricks) for name, each in recipe.pieces.items()}
+        darts: Mapping[tuple[str, str], FormDart] = {
+            (dart.piece, dart.line): dart
+            for dart in reversed(usual_darts(layout, plan.form.vertices, bricks))
+            if dart.place not in taken and dart.towards is None
+        }
+        left = line.removesuffix(" right") + " left"
+        dart = darts.get((piece, line)) or darts.get((piece, left))
+        if dart is not None:
+            return cut_of_dart(dart)
         part = (1.0 - _DART, 1.0) if int(row[0]) not in _border(solution.pieces[piece]) else (0.0, _DART)
     arc = arc_lengths(solution.pieces[piece].surface.vertices[row])
     first, last = (int(np.abs(arc - share * arc[-1]).argmin()) for share in part)
@@ -90,7 +102,12 @@ def cut_between(solution: Solution, first: Hit, second: Hit) -> dict[str, Any]:
     if first.piece not in solution.pieces:
         raise InputError(f"{first.piece} is a piece of the cut that is tried; apply it or leave it first")
     piece, vertices = solution.pieces[first.piece], solution.pieces[first.piece].surface.vertices
-    ends = [_place(piece, hit) for hit in (first, second)]
+    border, ends = np.array(sorted(_border(piece))), []
+    for hit in (first, second):
+        away = np.linalg.norm(vertices - hit.point, axis=1)
+        # A click near the border means the border.
+        near = border[np.argmin(away[border])]
+        ends.append(int(near if away[near] <= _TO_BORDER else np.argmin(away)))
     if ends[0] == ends[1]:
         raise InputError("both points lie at one place; click two that lie further apart")
     if solution.plan is None:
@@ -99,10 +116,10 @@ def cut_between(solution: Solution, first: Hit, second: Hit) -> dict[str, Any]:
         }  # fmt: skip
     best: tuple[float, str, IntArray] | None = None
     for line, row in cuttable_lines(solution, first.piece).items():
-        away = [np.linalg.norm(vertices[row] - vertices[end], axis=1) for end in ends]
-        worst = max(float(distance.min()) for distance in away)
+        distances = [np.linalg.norm(vertices[row] - vertices[end], axis=1) for end in ends]
+        worst = max(float(distance.min()) for distance in distances)
         if worst <= _TO_LINE and (best is None or worst < best[0]):
-            low, high = sorted(int(np.argmin(distance)) for distance in away)
+            low, high = sorted(int(np.argmin(distance)) for distance in distances)
             best = worst, line, row[low : high + 1]
     if best is None:
         raise InputError(
@@ -120,17 +137,17 @@ def _dart_table(solution: Solution, piece: str, line: str, row: IntArray) -> dic
     ends = row if int(row[0]) in _border(solution.pieces[piece]) else row[::-1]
     recipe = scene_recipe(plan.scene, plan.mannequin)[1].pieces[piece]
     layout = plan.mannequin.layout
-    words = line.removesuffix(" left").removesuffix(" right")
+    base = line.removesuffix(" left").removesuffix(" right")
     dart = dart_along(
         layout, plan.form.vertices, select_bricks(layout, recipe.bricks), plan.form.pieces[piece].grid_vertices[ends],
-        piece=piece, name=words,
+        piece=piece, name=base,
     )  # fmt: skip
     if dart is None:
         raise InputError(
             f"{piece}: a dart along {line!r} must begin at an edge of the piece, where no other dart lies; "
             "let the part begin or end there"
         )
-    name = f"{words} seam" if dart.parts_piece else f"{words} dart"
+    name = f"{base} seam" if dart.parts_piece else f"{base} dart"
     table = cut_of_dart(replace(dart, name=_unused(solution.scene, name, piece)))
     return {**table, "part": _shares(table["part"])}
 
@@ -139,37 +156,12 @@ def _border(piece: Flattening) -> set[int]:
     return {vertex for loop in border_loops(piece.surface.faces) for vertex in loop.tolist()}
 
 
-def _place(piece: Flattening, hit: Hit) -> int:
-    """Return the vertex of the uncut surface that is meant: one of the border if that is near."""
-    vertices, border = piece.surface.vertices, np.array(sorted(_border(piece)))
-    away = np.linalg.norm(vertices - hit.point, axis=1)
-    near = border[np.argmin(away[border])]
-    return int(near if away[near] <= _TO_BORDER else np.argmin(away))
-
-
 def _rounded(point: FloatArray) -> list[float]:
     return [round(float(value), 6) for value in point]
 
 
 def _shares(part: Sequence[float]) -> list[float]:
     return [round(share, 4) for share in part]
-
-
-def _usual(solution: Solution, piece: str, line: str) -> dict[str, Any] | None:
-    """Return the dart that a pattern book has along a line, unless the piece has it already."""
-    plan = solution.plan
-    assert plan is not None
-    recipe = scene_recipe(plan.scene, plan.mannequin)[1]
-    layout, taken = plan.mannequin.layout, {dart.place for dart in recipe.darts}
-    bricks = {name: select_bricks(layout, own.bricks) for name, own in recipe.pieces.items()}
-    darts: Mapping[tuple[str, str], FormDart] = {
-        (dart.piece, dart.line): dart
-        for dart in reversed(usual_darts(layout, plan.form.vertices, bricks))
-        if dart.place not in taken and dart.towards is None
-    }
-    left = line.removesuffix(" right") + " left"
-    dart = darts.get((piece, line)) or darts.get((piece, left))
-    return None if dart is None else cut_of_dart(dart)
 
 
 def _unused(scene: Scene, name: str, piece: str | None = None) -> str:

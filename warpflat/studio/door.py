@@ -135,7 +135,10 @@ class Door:
                     response.headers["Cache-Control"] = "no-store"
                 return response
 
-            options |= {"create_connection": Connection, "max_size": _LONGEST_MESSAGE, "logger": _quiet_logger()}
+            # Faults of the program are logged, and nothing of requests that are none.
+            logger = logging.getLogger("warpflat.studio.door")
+            logger.filters = [lambda record: record.getMessage() == "connection handler failed"]
+            options |= {"create_connection": Connection, "max_size": _LONGEST_MESSAGE, "logger": logger}
             return serve(handler, sock=self._socket, process_request=answer, **options)
 
         websockets.asyncio.server.serve = guarded
@@ -174,10 +177,3 @@ def _name(host: str) -> str | IPv4Address | IPv6Address:
         return ip_address(host.partition("%")[0])
     except ValueError:
         return host.lower()
-
-
-def _quiet_logger() -> logging.Logger:
-    """Return a logger that tells faults of the program, and nothing of requests that are none."""
-    logger = logging.getLogger("warpflat.studio.door")
-    logger.filters = [lambda record: record.getMessage() == "connection handler failed"]
-    return logger

@@ -55,7 +55,20 @@ class Page:
         self.door = Door(host, port)
         self._worker = Worker()
         self.session = Session(scene, self._worker, out=out, on_change=self._changed, on_frame=self._take)
-        self.server, self.url = _serve(self.door, self.session), self.door.url
+        # What a page says wrongly, and what fails of what it asks for, is one line of the session. The server greets on
+        # standard output, which is for results.
+        with (
+            contextlib.redirect_stdout(io.StringIO()),
+            self.door.guard(lambda said: read_message(said, server.gui._gui_input_handle_from_uuid), self.session.tell),
+        ):
+            server = viser.ViserServer(label="warpflat studio", verbose=False)
+        # Each callback of viser goes through here.
+        submit = server._thread_executor.submit
+        server._thread_executor.submit = lambda act, *event: submit(self.session.attempt, lambda: act(*event))
+        server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(340)
+        self.server, self.url = server, self.door.url
         self._kind = "energy"
         self._drape_of: Step | None = None  # whose drape has been asked for
         self.scale: Scale | None = None
@@ -137,23 +150,32 @@ class Page:
         is_new = state != self._drawn
         if is_new:
             self._drawn = state
-            self._draw_pieces(self._pieces(solution, live, kind, drape), kind, drape, at_rest=not live)
+            # While pieces are being relaxed, the scale and their places on the table stay.
+            pieces = self._pieces(solution, live, kind, drape)
+            at_rest = not live
+            if at_rest or self.scale is None or self.scale.kind != kind:
+                frames = [piece.frame for piece in pieces.values()]
+                self.scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(kind, frames)
+                self._panel.show_scale(self.scale)
+            if at_rest:
+                self.stage.lay_out(pieces)
+            self.stage.draw(pieces, self.scale, tentative=self.session.preview is not None)
             if not live and solution is not None:
-                self._after_rest(solution)
+                # Names, the body and the camera that shows all pieces do not change while pieces are being relaxed.
+                self.stage.write_names({name: name.replace("_", " ") for name in solution.pieces})
+                body = None if solution.plan is None else solution.plan.mannequin
+                others = self._seen != tuple(solution.pieces)
+                if body is not self._body or others:
+                    self.stage.draw_body(None if body is None else body.surface())
+                    self._body = body
+                if others:
+                    self._seen = tuple(solution.pieces)
+                    for client in self.server.get_clients().values():
+                        self.stage.show_all(client)
         if self._told:
             self._told = False
             self._update_panel()
         return is_new
-
-    def _draw_pieces(self, pieces: Mapping[str, Shown], kind: str, drape: Drape | None, *, at_rest: bool) -> None:
-        """Draw pieces; while they are being relaxed the scale and their places on the table stay."""
-        if at_rest or self.scale is None or self.scale.kind != kind:
-            frames = [piece.frame for piece in pieces.values()]
-            self.scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(kind, frames)
-            self._panel.show_scale(self.scale)
-        if at_rest:
-            self.stage.lay_out(pieces)
-        self.stage.draw(pieces, self.scale, tentative=self.session.preview is not None)
 
     def _pieces(
         self, solution: Solution | None, live: Mapping[str, PieceFrame], kind: str, drape: Drape | None
@@ -164,7 +186,10 @@ class Page:
         if live:
             # Of another form the pieces before are gone.
             frames = {**(frames if frames.keys() >= live.keys() else {}), **live}
-        lines = {name: _runs(frame) for name, frame in frames.items()}
+        lines = {
+            name: {line: np.asarray(ids) for line, ids in frame.surface.lines.items() if len(ids) > 1}
+            for name, frame in frames.items()
+        }
         if kind == "drape" and drape is not None:
             cloth = drape.cloth
             return {
@@ -179,22 +204,10 @@ class Page:
             }
         return {name: Shown.of_map(frame, kind, lines[name], angle) for name, frame in frames.items()}
 
-    def _after_rest(self, solution: Solution) -> None:
-        """Write what does not change while pieces are being relaxed: names, the body, the camera that shows all pieces."""
-        self.stage.write_names({name: name.replace("_", " ") for name in solution.pieces})
-        body, others = None if solution.plan is None else solution.plan.mannequin, self._seen != tuple(solution.pieces)
-        if body is not self._body or others:
-            self.stage.draw_body(None if body is None else body.surface())
-            self._body = body
-        if others:
-            self._seen = tuple(solution.pieces)
-            for client in self.server.get_clients().values():
-                self.stage.show_all(client)
-
     def _update_panel(self) -> None:
         solution = self.session.solution
         known = self._cuttable(solution)
-        lines = [(piece, line) for piece, own in known.items() for line in own]
+        lines = [(piece, line) for piece, cuttable in known.items() for line in cuttable]
         if self._picked not in lines:
             self._picked = None
         self._panel.update(lines=lines, picked=self._picked)
@@ -230,7 +243,13 @@ class Page:
         if hit is None or solution is None:
             return
         if self._two_points:
-            self._add_point(hit, solution)
+            # The second point makes a cut.
+            self._points = [hit] if len(self._points) != 1 else [*self._points, hit]
+            self._picked = None
+            if len(self._points) == 2:
+                self._try(lambda: cut_between(solution, *self._points))
+            else:
+                self.session.drop_preview()
         elif hit.piece in solution.pieces:
             surface = solution.pieces[hit.piece].surface
             line = nearest_line(hit.point, surface.vertices, self._cuttable(solution)[hit.piece])
@@ -238,15 +257,6 @@ class Page:
                 self.session.tell('no line runs within 2 cm of the click; click nearer, or pick "two points"')
             else:
                 self._choose_line((hit.piece, line))
-
-    def _add_point(self, hit: Hit, solution: Solution) -> None:
-        """Take a point; the second one makes a cut."""
-        self._points = [hit] if len(self._points) != 1 else [*self._points, hit]
-        self._picked = None
-        if len(self._points) == 2:
-            self._try(lambda: cut_between(solution, *self._points))
-        else:
-            self.session.drop_preview()
 
     def _choose_mode(self, two_points: bool) -> None:
         self._two_points = two_points
@@ -280,25 +290,3 @@ class Page:
             self.session.ask_drape()
         self._told = True
         self._dirty.set()
-
-
-def _runs(frame: PieceFrame) -> dict[str, IntArray]:
-    """Return the lines of a piece that have a length."""
-    return {name: np.asarray(ids) for name, ids in frame.surface.lines.items() if len(ids) > 1}
-
-
-def _serve(door: Door, session: Session) -> viser.ViserServer:
-    """Start a server behind a door; what a page says wrongly, and what fails of what it asks for, is one line of the session."""
-    # It greets on standard output, which is for results.
-    with (
-        contextlib.redirect_stdout(io.StringIO()),
-        door.guard(lambda said: read_message(said, server.gui._gui_input_handle_from_uuid), session.tell),
-    ):
-        server = viser.ViserServer(label="warpflat studio", verbose=False)
-    # Each callback of viser goes through here.
-    submit = server._thread_executor.submit
-    server._thread_executor.submit = lambda act, *event: submit(session.attempt, lambda: act(*event))
-    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
-    server.gui.main_panel.dock_right()
-    server.gui.main_panel.set_width(340)
-    return server

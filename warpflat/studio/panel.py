@@ -16,7 +16,6 @@ from warpflat.flattening.progress import relaxation_words
 from warpflat.mannequin.ease import EASE_PRESETS
 from warpflat.mannequin.forms import form_names
 from warpflat.mannequin.measurements import size_names
-from warpflat.scene.load import Scene
 from warpflat.studio.maps import MAPS, Scale
 from warpflat.studio.session import Preview, Session
 
@@ -56,14 +55,73 @@ class Panel:
         self._gui, self._session, self._actions = server.gui, session, actions
         self._lines: dict[str, tuple[str, str]] = {}
         self._head = self._gui.add_html("")
-        self._views()
-        self._steps()
-        self._map()
-        self._cut()
-        self._cloth()
-        if session.scene.settings.mannequin is not None:
-            self._body()
-        self._saving(name)
+        sides = {"Front": 0.0, "Left": 90.0, "Back": 180.0, "Right": 270.0}
+        buttons = self._gui.add_button_group("look from", tuple(sides))
+        buttons.on_click(lambda event: self._actions.view(event.client, sides[event.target.value]))
+        acts = {"Undo": session.undo, "Redo": session.redo, "Stop": session.stop, "Watch": self._watch}
+        _buttons(self._gui.add_button_group("do", tuple(acts)), acts)
+        with self._gui.add_folder("Map"):
+            self._kind = self._gui.add_dropdown("colours", tuple(MAPS.values()))
+            self._legend = self._gui.add_html("")
+        keys = {title: key for key, title in MAPS.items()}
+        _chosen(self._kind, lambda value: self._actions.choose_map(keys[value]))
+        with self._gui.add_folder("Cut"):
+            self._mode = self._gui.add_dropdown("pick", ("a line", "two points"))
+            self._line = self._gui.add_dropdown("line", (_NO_LINE,))
+            self._part = self._gui.add_multi_slider(
+                "part [%]", min=0, max=100, step=1, initial_value=(0, 100), min_range=2
+            )
+            self._made = self._gui.add_button_group("cut", ("Apply", "Leave it"))
+        _chosen(self._mode, lambda value: self._actions.choose_mode(value == "two points"))
+        _chosen(self._line, lambda value: self._actions.choose_line(self._lines.get(value)))
+        _chosen(self._part, lambda value: self._actions.try_again((0.01 * value[0], 0.01 * value[1])))
+        _buttons(self._made, {"Apply": session.apply, "Leave it": lambda: self._actions.choose_line(None)})
+        scene = session.scene
+        with self._gui.add_folder("Cloth"):
+            try:
+                names = sorted(load_library([scene.folder / file for file in scene.settings.fabric_files]))
+            except InputError:
+                names = sorted(load_library())
+            self._fabric = self._gui.add_dropdown("cloth", (_OWN, *names), initial_value=_OWN)
+            self._grain = self._gui.add_slider("grain [°]", min=-90.0, max=90.0, step=1.0, initial_value=0.0)
+        _chosen(self._fabric, lambda value: session.change("cloth", fabric=value))
+        _chosen(self._grain, lambda value: session.change("grain", grain_angle=float(value)))
+        if scene.settings.mannequin is not None:
+            with self._gui.add_folder("Body and form"):
+                self._shown_lengths: Mapping[str, float] = {}
+                self._size = self._gui.add_dropdown("size", (_OWN, *size_names()), initial_value=_OWN)
+                with self._gui.add_folder("Measures", expand_by_default=False):
+                    self._measures = {
+                        key: self._gui.add_number(words, 0.0, min=0.0, max=260.0, step=0.5)
+                        for key, words in _MEASURES.items()
+                    }
+                    take = self._gui.add_button("Take these measures")
+                self._form = self._gui.add_dropdown("form", (_OWN, *form_names()), initial_value=_OWN)
+                self._shape = self._gui.add_dropdown("shape", _SHAPES)
+                self._ease = self._gui.add_dropdown("ease", (_OWN, *EASE_PRESETS), initial_value=_OWN)
+            _chosen(self._size, lambda value: session.change_body(value))
+            _chosen(self._form, session.change_form)
+            _chosen(self._shape, lambda value: session.change("shape", shape=value))
+            _chosen(self._ease, lambda value: session.change("ease", ease=value))
+
+            @take.on_click
+            def _(_: Any) -> None:
+                known = self._known_lengths()
+                given = {key: round(0.01 * box.value, 4) for key, box in self._measures.items()}
+                # What stays as it was goes on following the size.
+                changed = {key: value for key, value in given.items() if abs(value - known.get(key, 0.0)) > 5e-4}
+                session.change_body(**changed)
+
+        with self._gui.add_folder("Save"):
+            self._name = self._gui.add_text("name", name)
+            save = self._gui.add_button("Save and run", icon="device-floppy")
+
+        @save.on_click
+        def _(_: Any) -> None:
+            if session.is_taken(self._name.value):
+                self._ask_to_replace(self._name.value)
+            else:
+                session.save(self._name.value)
 
     def update(self, *, lines: Sequence[tuple[str, str]], picked: tuple[str, str] | None) -> None:
         """Show what the session has come to.
@@ -76,9 +134,19 @@ class Panel:
         self._head.content = _head(session)
         self._made.visible = session.preview is not None
         self._fabric.value = _one_of(session.fabric_name(), self._fabric.options)
-        self._grain.value = float(session.scene.settings.grain_angle)
-        if session.scene.settings.mannequin is not None:
-            self._update_body(session.scene)
+        settings = session.scene.settings
+        self._grain.value = float(settings.grain_angle)
+        if settings.mannequin is not None:
+            self._size.value = _one_of(settings.mannequin.size, self._size.options)
+            self._form.value = _one_of(settings.form, self._form.options)
+            self._shape.value = settings.shape
+            self._ease.value = _one_of(settings.ease, self._ease.options)
+            lengths = self._known_lengths()
+            # What somebody is typing stays until there is another body.
+            if lengths != self._shown_lengths:
+                self._shown_lengths = lengths
+                for key in self._measures.keys() & lengths.keys():
+                    self._measures[key].value = round(100.0 * lengths[key], 1)
         self._lines = {f"{piece}: {line}": (piece, line) for piece, line in lines}
         options = (_NO_LINE, *self._lines)
         if self._line.options != options:
@@ -96,94 +164,9 @@ class Panel:
         """Show which map is chosen."""
         self._kind.value = MAPS[kind]
 
-    def _views(self) -> None:
-        sides = {"Front": 0.0, "Left": 90.0, "Back": 180.0, "Right": 270.0}
-        buttons = self._gui.add_button_group("look from", tuple(sides))
-
-        @buttons.on_click
-        def _(event: Any) -> None:
-            self._actions.view(event.client, sides[event.target.value])
-
-    def _steps(self) -> None:
-        session = self._session
-        acts = {"Undo": session.undo, "Redo": session.redo, "Stop": session.stop, "Watch": self._watch}
-        _buttons(self._gui.add_button_group("do", tuple(acts)), acts)
-
-    def _body(self) -> None:
-        with self._gui.add_folder("Body and form"):
-            self._shown_lengths: Mapping[str, float] = {}
-            self._size = self._gui.add_dropdown("size", (_OWN, *size_names()), initial_value=_OWN)
-            with self._gui.add_folder("Measures", expand_by_default=False):
-                self._measures = {
-                    key: self._gui.add_number(words, 0.0, min=0.0, max=260.0, step=0.5)
-                    for key, words in _MEASURES.items()
-                }
-                take = self._gui.add_button("Take these measures")
-            self._form = self._gui.add_dropdown("form", (_OWN, *form_names()), initial_value=_OWN)
-            self._shape = self._gui.add_dropdown("shape", _SHAPES)
-            self._ease = self._gui.add_dropdown("ease", (_OWN, *EASE_PRESETS), initial_value=_OWN)
-        _chosen(self._size, lambda value: self._session.change_body(value))
-        _chosen(self._form, self._session.change_form)
-        _chosen(self._shape, lambda value: self._session.change("shape", shape=value))
-        _chosen(self._ease, lambda value: self._session.change("ease", ease=value))
-
-        @take.on_click
-        def _(_: Any) -> None:
-            known = self._known_lengths()
-            given = {key: round(0.01 * box.value, 4) for key, box in self._measures.items()}
-            # What stays as it was goes on following the size.
-            changed = {key: value for key, value in given.items() if abs(value - known.get(key, 0.0)) > 5e-4}
-            self._session.change_body(**changed)
-
     def _known_lengths(self) -> Mapping[str, float]:
         solution = self._session.solution
         return {} if solution is None or solution.plan is None else solution.plan.mannequin.lengths
-
-    def _update_body(self, scene: Scene) -> None:
-        settings = scene.settings
-        assert settings.mannequin is not None  # who calls this has looked
-        self._size.value = _one_of(settings.mannequin.size, self._size.options)
-        self._form.value = _one_of(settings.form, self._form.options)
-        self._shape.value = settings.shape
-        self._ease.value = _one_of(settings.ease, self._ease.options)
-        lengths = self._known_lengths()
-        # What somebody is typing stays until there is another body.
-        if lengths != self._shown_lengths:
-            self._shown_lengths = lengths
-            for key in self._measures.keys() & lengths.keys():
-                self._measures[key].value = round(100.0 * lengths[key], 1)
-
-    def _cloth(self) -> None:
-        scene = self._session.scene
-        with self._gui.add_folder("Cloth"):
-            try:
-                names = sorted(load_library([scene.folder / file for file in scene.settings.fabric_files]))
-            except InputError:
-                names = sorted(load_library())
-            self._fabric = self._gui.add_dropdown("cloth", (_OWN, *names), initial_value=_OWN)
-            self._grain = self._gui.add_slider("grain [°]", min=-90.0, max=90.0, step=1.0, initial_value=0.0)
-        _chosen(self._fabric, lambda value: self._session.change("cloth", fabric=value))
-        _chosen(self._grain, lambda value: self._session.change("grain", grain_angle=float(value)))
-
-    def _cut(self) -> None:
-        with self._gui.add_folder("Cut"):
-            self._mode = self._gui.add_dropdown("pick", ("a line", "two points"))
-            self._line = self._gui.add_dropdown("line", (_NO_LINE,))
-            self._part = self._gui.add_multi_slider(
-                "part [%]", min=0, max=100, step=1, initial_value=(0, 100), min_range=2
-            )
-            self._made = self._gui.add_button_group("cut", ("Apply", "Leave it"))
-        _chosen(self._mode, lambda value: self._actions.choose_mode(value == "two points"))
-        _chosen(self._line, lambda value: self._actions.choose_line(self._lines.get(value)))
-        _chosen(self._part, lambda value: self._actions.try_again((0.01 * value[0], 0.01 * value[1])))
-        _buttons(self._made, {"Apply": self._session.apply, "Leave it": lambda: self._actions.choose_line(None)})
-
-    def _map(self) -> None:
-        with self._gui.add_folder("Map"):
-            self._kind = self._gui.add_dropdown("colours", tuple(MAPS.values()))
-            self._legend = self._gui.add_html("")
-        keys = {words: key for key, words in MAPS.items()}
-        _chosen(self._kind, lambda value: self._actions.choose_map(keys[value]))
 
     def _watch(self) -> None:
         """Show how the piece of the picked line, or the first one, relaxes in plain steps."""
@@ -191,18 +174,6 @@ class Panel:
         if solution is not None:
             picked = self._lines.get(self._line.value)
             self._session.watch(picked[0] if picked else next(iter(solution.pieces)))
-
-    def _saving(self, name: str) -> None:
-        with self._gui.add_folder("Save"):
-            self._name = self._gui.add_text("name", name)
-            save = self._gui.add_button("Save and run", icon="device-floppy")
-
-        @save.on_click
-        def _(_: Any) -> None:
-            if self._session.is_taken(self._name.value):
-                self._ask_to_replace(self._name.value)
-            else:
-                self._session.save(self._name.value)
 
     def _ask_to_replace(self, name: str) -> None:
         modal = self._gui.add_modal("Replace the file?")

@@ -41,35 +41,29 @@ def pick_on_rays(
         origin, direction: of the ray, 3 each [m].
         pieces: by name the vertices in space, #V by 3 [m], and the faces, #F by 4.
     """
-    start, way = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
+    start, ray = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
     best: tuple[float, str, int] | None = None
     for name, (vertices, faces) in pieces.items():
         triangles, _ = triangulate(faces)
-        distance, triangle = _first_triangle(start, way, vertices[triangles])
-        if triangle is None or (best is not None and distance >= best[0]):
-            continue
-        at, corners = start + distance * way, triangles[triangle]
-        best = distance, name, int(corners[np.argmin(np.linalg.norm(vertices[corners] - at, axis=1))])
+        # Where the ray meets each triangle (Moeller, Trumbore 1997).
+        corners = vertices[triangles]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        across = np.cross(ray, second)
+        volume = np.einsum("ij,ij->i", first, across)
+        flat = np.abs(volume) < 1e-15
+        inverse = 1.0 / np.where(flat, 1.0, volume)
+        to_corner = start - corners[:, 0]
+        u = np.einsum("ij,ij->i", to_corner, across) * inverse
+        turned = np.cross(to_corner, first)
+        v = turned @ ray * inverse
+        distance = np.einsum("ij,ij->i", second, turned) * inverse
+        meets = ~flat & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (distance > 0.0)
+        distance = np.where(meets, distance, np.inf)
+        number = int(np.argmin(distance))
+        if distance[number] < (np.inf if best is None else best[0]):
+            away = np.linalg.norm(corners[number] - (start + distance[number] * ray), axis=1)
+            best = float(distance[number]), name, int(triangles[number][np.argmin(away)])
     return None if best is None else best[1:]
-
-
-def _first_triangle(origin: FloatArray, way: FloatArray, corners: FloatArray) -> tuple[float, int | None]:
-    """Return the distance along a ray to the first of some triangles (#T by 3 by 3), and its number (Moeller, Trumbore 1997)."""
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    across = np.cross(way, second)
-    volume = np.einsum("ij,ij->i", first, across)
-    flat = np.abs(volume) < 1e-15
-    inverse = 1.0 / np.where(flat, 1.0, volume)
-    to_corner = origin - corners[:, 0]
-    u = np.einsum("ij,ij->i", to_corner, across) * inverse
-    turned = np.cross(to_corner, first)
-    v = turned @ way * inverse
-    distance = np.einsum("ij,ij->i", second, turned) * inverse
-    meets = ~flat & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (distance > 0.0)
-    if not meets.any():
-        return np.inf, None
-    number = int(np.argmin(np.where(meets, distance, np.inf)))
-    return float(distance[number]), number
 
 
 def pick_flat(place: ArrayLike, pieces: Mapping[str, FloatArray]) -> tuple[str, int] | None:
@@ -85,12 +79,12 @@ def pick_flat(place: ArrayLike, pieces: Mapping[str, FloatArray]) -> tuple[str, 
         vertex = int(np.argmin(away))
         if best is None or away[vertex] < best[0]:
             best = float(away[vertex]), name, vertex
-    return None if best is None or best[0] > max(_NEAR_PIECE, _spacing(pieces[best[1]])) else best[1:]
-
-
-def _spacing(flat: FloatArray) -> float:
-    """Return about how far vertices lie from each other [m]."""
-    return float(np.sqrt(np.ptp(flat, axis=0).prod() / len(flat)))
+    if best is None:
+        return None
+    flat = pieces[best[1]]
+    # About how far vertices lie from each other.
+    spacing = float(np.sqrt(np.ptp(flat, axis=0).prod() / len(flat)))
+    return None if best[0] > max(_NEAR_PIECE, spacing) else best[1:]
 
 
 def nearest_line(point: ArrayLike, vertices: FloatArray, lines: Mapping[str, Iterable[int]]) -> str | None:
@@ -101,17 +95,13 @@ def nearest_line(point: ArrayLike, vertices: FloatArray, lines: Mapping[str, Ite
         vertices: #V by 3 [m].
         lines: vertices of each line.
     """
-    best: tuple[float, str] | None = None
+    place, best = np.asarray(point, dtype=float), None
     for name, ids in lines.items():
-        away = _distance(np.asarray(point, dtype=float), vertices[np.asarray(list(ids), dtype=np.int64)])
+        polyline = vertices[np.asarray(list(ids), dtype=np.int64)]
+        start, step = polyline[:-1], np.diff(polyline, axis=0)
+        length = np.maximum(np.einsum("ij,ij->i", step, step), 1e-30)
+        share = np.clip(np.einsum("ij,ij->i", place - start, step) / length, 0.0, 1.0)
+        away = float(np.linalg.norm(start + share[:, None] * step - place, axis=1).min())
         if best is None or away < best[0]:
             best = away, name
     return None if best is None or best[0] > _NEAR_LINE else best[1]
-
-
-def _distance(point: FloatArray, polyline: FloatArray) -> float:
-    """Return the distance of a point from a polyline (#N by 3) [m]."""
-    start, step = polyline[:-1], np.diff(polyline, axis=0)
-    length = np.maximum(np.einsum("ij,ij->i", step, step), 1e-30)
-    share = np.clip(np.einsum("ij,ij->i", point - start, step) / length, 0.0, 1.0)
-    return float(np.linalg.norm(start + share[:, None] * step - point, axis=1).min())

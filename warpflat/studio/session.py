@@ -187,12 +187,12 @@ class Session:
         if table is None:
             self.tell("the scene has no body; its [surface] is as large as its mesh")
             return
-        own = table.model_dump(exclude_unset=True, by_alias=True)
+        given = table.model_dump(exclude_unset=True, by_alias=True)
         if size is not None:
-            own = {key: value for key, value in own.items() if key not in ("measurements", "scan", "table")}
-            self.change("size", mannequin={**own, "size": size})
+            given = {key: value for key, value in given.items() if key not in ("measurements", "scan", "table")}
+            self.change("size", mannequin={**given, "size": size})
         else:
-            self.change("measures", mannequin={**own, "measurements": {**own.get("measurements", {}), **lengths}})
+            self.change("measures", mannequin={**given, "measurements": {**given.get("measurements", {}), **lengths}})
 
     def try_cut(self, cut: Mapping[str, Any]) -> None:
         """Solve the scene with one cut more, as a preview."""
@@ -389,20 +389,17 @@ class Session:
             try:
                 step.solution = solve(step.scene, before, callback=Watch(ticket, self._on_frame))
             except InputError:
-                self._remove(step)
+                # A step that cannot be solved goes; the first one stays.
+                with self._lock:
+                    if step in self._steps[1:]:
+                        at = self._steps.index(step)
+                        del self._steps[at]
+                        self._at -= at <= self._at
+                        if self._at and self.step.solution is None:
+                            self._solve()
                 raise
 
         self._run("solving", job)
-
-    def _remove(self, step: Step) -> None:
-        """Take a step that cannot be solved out of the way; the first one stays."""
-        with self._lock:
-            if step in self._steps[1:]:
-                at = self._steps.index(step)
-                del self._steps[at]
-                self._at -= at <= self._at
-                if self._at and self.step.solution is None:
-                    self._solve()
 
     def _run(self, activity: str, job: Callable[[Ticket], None], *, to_its_end: bool = False) -> None:
         """Run a job in the worker; a mistake of the user becomes one line."""

@@ -96,24 +96,31 @@ def solve(
         InputError: as :func:`warpflat.run_scene`.
     """
     if scene.settings.mannequin is None:
-        return _solve_surface(scene, before, callback)
-    return _solve_garment(scene, before, callback)
-
-
-def _solve_surface(
-    scene: Scene, before: Solution | None, callback: Callable[[str, Progress], bool | None] | None
-) -> Solution:
-    known = before is not None and before.bare is not None and _alike(scene, before.scene, _OF_SURFACE)
-    bare = before.bare if known and before is not None and before.bare is not None else scene_surface(scene)
-    sequence = scene_cuts(scene, surface=bare)
-    plan = None if before is None else _one_more_cut(scene, before, sequence)
-    if before is not None and plan is not None:
-        with errors_named(scene.where):
-            step = None if callback is None else partial(callback, scene.name)
-            result = cut(before.pieces[scene.name], plan, relax=scene_relax_options(scene), callback=step)
+        known = before is not None and before.bare is not None and _alike(scene, before.scene, _OF_SURFACE)
+        bare = before.bare if known and before is not None and before.bare is not None else scene_surface(scene)
+        sequence = scene_cuts(scene, surface=bare)
+        slit = None if before is None else _one_more_cut(scene, before, sequence)
+        if before is not None and slit is not None:
+            with errors_named(scene.where):
+                step = None if callback is None else partial(callback, scene.name)
+                result = cut(before.pieces[scene.name], slit, relax=scene_relax_options(scene), callback=step)
+        else:
+            result = plan_mesh(scene, cuts=sequence).flatten(callback=callback).pieces[scene.name]
+        return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*sequence.notes, *result.messages))
+    settled, notes = settle_shape(scene)
+    plan = None if before is None else before.plan
+    mannequin = plan.mannequin if plan is not None and _alike(scene, plan.scene, _OF_BODY) else _body(scene)
+    if plan is not None and mannequin is plan.mannequin and _alike(settled, plan.scene, _OF_FORM):
+        form = plan.form
     else:
-        result = plan_mesh(scene, cuts=sequence).flatten(callback=callback).pieces[scene.name]
-    return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*sequence.notes, *result.messages))
+        form = scene_form(settled, mannequin, before=None if plan is None else plan.form)[1]
+    plan = plan_garment(settled, built=(mannequin, form))
+    garment = plan.flatten(callback=callback, known=_known(plan, before))
+    while (opened := without_closed_darts(settled, [garment]))[1]:
+        settled, notes = opened[0], (*notes, *opened[1])
+        plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin, before=plan.form)[1]))
+        garment = plan.flatten(callback=callback, known=_known(plan, before))
+    return Solution(scene=scene, pieces=garment.pieces, plan=plan, garment=garment, notes=(*notes, *garment.notes))
 
 
 def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutPlan | None:
@@ -132,25 +139,6 @@ def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutP
     ):
         return None
     return sequence.plans[-1]
-
-
-def _solve_garment(
-    scene: Scene, before: Solution | None, callback: Callable[[str, Progress], bool | None] | None
-) -> Solution:
-    settled, notes = settle_shape(scene)
-    plan = None if before is None else before.plan
-    mannequin = plan.mannequin if plan is not None and _alike(scene, plan.scene, _OF_BODY) else _body(scene)
-    if plan is not None and mannequin is plan.mannequin and _alike(settled, plan.scene, _OF_FORM):
-        form = plan.form
-    else:
-        form = scene_form(settled, mannequin, before=None if plan is None else plan.form)[1]
-    plan = plan_garment(settled, built=(mannequin, form))
-    garment = plan.flatten(callback=callback, known=_known(plan, before))
-    while (opened := without_closed_darts(settled, [garment]))[1]:
-        settled, notes = opened[0], (*notes, *opened[1])
-        plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin, before=plan.form)[1]))
-        garment = plan.flatten(callback=callback, known=_known(plan, before))
-    return Solution(scene=scene, pieces=garment.pieces, plan=plan, garment=garment, notes=(*notes, *garment.notes))
 
 
 def _known(plan: GarmentPlan, before: Solution | None) -> dict[str, Flattening]:

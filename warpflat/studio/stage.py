@@ -104,8 +104,8 @@ class Stage:
         edges: list[FloatArray] = []
         count = 0
         for name, piece in pieces.items():
-            own, _ = triangulate(piece.frame.surface.faces)
-            triangles.append(own + count)
+            corners, _ = triangulate(piece.frame.surface.faces)
+            triangles.append(corners + count)
             space.append(piece.space)
             flat.append(self._flat(name, piece))
             colours.append(scale.colours(piece.values))
@@ -180,13 +180,13 @@ class Stage:
 
     def pick(self, origin: Sequence[float], direction: Sequence[float]) -> Hit | None:
         """Return the place of a piece that a ray from the eye meets, on the form or in the pattern."""
-        start, way = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
+        start, ray = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
         hit = pick_on_rays(
             start - np.asarray(self._form.position),
-            way,
+            ray,
             {name: (piece.space, piece.frame.surface.faces) for name, piece in self._pieces.items()},
         )
-        local, along = (start - np.asarray(self._pattern.position)) @ self._turn, way @ self._turn
+        local, along = (start - np.asarray(self._pattern.position)) @ self._turn, ray @ self._turn
         if hit is None and abs(along[2]) > 1e-9:
             place = (local - local[2] / along[2] * along)[:2]
             hit = pick_flat(place, {name: self._flat(name, piece)[:, :2] for name, piece in self._pieces.items()})
@@ -245,7 +245,8 @@ class Stage:
         across = width - _BETWEEN - 2.0 * pattern
         self._form.position = right * (0.5 * across - 0.5 * width) - middle[0]
         self._pattern.position = right * (0.5 * width - pattern - middle[1][0]) - up * (middle[1][1] - 0.03)
-        self._pattern.wxyz = _quaternion(self._turn)
+        x, y, z, w = Rotation.from_matrix(self._turn).as_quat().tolist()
+        self._pattern.wxyz = (w, x, y, z)
 
     def _flat(self, name: str, piece: Shown) -> FloatArray:
         """Return the pattern of a piece at its place on the table, #P by 3 [m]."""
@@ -304,9 +305,3 @@ def _above(vertices: FloatArray, faces: IntArray, height: float) -> FloatArray:
     triangles, _ = triangulate(faces)
     normals = vertex_normals(area_vectors(vertices, triangles), triangles, len(vertices))
     return np.asarray(vertices + height * normals)
-
-
-def _quaternion(turn: FloatArray) -> tuple[float, float, float, float]:
-    """Return a rotation matrix as a quaternion (w, x, y, z)."""
-    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
-    return w, x, y, z
