@@ -167,3 +167,17 @@ def skirt(rows: int = 16, around: int = 40) -> Surface:
         for k in range(around)
     ]
     return make_surface(vertices, faces, name="skirt")
+
+
+def jumpsuit(step: float = 0.04) -> Surface:
+    """Return a suit in one: trunk, arms that hang a little, legs."""
+    way, root = np.array([np.cos(0.6), -np.sin(0.6), 0.0]), np.array([0.16, 0.52, 0.0])
+    parts = [rod([0, 0.05, 0], [0, 0.45, 0], 0.17, 0.65), rod([0, 0.45, 0], [0, 0.75, -0.02], 0.06)]
+    parts += [rod([0.09 * side, 0, 0], [0.16 * side, -0.75, 0], 0.075) for side in (1.0, -1.0)]
+    openings: list[Plane] = [([0, 0.66, 0.0], [0, 0.94, 0.34])]
+    for side in (1.0, -1.0):
+        mirror = np.array([side, 1.0, 1.0])
+        parts.append(rod(root * mirror, (root + 0.45 * way) * mirror, 0.06))
+        openings.append(((root + 0.4 * way) * mirror, way * mirror))
+        openings.append(([0.15 * side, -0.7, 0], [0, -1, 0]))
+    return skin(joined(parts, 0.02), [-0.75, -0.9, -0.3], [0.75, 0.9, 0.3], step, openings)

@@ -12,7 +12,7 @@ from .promise import Case
 
 __all__ = ["GEOMETRY_SHARES", "garment_meshes", "geometry_case"]
 
-GEOMETRY_SHARES = {"form": 3, "tables": 6, "pieces": 6, "open": 4}
+GEOMETRY_SHARES = {"form": 3, "tables": 6, "pieces": 6, "open": 4, "garment": 4}
 """How many of a hundred cases, or so, are of which kind: a form takes seconds."""
 
 _QUIET = "[output]\nframes = 0\npicture = false\nreview = false\n"
@@ -81,6 +81,48 @@ def garment_meshes() -> dict[str, bytes]:
     }
 
 
+@functools.cache
+def whole_garments() -> dict[str, bytes]:
+    """Meshes of whole garments by name: trousers, a ball, and a tube."""
+    import trimesh
+
+    # Two legs share three places between them; the outer halves of both are the waist.
+    turn = np.linspace(0.5 * np.pi, -0.5 * np.pi, 7)
+    half = np.stack([0.08 + 0.1 * np.cos(turn), np.zeros(7), 0.11 * np.sin(turn)], -1)[1:-1]
+    middle = np.array([[0, 0, 0.11], [0, -0.04, 0], [0, 0, -0.11]])
+    points, faces = [*middle.tolist()], list[list[int]]()
+    outer = {}
+    for side in (1, -1):
+        outer[side] = list(range(len(points), len(points) + 5))
+        points += (half * [side, 1, 1]).tolist()
+    waist = [0, *outer[1], 2, *outer[-1][::-1]]
+    for ring, x, way in (
+        (waist, 0.0, 1),
+        ([0, 1, 2, *outer[1][::-1]], 0.09, -1),
+        ([0, *outer[-1], 2, 1], -0.09, -1),
+    ):
+        for level in range(1, 6):
+            new = list(range(len(points), len(points) + len(ring)))
+            for k in ring:
+                y, share = (0.05, 1.0) if way > 0 else (-0.12, 0.94)
+                points.append(
+                    [
+                        x + (points[k][0] - x) * share,
+                        points[k][1] + y if level > 1 or way > 0 else -0.12,
+                        points[k][2] * share,
+                    ]
+                )
+            count = len(ring)
+            faces += [[ring[k], ring[(k + 1) % count], new[(k + 1) % count], new[k]][::way] for k in range(count)]
+            ring = new
+    ball = trimesh.creation.icosphere(2, radius=0.1)
+    return {
+        "trousers.obj": _obj([("trousers", points, faces)]),
+        "ball.obj": _obj([("ball", ball.vertices, ball.faces)]),
+        "tube.obj": garment_meshes()["tube.obj"],
+    }
+
+
 def geometry_case(kind: str, random: Random) -> Case:
     """A damaged scene or mesh of a kind, and the command that reads it."""
     from .mutations import _MUCH_WORK, damaged_bytes, damaged_toml
@@ -97,7 +139,12 @@ def geometry_case(kind: str, random: Random) -> Case:
         return Case(kind, files, run, subject="odd.scene.toml", leaves="out/metrics.json", seconds=seconds)
     name = random.choice(list(meshes))
     command = ["flatten", "odd.obj", "--units", random.choice(("m", "m", "cm")), "--out", "out", *BARE]
-    if kind == "pieces":
+    if kind == "garment":
+        meshes = whole_garments()
+        name = random.choice(list(meshes))
+        command += ["--seams", "auto", "--fabric", "woven", "--max-steps", "30"]
+        command += random.choice(([], ["--front", "-z"], ["--up", "+z"], ["--no", "dart"], ["--limit", "1"]))
+    elif kind == "pieces":
         command += ["--component", "all"]
     else:
         name = random.choice(("tube.obj", name))
@@ -105,5 +152,5 @@ def geometry_case(kind: str, random: Random) -> Case:
         command += ["--open", ",".join(map(str, ends))]
     content = damaged_bytes(random, meshes[name])
     # A wrong vertex of --open is a fault of the command line.
-    subject = "odd.obj" if kind == "pieces" else ""
+    subject = "" if kind == "open" else "odd.obj"
     return Case(kind, {"odd.obj": content}, tuple(command), subject=subject, leaves="out/metrics.json", seconds=40.0)

@@ -127,3 +127,21 @@ def test_two_layers_are_worn_the_same_way_up(tmp_path: Path) -> None:
     assert {piece.name for piece in found.pieces} == {
         "top front", "top back", "left_sleeve", "right_sleeve", "skirt front", "skirt back",
     }  # fmt: skip
+
+
+def test_wrinkles_are_smoothed_on_request_and_tubes_keep_their_girth() -> None:
+    plain = solids.skirt(40, 80)
+    turn = np.arctan2(plain.vertices[:, 0], plain.vertices[:, 2])
+    wrinkles = 0.004 * np.sin(40 * turn)[:, None] * np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
+    rough = warpflat.make_surface(plain.vertices + wrinkles, plain.faces, name="skirt")
+    found = warpflat.find_seams(rough, warpflat.SeamOptions(smooth=0.02))
+    assert found.notes[0].startswith("smoothed over 20 mm, on request: it moved by")
+    radius = np.concatenate([piece.vertices for piece in found.pieces])
+    height = radius[:, 1]
+    middle = (height > 0.2) & (height < 0.4)
+    # Its own ellipse is 1, whatever the height.
+    own = np.hypot(radius[:, 0] / (0.28 - 0.2 * height), radius[:, 2] / (0.2 - 0.13 * height))[middle]
+    assert own.std() < 0.25 * 0.004 / 0.2
+    assert own.mean() == pytest.approx(1.0, abs=0.01)
+    with pytest.raises(warpflat.InputError, match="smooth = 500 mm is out of range"):
+        warpflat.find_seams(rough, warpflat.SeamOptions(smooth=0.5))

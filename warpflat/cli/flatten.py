@@ -34,6 +34,7 @@ __all__ = ["flatten"]
 )
 @click.option("--up", metavar="AXIS", help="Where up is: +y, +z ...  [default: found]")
 @click.option("--no", multiple=True, metavar="SEAM", help='A seam that is left closed: "shoulder", "side left".')
+@click.option("--smooth", type=float, metavar="MM", help="Smooth wrinkles over so many millimetres before it is cut.")
 @click.option("--most-pieces", type=int, metavar="N", help="At most so many pieces.  [default: as usual for its kind]")
 @click.option(
     "--limit",
@@ -127,6 +128,7 @@ def flatten(
         "up": ("find_seams", "up"),
         "most_pieces": ("find_seams", "most_pieces"),
         "limit": ("find_seams", "limit"),
+        "smooth": ("find_seams", "smooth_mm"),
     }
     for option, (table, key) in places.items():
         if options[option] is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,9 +62,12 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         layers = [layers[table.component]]
     elif table.component == "largest":
         layers = layers[:1]
-    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"find"})
-    options = SeamOptions(**{**given, "no": tuple(given.get("no", ()))})
-    return find_seams(layers, options, fabric=scene_fabric(scene))
+    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"find", "smooth_mm"})
+    smooth = 0.0 if asked is None else 1e-3 * asked.smooth_mm
+    options = SeamOptions(**{**given, "no": tuple(given.get("no", ())), "smooth": smooth})
+    found = find_seams(layers, options, fabric=scene_fabric(scene))
+    why = "one piece cannot lie flat, so its seams were found; --seams none keeps it whole"
+    return found if asked is not None else replace(found, notes=(why, *found.notes))
 
 
 def _is_whole_garment(surface: Surface) -> bool:

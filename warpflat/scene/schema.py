@@ -303,6 +303,8 @@ class FindSeamsTable(Table):
     front: Direction | None = None
     no: list[str] = Field(default_factory=list)
     """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts."""
+    smooth_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Length over which wrinkles of draped or scanned cloth are smoothed before it is cut; how far the cloth moves is told."""
     limit: Annotated[float, Field(ge=0, le=1)] = 0.01
     """Share of the cloth that may stay beyond its strain limit before further seams and darts are looked for."""
     most_pieces: Annotated[int, Field(ge=1, le=1000)] | None = None

@@ -19,6 +19,7 @@ class SeamOptions:
         up, front: directions as "+y" and "+z"; found from the shape if not given.
         no: seams that are left closed, by name, as "shoulder" or "shoulder left"; "dart" for no darts.
         limit: share of the cloth that may stay beyond its strain limit before further seams and darts are looked for.
+        smooth: wrinkles of draped or scanned cloth are smoothed over this length before anything is cut [m]; 0 leaves them.
         most_pieces: at most so many of one layer; as many as are usual for its kind if not given.
     """
 
@@ -27,6 +28,7 @@ class SeamOptions:
     no: tuple[str, ...] = ()
     limit: float = 0.01
     most_pieces: int | None = None
+    smooth: float = 0.0
 
     def forbids(self, seam: str) -> bool:
         """Return whether a seam is to be left closed."""
@@ -41,6 +43,8 @@ class SeamOptions:
         for key, value in (("up", self.up), ("front", self.front)):
             if value is not None and value not in DIRECTIONS:
                 raise InputError(f"{key} = {value!r} is no direction; {nearest(str(value), DIRECTIONS)}")
+        if not 0.0 <= self.smooth <= 0.1:
+            raise InputError(f"smooth = {1e3 * self.smooth:g} mm is out of range; it lies between 0 and 100 mm")
         if not 0.0 <= self.limit <= 1.0:
             raise InputError(f"limit = {self.limit:g} is no share of the cloth; it lies between 0 and 1")
         if self.most_pieces is not None and not 1 <= self.most_pieces <= 1000:
