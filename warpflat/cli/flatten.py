@@ -40,7 +40,7 @@ __all__ = ["flatten"]
     "--limit",
     type=float,
     metavar="SHARE",
-    help="Of the cloth that may stay beyond its limit before darts and further seams are tried.  [default: 0.01]",
+    help="Of the cloth that may stay beyond its limit before darts and further seams are tried.  [default: 0.02]",
 )
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")

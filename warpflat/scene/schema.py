@@ -305,7 +305,7 @@ class FindSeamsTable(Table):
     """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts."""
     smooth_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
     """Length over which wrinkles of draped or scanned cloth are smoothed before it is cut; how far the cloth moves is told."""
-    limit: Annotated[float, Field(ge=0, le=1)] = 0.01
+    limit: Annotated[float, Field(ge=0, le=1)] = 0.02
     """Share of the cloth that may stay beyond its strain limit before further seams and darts are looked for."""
     most_pieces: Annotated[int, Field(ge=1, le=1000)] | None = None
     """At most so many pieces of one layer; as many as are usual for its kind if not given."""

@@ -43,6 +43,8 @@ _HEARD = 0.08
 _OTHER_WAY = 0.6
 # Lengths are shares of the garment's size. A dart is between these long, and its tip a little behind the place.
 _SHORTEST, _LONGEST, _BEHIND = 0.03, 0.32, 0.01
+# Ahead of its tip a dart leaves at least this share of its length: one that all but parts a piece is no dart.
+_CLEAR = 0.6
 # Seams and darts at most, mirrored ones counted once; and how many are tried.
 _MOST_ROUNDS, _MOST_TRIALS = 6, 48
 
@@ -327,14 +329,16 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
                 continue
             way = (place - rim[k]) / length
             flat = np.cross(way, normal)
-            if np.linalg.norm(flat) < 0.3:
+            tip = place + _BEHIND * size * way
+            ahead_of_tip = np.linalg.norm(rim - tip, axis=1)[(rim - tip) @ way > 0.0]
+            if np.linalg.norm(flat) < 0.3 or ahead_of_tip.min(initial=np.inf) < _CLEAR * length:
                 continue
             yield _Candidate(
                 name="dart",
                 normal=flat / np.linalg.norm(flat),
                 point=rim[k],
                 start=rim[k],
-                end=place + _BEHIND * size * way,
+                end=tip,
                 parts=False,
             )
         if away.min() < _SHORTEST * size:

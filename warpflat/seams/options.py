@@ -26,7 +26,7 @@ class SeamOptions:
     up: str | None = None
     front: str | None = None
     no: tuple[str, ...] = ()
-    limit: float = 0.01
+    limit: float = 0.02
     most_pieces: int | None = None
     smooth: float = 0.0
 
