@@ -16,7 +16,6 @@ from typing import Any
 from warpflat.core.errors import SIGNALS
 
 __all__ = [
-    "HUNG_UP",
     "INTERRUPTED",
     "TERMINATED",
     "Stopped",
@@ -26,7 +25,7 @@ __all__ = [
     "stop_on_signals",
 ]
 
-HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
+INTERRUPTED, TERMINATED = 130, 143
 _WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
 _LATER = 0.01  # [s]
 
@@ -157,9 +156,9 @@ def _ours() -> list[int]:
     if threading.current_thread() is not threading.main_thread():
         return []  # only the main thread may handle signals
     known = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    return [number for number in known if _is_usual(signal.getsignal(number))]
-
-
-def _is_usual(handler: object) -> bool:
-    usual = handler in (signal.SIG_DFL, signal.default_int_handler)
-    return usual or getattr(handler, "__module__", None) == __name__
+    usual = []
+    for number in known:
+        handler = signal.getsignal(number)
+        if handler in (signal.SIG_DFL, signal.default_int_handler) or getattr(handler, "__module__", None) == __name__:
+            usual.append(number)
+    return usual

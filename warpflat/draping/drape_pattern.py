@@ -9,7 +9,6 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
 from warpflat.draping.body import Body
@@ -24,7 +23,7 @@ from warpflat.draping.whole_pieces import whole_pieces
 from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.pattern.pieces import Pattern, Piece
+from warpflat.pattern.pieces import Pattern
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["Placement", "drape_pattern"]
@@ -128,7 +127,9 @@ def drape_pattern(
     ).astype(np.int32)
     cells = [len(mesh.triangles) for mesh in meshes.values()]
     places = np.cumsum([0, *cells]).tolist()
-    warps = np.repeat([_grain(pieces[name]) for name in meshes], cells, axis=0)
+    grains = [pieces[name].grain for name in meshes]
+    along = [np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0] for grain in grains]
+    warps = np.repeat([line / np.linalg.norm(line) for line in along], cells, axis=0)
     lines = {
         f"{name}.{edge}": welded[row + begins[name]] for name, m in meshes.items() for edge, row in m.edges.items()
     }
@@ -163,11 +164,3 @@ def drape_pattern(
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
-
-
-def _grain(piece: Piece) -> FloatArray:
-    """Return the unit vector of a piece's warp."""
-    if piece.grain is None:
-        return np.array([0.0, 1.0])
-    along = piece.grain[1] - piece.grain[0]
-    return np.asarray(along / np.linalg.norm(along))

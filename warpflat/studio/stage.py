@@ -118,7 +118,9 @@ class Stage:
             outline = np.concatenate(edges) + np.array([0.0, 0.0, _ABOVE])
             self._segments("/pattern/outline", outline, _PICKED if tentative else _INK, 2.5)
             self._segments("/pattern/lines", _joined(self._line_pairs(pieces, self._flat)), _THIN, 1.0)
-            self._segments("/form/lines", _joined(self._line_pairs(pieces, _lifted)), _INK, 1.5)
+            # Lines lie a little above the cloth, so that they are seen.
+            lifted = self._line_pairs(pieces, lambda _, piece: _above(piece.space, piece.frame.surface.faces, _ABOVE))
+            self._segments("/form/lines", _joined(lifted), _INK, 1.5)
             self._segments(
                 "/pattern/grain", _joined(self._grain(name, piece) for name, piece in pieces.items()), _INK, 2.0
             )
@@ -294,11 +296,6 @@ class Stage:
 def _joined(parts: Iterable[FloatArray]) -> FloatArray:
     rows = list(parts)
     return np.concatenate(rows) if rows else np.zeros((0, 2, 3))
-
-
-def _lifted(name: str, piece: Shown) -> FloatArray:
-    """Return the vertices of a piece a little above its cloth, so that lines there are seen, #P by 3 [m]."""
-    return _above(piece.space, piece.frame.surface.faces, _ABOVE)
 
 
 def _above(vertices: FloatArray, faces: IntArray, height: float) -> FloatArray:
