@@ -30,7 +30,7 @@ Ids = NDArray[np.int64]
 _WORTH, _WORTH_OF_PIECE = 0.002, 0.15
 # A garment of which more than the first share is beyond the limit is parted further before darts are looked for; one of which more than the
 # second is, after them.
-_PARTED_FIRST, _PARTED = 0.05, 0.025
+_PARTED_FIRST, _PARTED = 0.05, 0.015
 # A centimetre sewn counts as this much cloth beyond the limit [m2].
 _PRICE = 1e-5
 # One that brings back this share of what is beyond in its piece is taken without a look at others.
