@@ -30,11 +30,13 @@ Ids = NDArray[np.int64]
 _WORTH, _WORTH_OF_PIECE = 0.002, 0.15
 # A garment of which more than the first share is beyond the limit is parted further before darts are looked for; one of which more than the
 # second is, after them.
-_PARTED_FIRST, _PARTED = 0.05, 0.025
+_PARTED_FIRST, _PARTED = 0.05, 0.015
 # A centimetre sewn counts as this much cloth beyond the limit [m2].
 _PRICE = 1e-5
 # One that brings back this share of what is beyond in its piece is taken without a look at others.
 _ENOUGH = 0.5
+# A dart opens by at least this [m], and its legs do not lie over each other by more than this [m2].
+_MOUTH, _OVERLAP = 4e-3, 1e-5
 # Of a piece so many places are looked at, and from each so many stretches of border.
 _PLACES, _STRETCHES = 3, 2
 # A place is looked at if it has this share of what is beyond in its piece.
@@ -151,6 +153,13 @@ def cut_by_energy(
                 after = _measured(made, fabric, prepare, pieces)
             except InputError:
                 continue
+            if not _can_be_sewn(
+                made,
+                candidate,
+                worst,
+                [piece for piece in after if all(piece.result is not one.result for one in pieces)],
+            ):
+                continue
             gain = beyond - sum(piece.outside for piece in after)
             released = sum(piece.energy for piece in pieces) - sum(piece.energy for piece in after)
             length = _length(made, f"trial of {candidate.name}")
@@ -229,6 +238,24 @@ def _measured(cloth: Cloth, fabric: Fabric, prepare: Prepare, known: Sequence[_M
             )
         )
     return found
+
+
+def _can_be_sewn(cloth: Cloth, candidate: _Candidate, before: _Measured, after: Sequence[_Measured]) -> bool:
+    """Return whether a dart opens wide enough to be sewn, and nothing lies over itself that did not before."""
+    if sum(piece.result.overlap for piece in after) > before.result.overlap + _OVERLAP:
+        return False
+    if candidate.parts:
+        return True
+    line = np.unique(cloth.seams[f"trial of {candidate.name}"])
+    widest = 0.0
+    for piece in after:
+        own = piece.mesh.vertex_of
+        order = np.argsort(own, kind="stable")
+        twice = np.flatnonzero((own[order][1:] == own[order][:-1]) & np.isin(own[order][1:], line))
+        if len(twice):
+            gap = piece.result.positions[order[twice]] - piece.result.positions[order[twice + 1]]
+            widest = max(widest, float(np.linalg.norm(gap, axis=1).max()))
+    return widest >= _MOUTH
 
 
 def _with_layout(cloth: Cloth, piece: _Measured) -> Cloth:
@@ -390,17 +417,26 @@ def _cut(cloth: Cloth, mesh: PieceMesh, candidate: _Candidate, name: str) -> Clo
     own = np.zeros(len(cloth.faces), dtype=bool)
     own[mesh.face_of] = True
     field = (cloth.vertices - candidate.point) @ candidate.normal
-    values = {**cloth.values, "trial": field}
+    cloth = replace(cloth, values={**cloth.values, "trial": field})
     if candidate.start is not None and candidate.end is not None:
         way = candidate.end - candidate.start
         along = (cloth.vertices - candidate.start) @ way / float(way @ way)
         beside = np.linalg.norm(cloth.vertices - candidate.start - np.clip(along, 0.0, 1.0)[:, None] * way, axis=1)
         # Cloth that lies elsewhere in the same plane, such as the other side of a tube, is not meant.
-        near = (along < 1.0) & (beside < 0.5 * float(np.linalg.norm(way)))
+        near = beside < 0.5 * float(np.linalg.norm(way))
         reached = _reached_within(cloth, own & near[cloth.faces].any(axis=1), candidate.start)
-        own &= reached
+        # The tip lies where it is meant to, not where the next edge is: on both sides of a garment alike.
+        corners = field[cloth.faces]
+        through = reached & (corners.min(axis=1) < 0.0) & (corners.max(axis=1) > 0.0)
+        cloth = replace(
+            cloth,
+            values={**cloth.values, "tip": along - 1.0},
+            labels={**cloth.labels, "own": reached.astype(np.int64)},
+        )
+        cloth, beyond = cloth.split("tip", through)
+        own = (cloth.labels["own"] > 0) & ~beyond
     labels = {**cloth.labels, "own": own.astype(np.int64)}
-    made, positive = replace(cloth, values=values, labels=labels).split("trial", own)
+    made, positive = replace(cloth, labels=labels).split("trial", own)
     within = made.labels["own"] > 0
     lines = made.line_between(positive, within)
     if len(lines) == 0:
@@ -420,7 +456,7 @@ def _cut(cloth: Cloth, mesh: PieceMesh, candidate: _Candidate, name: str) -> Clo
         inner = vertices[counts == 2]
         if any(int(v) in outside for v in inner) or sum(at_border) != (2 if candidate.parts else 1):
             return None
-        kept = {key: value for key, value in made.values.items() if key != "trial"}
+        kept = {key: value for key, value in made.values.items() if key not in ("trial", "tip")}
         marks = {key: label for key, label in made.labels.items() if key != "own"}
         return replace(made, values=kept, labels=marks).with_seam(name, part)
     return None
