@@ -63,7 +63,7 @@ def flatten(
         datum: the line from which it is developed and which becomes the grain: a name in `surface.lines`, or vertex
             indices along mesh edges; if not given, the line along the long axis through the middle.
         grain_angle: of the warp against the datum, degrees; 45 cuts on the bias.
-        units: of a mesh file that carries none: "m", "cm", "mm", "in", "ft".
+        units: of a mesh file that carries none: "m", "dm", "cm", "mm", "in", "ft".
         model: "springs", the paper's, or "membrane", the cloth measured as worn (see `warpflat.model.network`); what is
             minimised is reported as `model_energy_j` for both.
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.

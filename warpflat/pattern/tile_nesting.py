@@ -24,6 +24,8 @@ __all__ = ["CELL", "Mask", "Places", "TurnedShape", "nest_on_strip", "nest_on_ti
 
 #: Cells are about this wide [m], at most.
 CELL = 0.008
+# Sheets up to which everything is tried, and cells of a tile at least, down and across.
+_MANY, _FEWEST = 150, 4
 # A shape becomes cells block by block of so many each way.
 _BLOCK = 6
 #: Orders of the pieces that are tried.
@@ -95,17 +97,19 @@ def nest_on_tiles(
     Returns:
         The place of each shape, and the sheet's width and height [m], which are those of whole tiles.
     """
-    per_tile = tuple(int(np.ceil(side / CELL)) for side in step[::-1])
+    total = sum(float(shape.area) for shape in shapes)
+    needed = int(np.ceil(total / float(np.prod(step))))
+    # What takes more sheets is laid in coarser cells, by fewer tries: the work stays that of so many sheets.
+    coarser = max(1.0, np.sqrt(needed / _MANY))
+    per_tile = tuple(max(_FEWEST, int(np.ceil(side / (CELL * coarser)))) for side in step[::-1])
     cell = step / per_tile[::-1]
     shared = (int(overlap // cell[1]), int(overlap // cell[0]))
     masks = [_masks(shape, cell, gap, (0, 1, 2, 3)) for shape in shapes]
-    total = sum(float(shape.area) for shape in shapes)
-    needed = int(np.ceil(total / float(np.prod(step))))
     # The numbers of columns that are tried: around a square sheet, and wide enough for every shape.
     narrowest = max(min(mask.cells.shape[1] for mask in row) for row in masks)
     least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
     square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
-    counts = list(range(least, max(least, square) + 3))
+    counts = list(range(least, max(least, square) + 3)) if coarser == 1.0 else [max(least, square)]
     heights = [_heights(masks, count, per_tile, shared) for count in counts]
     sizes = [(max(height) + needed // count + 2, count) for count, height in zip(counts, heights, strict=True)]
     # Where shapes do not fit together there is room at last for all above each other.
@@ -115,7 +119,7 @@ def nest_on_tiles(
         for tiles in tries if best is None else []:
             grid = _Grid(cell=cell, per_tile=(per_tile[0], per_tile[1]), shared=shared, tiles=tiles)
             sheet = Places((tiles[0] * per_tile[0] + shared[0], tiles[1] * per_tile[1] + shared[1]))
-            for order in orders(masks):
+            for order in orders(masks)[: None if coarser == 1.0 else 2]:
                 laid = _lay(masks, order, grid, sheet)
                 if laid is not None and (best is None or laid[0] < best[0]):
                     best = laid

@@ -52,7 +52,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         if asked is None:
             return None
         raise
-    if asked is None and (len(layers) > 1 or not _is_whole_garment(layers[0])):
+    if asked is None and not _is_whole_garment(layers[0]):
         return None
     if isinstance(table.component, int):
         if table.component >= len(layers):

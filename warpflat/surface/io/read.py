@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 
-METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+METRES_PER_UNIT = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 SUFFIXES = (*GLTF, ".obj", ".off", ".ply", ".stl", *_USD)
@@ -95,7 +95,7 @@ def read_surface(
 
     Args:
         path: the file.
-        units: "m", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
+        units: "m", "dm", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
             overrides what the file says.
         component: the connected part to take if there are several: "largest", or its number, largest first from 0.
         name: of the piece (see :func:`warpflat.make_surface`); by default the file's stem, or the USD prim's or
@@ -166,12 +166,12 @@ def read_mesh_file(
             used = np.unique(raw.polygons[raw.polygons >= 0])
             points = raw.vertices[used[used < len(raw.vertices)]]
             points = points[np.isfinite(points).all(axis=1)]
-            sides = {unit: (np.ptp(points, axis=0) * METRES_PER_UNIT[unit]).tolist() for unit in ("m", "cm", "mm")}
+            sides = {unit: (np.ptp(points, axis=0) * METRES_PER_UNIT[unit]).tolist() for unit in ("m", "dm", "cm", "mm")}
             extents = {unit: " x ".join(f"{side:.3g}" for side in extent) for unit, extent in sides.items()}
             sizes = "; ".join(f'"{unit}": {extent} m' for unit, extent in extents.items())
             raise InputError(
                 'carries no unit: say which with units = "m" in the scene or --units m on the command line '
-                f"(m, cm, mm, in, ft); the mesh would measure, as {sizes}"
+                f"(m, dm, cm, mm, in, ft); the mesh would measure, as {sizes}"
             )
     report_activity("checking the mesh")
     return file, raw, raw.scale, sources
