@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.errors import InputError
+from warpflat.core.memory_limit import require_memory_for_run
+from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.scene.schema import FileSurface
 
@@ -52,6 +54,8 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         if asked is None:
             return None
         raise
+    # Before anything is tried on it, or read again.
+    require_memory_for_run(sum(len(layer.vertices) for layer in layers), frames=FrameSchedule(settings.output).wanted)
     if asked is None and not _is_whole_garment(layers[0]):
         return None
     if isinstance(table.component, int):
