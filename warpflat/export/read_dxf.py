@@ -235,7 +235,7 @@ def _add_lines(found: _Block, entities: Iterable[Any], metres: float, most: int,
         if kind == "SPLINE" and max(len(entity.control_points), len(entity.fit_points)) < 2:
             continue
         path = make_path(entity)
-        corners = np.array([tuple(corner)[:2] for corner in path.control_vertices()]).reshape(-1, 2)
+        corners = np.array([tuple(corner) for corner in path.control_vertices()]).reshape(-1, 3)
         if np.abs(corners * metres).max(initial=0.0) > FARTHEST or not np.isfinite(corners).all():
             raise InputError(f"reaches farther than {FARTHEST:g} m, or has a coordinate that is no number")
         # At once all points of a curve would take gigabytes.

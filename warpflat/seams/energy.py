@@ -370,9 +370,10 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
             )
         if away.min() < _SHORTEST * size:
             k = int(away.argmin())
-            inwards = surface.vertices[surface.faces[beside, :3]].mean(axis=(0, 1)) - rim[k]
             middle = triangles.mean(axis=1)
             near = np.linalg.norm(middle - rim[k], axis=1) < 0.08 * size
+            if not near.any():
+                continue
             inwards = middle[near].mean(axis=0) - rim[k]
             far = float(np.linalg.norm(inwards))
             if far < 1e-6 * size:

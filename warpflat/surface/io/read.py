@@ -266,7 +266,7 @@ def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:
     Raises:
         InputError: there is one.
     """
-    if float(np.ptp(raw.vertices, axis=0).max(initial=0.0)) * scale <= POSSIBLE[1]:
+    if not len(raw.vertices) or float(np.ptp(raw.vertices, axis=0).max()) * scale <= POSSIBLE[1]:
         return
     used = np.unique(raw.polygons[raw.polygons >= 0])
     used = used[used < len(raw.vertices)]
