@@ -33,7 +33,7 @@ from warpflat.pattern.sewing_order import seam_letters
 from warpflat.pattern.tile_nesting import nest_on_tiles
 from warpflat.pattern.words import printed_in, translate
 
-__all__ = ["PAPERS", "write_pdf"]
+__all__ = ["PAPERS", "too_many_sheets", "write_pdf"]
 
 
 #: Points per metre: a PDF's unit is 1/72 inch.
@@ -51,6 +51,8 @@ PAPERS = {
 }
 #: Width [m] of the page of a projector: that of a cutting table.
 PROJECTED_WIDTH = 0.9
+# Nobody glues more sheets than these together.
+MOST_SHEETS = 1000
 #: Roles whose strokes lie on the layer of their size in a nest.
 OF_LAYER = (*OF_SIZE, "dart_fold", "drill", "cutout")
 
@@ -82,6 +84,17 @@ def write_pdf(
         return _write(garment, path, paper, sizes)
 
 
+def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
+    """Return why nobody would print a pattern on sheets of this paper, "" where one would: cloth of a wrong unit takes thousands."""
+    if paper not in PAPERS or not PAPERS[paper].tiled:
+        return ""
+    import shapely
+
+    area = sum(shapely.Polygon(piece.cut_line).area for row in garment.pieces.values() for piece in row)
+    sheets = area / float(np.prod(PAPERS[paper].step))
+    return f"it would take some {sheets:,.0f} sheets; check the units, or take A0 paper" if sheets > MOST_SHEETS else ""
+
+
 def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, sizes: Sequence[str] | None) -> Tiling:
     if paper not in PAPERS:
         raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
@@ -91,6 +104,8 @@ def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, si
     whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
     printed = halved(whole)
     kind = PAPERS[paper]
+    if told := too_many_sheets(printed, paper):
+        raise InputError(f"{path}: {told}")
     sheet, tiling = _arranged(nests(printed), kind)
     # Labels move to where no joint of two sheets crosses them, where there is room for that.
     placed = []

@@ -207,6 +207,7 @@ def _write_pattern(
     from shapely.errors import ShapelyError
 
     from warpflat.core.output import file_in, output_folder
+    from warpflat.export.pdf import too_many_sheets
     from warpflat.pattern.curves import TOLERANCE
     from warpflat.pattern.cut_list import cut_list
     from warpflat.pattern.draft import draft_garment
@@ -261,11 +262,13 @@ def _write_pattern(
             for seam in walked
         ],
     }
+    refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
+    notes = (*notes, f"pattern.pdf was left out: {refused}") if refused else notes
     with output_folder(to) as folder:
         files = [
             _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
             for kind in FORMATS
-            if kind in options.formats
+            if kind in options.formats and not (kind == "pdf" and refused)
         ]
         if "dxf" in options.formats and len(drafted.pieces) > 1:
             files.append(file_in(folder, name, ".rul").name)
