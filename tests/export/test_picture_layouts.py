@@ -153,6 +153,18 @@ def test_picture_of_any_pieces(drawn: list[PicturePiece], scale: float | None, o
     check_page(figure)
 
 
+def test_picture_of_lines_whose_names_have_no_ink() -> None:
+    index, faces = grid(5, 5)
+    x, y = (part.ravel() for part in np.meshgrid(np.linspace(0.0, 0.1, 5), np.linspace(0.0, 0.1, 5)))
+    pattern, lines = np.column_stack([x, y]), {"\u00ad": index[:, 2], "\u2060": index[2], " ": index[0]}
+    shape = surface(np.column_stack([x, y, 0.0 * x]), faces, "\u200b", **lines)
+    piece = PicturePiece(
+        name="\u200b", surface=shape, faces=faces, positions=pattern, face_energy_density=np.zeros(len(faces)),
+        lines=lines, surface_lines=lines, datum=None, grain_angle=0.0, captions={"fabric": "\u00ad"},
+    )  # fmt: skip
+    check_page(draw_figure([piece]), words=False)
+
+
 def check_written(module: Any, write: Any, *arguments: Any, **options: Any) -> None:
     """The page that a function of a module draws for a file is as it should be."""
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:

@@ -121,7 +121,8 @@ class Pen:
         if key not in self._measured:
             font = FontProperties(size=size, weight=weight)
             width, height, _ = self._renderer.get_text_width_height_descent(text, font, ismath=False)
-            self._measured[key] = width / DPI, height / DPI
+            # Letters without ink, as a soft hyphen, have no height.
+            self._measured[key] = max(width, 1.0) / DPI, max(height, 1.0) / DPI
         return self._measured[key]
 
     def shorten(self, text: str, size: float, room: float, weight: str = "normal") -> str:
