@@ -100,10 +100,12 @@ def relax_under_equations(
     # Steps know no contact. Where offsets are known, an earlier minimum goes on, in which the forces of seams and cloth balance: to the
     # steps a seam's tension is a large energy, and they would carry soft cloth along a flat valley.
     goes_on = network.seams is not None and network.seams.offset.numpy().any()
+    # Factored before the steps: they leave seams and cloth beside them compressed, where the stiffness is a poor guide.
+    metric = _stiffness_metric(state)
     first = None if gap or goes_on else take_first_steps(state)
     layout = None if first is None else state.positions()
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
-    problem = Cloth(Energy(state, Barrier.of(network, gap) if gap else None), _stiffness_metric(state))
+    problem = Cloth(Energy(state, Barrier.of(network, gap) if gap else None), metric)
     descent = Descent(problem, problem.at(state.positions()))
     factored_at = 0
     while True:

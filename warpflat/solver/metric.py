@@ -60,11 +60,14 @@ class Factor(Protocol):
     def solve(self, force: FloatArray) -> FloatArray:
         """Return the inverse times forces, #V by 2."""
 
-    def spread(self, vertices: IntArray, pull: FloatArray) -> FloatArray:
-        """Return the inverse times forces `pull` (#N by 2) at some vertices (#N) and none elsewhere, #V by 2."""
+    def columns(self, vertices: IntArray) -> FloatArray:
+        """Return what the inverse says of some vertices (#N), for the two below."""
 
-    def between(self, vertices: IntArray) -> FloatArray:
-        """Return the inverse's entries between the coordinates of some vertices, 2 #N by 2 #N."""
+    def spread(self, columns: FloatArray, pull: FloatArray) -> FloatArray:
+        """Return the inverse times forces `pull` (#N by 2) at those vertices and none elsewhere, #V by 2."""
+
+    def between(self, columns: FloatArray, vertices: IntArray) -> FloatArray:
+        """Return the inverse's entries between the coordinates of those vertices, 2 #N by 2 #N."""
 
 
 @once_per_surface
@@ -106,16 +109,16 @@ class LaplacianFactor:
         """Return the inverse times forces, #V by 2."""
         return self._solve(force) / self._stiffness
 
-    def spread(self, vertices: IntArray, pull: FloatArray) -> FloatArray:
+    def spread(self, columns: FloatArray, pull: FloatArray) -> FloatArray:
         """Return the inverse times forces at some vertices."""
-        return np.ascontiguousarray((pull.T @ self._columns(vertices)).T)
+        return np.ascontiguousarray((pull.T @ columns).T)
 
-    def between(self, vertices: IntArray) -> FloatArray:
+    def between(self, columns: FloatArray, vertices: IntArray) -> FloatArray:
         """Return the inverse's entries between some vertices."""
-        table = self._columns(vertices)[:, vertices]
-        return np.asarray(np.kron(table, np.eye(2)), dtype=np.float64)
+        return np.asarray(np.kron(columns[:, vertices], np.eye(2)), dtype=np.float64)
 
-    def _columns(self, vertices: IntArray) -> FloatArray:
+    def columns(self, vertices: IntArray) -> FloatArray:
+        """Return the inverse's columns at some vertices, the same for both coordinates (#N by #V)."""
         new = [vertex for vertex in vertices.tolist() if vertex not in self._column]
         if new:
             unit = np.zeros((self._count, len(new)))
@@ -133,9 +136,11 @@ class StiffnessFactor:
         """Factor the stiffness in a layout (#V by 2 [m]) without mirrored cells; chords of pieces resist being turned."""
         matrix, free = stiffness_matrix(network, positions), network.bonds.freedom.numpy().ravel()
         if alignments:
+            # Each end of a chord is held sideways. A piece that no force moves along has one place and direction then, and the chord
+            # couples no far vertices, which would fill the factor.
             chords, across = _chords(alignments)
-            sideways = across[:, None] * np.array([[1.0], [-1.0]]) * np.sqrt(network.spring_arrays.stiffness.max())
-            rows = _rows(network.vertex_count, chords[:, :2], sideways) @ diags_array(free)
+            ends = np.repeat(across, 2, axis=0)[:, None] * np.sqrt(network.spring_arrays.stiffness.max())
+            rows = _rows(network.vertex_count, chords[:, :2].reshape(-1, 1), ends) @ diags_array(free)
             matrix = csc_array(matrix + rows.T @ rows)
         if network.seams is not None:
             rows = equation_rows(network, positions) @ diags_array(free)
@@ -149,15 +154,16 @@ class StiffnessFactor:
         """Return the inverse times forces, #V by 2."""
         return self._solve(force.ravel()).reshape(-1, 2)
 
-    def spread(self, vertices: IntArray, pull: FloatArray) -> FloatArray:
+    def spread(self, columns: FloatArray, pull: FloatArray) -> FloatArray:
         """Return the inverse times forces at some vertices."""
-        return np.asarray(pull.ravel() @ self._columns(vertices)).reshape(-1, 2)
+        return np.asarray(pull.ravel() @ columns).reshape(-1, 2)
 
-    def between(self, vertices: IntArray) -> FloatArray:
+    def between(self, columns: FloatArray, vertices: IntArray) -> FloatArray:
         """Return the inverse's entries between some vertices."""
-        return self._columns(vertices)[:, _coordinates(vertices)]
+        return columns[:, _coordinates(vertices)]
 
-    def _columns(self, vertices: IntArray) -> FloatArray:
+    def columns(self, vertices: IntArray) -> FloatArray:
+        """Return the inverse's columns at some vertices' coordinates (2 #N by 2 #V)."""
         coordinates = _coordinates(vertices).tolist()
         for coordinate in coordinates:
             if coordinate not in self._column:
@@ -209,7 +215,8 @@ class Metric:
         rows = np.zeros((len(vertices), len(own), 2))
         np.add.at(rows, (np.repeat(np.arange(len(vertices)), 3), at.ravel()), lever.reshape(-1, 2))
         flat = rows.reshape(len(rows), -1)
-        inner = flat @ factor.between(own) @ flat.T
+        columns = factor.columns(own)
+        inner = flat @ factor.between(columns, own) @ flat.T
         contacts = np.arange(count, len(rows))
         inner[contacts, contacts] += 1.0
         # Contacts so stiff that 1 is lost beside them would leave it singular.
@@ -218,7 +225,7 @@ class Metric:
         def solve(force: FloatArray) -> FloatArray:
             step = factor.solve(force)
             pull = np.linalg.solve(inner, flat @ step[own].ravel())
-            step = step - factor.spread(own, (pull @ flat).reshape(-1, 2))
+            step = step - factor.spread(columns, (pull @ flat).reshape(-1, 2))
             for (upper, lower, _), across in zip(self._chords, self._across, strict=True):
                 # What is left is rounding, which would add up over the steps.
                 half = 0.5 * across * (across @ (step[upper] - step[lower]))
