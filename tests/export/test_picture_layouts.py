@@ -21,7 +21,7 @@ from warpflat.cutting import ledger_picture
 from warpflat.draping import correction_picture, picture
 from warpflat.draping.correct_pattern import Correction
 from warpflat.export import picture_walked
-from warpflat.export.figure import DPI, PAGE_WIDTH, keep_words_on_page
+from warpflat.export.figure import DPI, PAGE_WIDTH, keep_words_on_page, new_figure
 from warpflat.export.geometry import face_areas
 from warpflat.export.letters import all_letters
 from warpflat.export.picture import PicturePiece, draw_figure
@@ -163,6 +163,15 @@ def test_picture_of_lines_whose_names_have_no_ink() -> None:
         lines=lines, surface_lines=lines, datum=None, grain_angle=0.0, captions={"fabric": "\u00ad"},
     )  # fmt: skip
     check_page(draw_figure([piece]), words=False)
+
+
+def test_words_stay_on_a_page_whose_axes_take_the_scale_of_their_outlines() -> None:
+    figure = new_figure(8.0, 6.0, dpi=100)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.plot([0.0, 0.1], [0.0, 9.0])
+    axes.text(0.0, 4.0, "W" * 60)
+    axes.set_aspect("equal")
+    check_page(figure)
 
 
 def check_written(module: Any, write: Any, *arguments: Any, **options: Any) -> None:

@@ -82,6 +82,8 @@ def write_figure(path: str | os.PathLike[str], figure: Figure) -> None:
 def keep_words_on_page(figure: Any) -> None:
     """Shorten level texts of a figure with an Agg canvas that would run over its left or right edge, with dots at their ends."""
     renderer, page = figure.canvas.get_renderer(), figure.bbox
+    for axes in figure.axes:
+        axes.apply_aspect()  # which moves what stands in them, otherwise when they are drawn
     for text in [*figure.texts, *(text for axes in figure.axes for text in axes.texts)]:
         whole, share = text.get_text().split("\n"), 1.0
         while whole != [""] and not text.get_rotation() and share > 0.01:
