@@ -288,7 +288,7 @@ def made_light(scene: Scene) -> Scene:
     settings = scene.settings
     if settings.mannequin is not None and settings.mannequin.size is not None:
         settings = settings.model_copy(
-            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 15.0})}
+            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 20.0})}
         )
     output = settings.output.model_copy(update={"frames": 0, "picture": False})
     pattern = settings.pattern.model_copy(update={"formats": ["json"]})
