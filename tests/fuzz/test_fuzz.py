@@ -18,10 +18,8 @@ from .mutations import SHARES, random_case
 from .promise import Case, Worker
 from .regressions import cases_of, regression_files
 
-# A few of each kind; `python -m tests.fuzz` runs thousands. USD is read by a process of its own, which takes half a
-# second; a scan takes seconds.
-EXAMPLES = {kind: max(1, share // 2) if kind.startswith("usd") else share for kind, share in SHARES.items()}
-EXAMPLES |= {"metrics": 4, "scan": 1}
+# A few of each kind; `python -m tests.fuzz` runs thousands.
+EXAMPLES = {kind: max(1, share // 2) for kind, share in SHARES.items()}
 
 
 @pytest.fixture(scope="module")
