@@ -2,12 +2,27 @@
 
 import os
 import signal
+import sys
+from pathlib import Path
+
+import pytest
+from command import Command, command_in
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("WARPFLAT_THREADS", "1")
 # As the command has it: threads of BLAS that wait for each other on a busy machine take several times the processor's time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Processes that tests start would each compile the package anew, for a second or two, if none kept what it has compiled.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # A shell lets what it starts in the background ignore Ctrl-C, and the programs that tests start would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
+    """Runs the command line in an empty folder, which becomes the current one."""
+    monkeypatch.chdir(tmp_path)
+    return command_in(tmp_path, capfd)

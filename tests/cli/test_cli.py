@@ -8,21 +8,18 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import warp as wp
+from command import Command, Ended
 
 from warpflat._version import __version__
-from warpflat.cli.main import main
 from warpflat.cli.progress_bar import ProgressBar
 from warpflat.cli.tables import warnings_of
 from warpflat.core.text import energy_words, format_count
-
-Run = Callable[..., tuple[int, str, str]]
 
 PATTERN_FILES = ("cloth.dxf", "cloth.svg", "pattern.pdf", "pattern.json")
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
@@ -35,35 +32,12 @@ BARE = "[output]\nframes = 0\npicture = false\n"
 FAR = "v 9 0 0\nv 9 1 0\nv 8 1 0\nf 7 8 9\n"
 
 
-@pytest.fixture
-def warpflat(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    """Runs the command line in an empty folder: exit code, standard output, standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        code = main(list(arguments))
-        captured = capfd.readouterr()
-        return code, captured.out, captured.err
-
-    return run
-
-
-def mistake(result: tuple[int, str, str]) -> str:
-    """The one line of a user's mistake."""
-    code, out, err = result
-    assert code == 2, (out, err)
-    assert out == ""
-    assert re.fullmatch(r"warpflat: [^\n]+\n", err), err
-    assert "Traceback" not in err
-    return err.removeprefix("warpflat: ").rstrip("\n")
-
-
 # --- a run
 
 
-def test_flatten_writes_its_files_and_a_summary(warpflat: Run):
+def test_flatten_writes_its_files_and_a_summary(command: Command):
     Path("cloth.obj").write_text(SQUARE)
-    code, out, err = warpflat("flatten", "cloth.obj", "--units", "m", "--fabric", "denim")
+    code, out, err, _ = command("flatten", "cloth.obj", "--units", "m", "--fabric", "denim")
     assert code == 0
     assert len(out.splitlines()) <= 5
     assert out.startswith("pieces: 1; 6 vertices, converged, ")
@@ -75,9 +49,9 @@ def test_flatten_writes_its_files_and_a_summary(warpflat: Run):
     assert json.loads(Path("out/cloth/metrics.json").read_text())["pieces"]["cloth"]["fabric"] == "denim"
 
 
-def test_run_prints_its_metrics_as_json_and_nothing_else(warpflat: Run):
+def test_run_prints_its_metrics_as_json_and_nothing_else(command: Command):
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 7\n" + BARE)
-    code, out, err = warpflat("run", "cap.toml", "--out", "there", "--json")
+    code, out, err, _ = command("run", "cap.toml", "--out", "there", "--json")
     assert code == 0
     assert json.loads(out) == json.loads(Path("there/metrics.json").read_text())
     assert err == ""
@@ -85,9 +59,11 @@ def test_run_prints_its_metrics_as_json_and_nothing_else(warpflat: Run):
 
 @pytest.mark.parametrize("verbose", [[], ["-v"]])
 @pytest.mark.parametrize("solver", ["auto", "paper"])
-def test_it_tells_the_steps_and_the_iterations_and_what_each_released(warpflat: Run, solver: str, verbose: list[str]):
+def test_it_tells_the_steps_and_the_iterations_and_what_each_released(
+    command: Command, solver: str, verbose: list[str]
+):
     Path("cap.toml").write_text(f"[surface]\nshape = 'dome'\nresolution = 9\n[relax]\nsolver = '{solver}'\n{BARE}")
-    _, out, _ = warpflat("run", "cap.toml", "--out", "there", *verbose)
+    _, out, *_ = command("run", "cap.toml", "--out", "there", *verbose)
     stages = json.loads(Path("there/metrics.json").read_text())["pieces"]["cap"]["stages"]
     released = [a["model_energy_j"] - b["model_energy_j"] for a, b in pairwise(stages)]
     units = ["step", "iteration"] if solver == "auto" else ["step"]
@@ -100,27 +76,27 @@ def test_it_tells_the_steps_and_the_iterations_and_what_each_released(warpflat: 
     assert all(joules > 0.0 for joules in released)
 
 
-def test_quiet_prints_nothing(warpflat: Run):
+def test_quiet_prints_nothing(command: Command):
     Path("cloth.obj").write_text(SQUARE)
-    assert warpflat("flatten", "cloth.obj", "--units", "m", "--frames", "0", "--no-picture", "-q") == (0, "", "")
+    assert command("flatten", "cloth.obj", "--units", "m", "--frames", "0", "--no-picture", "-q")[:3] == (0, "", "")
     assert {path.name for path in Path("out/cloth").iterdir()} == {"metrics.json", "cloth.obj", *PATTERN_FILES}
 
 
-def test_a_run_that_does_not_converge_exits_with_1_and_says_so(warpflat: Run):
+def test_a_run_that_does_not_converge_exits_with_1_and_says_so(command: Command):
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n[relax]\nmax_steps = 2\n" + BARE)
-    code, out, err = warpflat("run", "cap.toml", "--quiet")
+    code, out, err, _ = command("run", "cap.toml", "--quiet")
     assert (code, out) == (1, "")
     assert re.fullmatch(r"warpflat: cap did not converge within 4 work units .*max_steps\n", err)
-    code, out, err = warpflat("run", "cap.toml")
+    code, out, err, _ = command("run", "cap.toml")
     assert out.startswith("pieces: 1; 81 vertices, NOT converged: cap, ")
-    code, out, err = warpflat("run", "cap.toml", "-v")
+    code, out, err, _ = command("run", "cap.toml", "-v")
     assert re.search(r"^cap +81 .* NO$", out, re.MULTILINE)
 
 
-def test_with_levels_it_says_how_much_work_the_limit_was_reached_with(warpflat: Run):
+def test_with_levels_it_says_how_much_work_the_limit_was_reached_with(command: Command):
     """Of which the steps on the piece's own mesh, less than max_steps, are a part."""
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 33\n[relax]\nmax_steps = 10\n" + BARE)
-    code, out, err = warpflat("run", "cap.toml", "--json")
+    code, out, err, _ = command("run", "cap.toml", "--json")
     last = json.loads(out)["pieces"]["cap"]["stages"][-1]
     assert code == 1
     assert last["steps"] < 10 <= last["work_units"]
@@ -136,29 +112,29 @@ def test_a_residual_that_is_no_number_is_not_printed():
         ]
 
 
-def test_mended_input_is_noted(warpflat: Run):
+def test_mended_input_is_noted(command: Command):
     turned = SQUARE.replace("f 2 5 6 3", "f 3 6 5 2")
     repeated = SQUARE + "f 1 2 2 1\n"
     for text, note in ((turned, "winding"), (repeated, "repeated vertices")):
         Path("cloth.obj").write_text(text)
-        code, _, err = warpflat("flatten", "cloth.obj", "--units", "m", "--frames", "0", "--no-picture")
+        code, _, err, _ = command("flatten", "cloth.obj", "--units", "m", "--frames", "0", "--no-picture")
         assert code == 0
         assert note in err
 
 
 @pytest.mark.parametrize("datum", ["0,3", "1,2", "0,1,4"])
-def test_a_datum_by_vertices(warpflat: Run, datum: str):
+def test_a_datum_by_vertices(command: Command, datum: str):
     Path("cloth.obj").write_text(SQUARE)
-    assert warpflat("flatten", "cloth.obj", "--units", "m", "--datum", datum, "--frames", "0", "--no-picture")[0] == 0
+    assert command("flatten", "cloth.obj", "--units", "m", "--datum", datum, "--frames", "0", "--no-picture")[0] == 0
 
 
-def test_interrupting_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
+def test_interrupting_is_one_line_and_leaves_no_half_file(command: Command, monkeypatch: pytest.MonkeyPatch):
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("warpflat.cli.progress_bar.ProgressBar.__call__", interrupt)
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
-    assert warpflat("run", "cap.toml") == (130, "", "warpflat: interrupted\n")
+    assert command("run", "cap.toml")[:3] == (130, "", "warpflat: interrupted\n")
     assert not Path("out").exists()
 
 
@@ -169,7 +145,7 @@ def test_interrupting_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeyp
     ids=["terminated", "terminal closed"],
 )
 def test_a_signal_that_ends_a_run_leaves_no_half_file(
-    warpflat: Run, monkeypatch: pytest.MonkeyPatch, name: str, code: int, told: str
+    command: Command, monkeypatch: pytest.MonkeyPatch, name: str, code: int, told: str
 ):
     number = getattr(signal, name)
     monkeypatch.setattr("warpflat.cli.progress_bar.ProgressBar.__call__", lambda *_: os.kill(os.getpid(), number))
@@ -177,7 +153,7 @@ def test_a_signal_that_ends_a_run_leaves_no_half_file(
     # Whatever it was before is what it is again.
     before = signal.signal(number, signal.SIG_DFL)
     try:
-        assert warpflat("run", "cap.toml") == (code, "", told)
+        assert command("run", "cap.toml")[:3] == (code, "", told)
         assert signal.getsignal(number) is signal.SIG_DFL
     finally:
         signal.signal(number, before)
@@ -223,97 +199,97 @@ def test_a_good_run_is_one_with_standard_error_closed_too(tmp_path: Path, closed
         pytest.param(bytes(range(256)).decode("latin-1") * 20, "", id="noise"),
     ],
 )
-def test_a_bad_mesh_is_refused_in_one_line(warpflat: Run, text: str, message: str):
+def test_a_bad_mesh_is_refused_in_one_line(command: Command, text: str, message: str):
     Path("bad.obj").write_bytes(text.encode("latin-1"))
-    told = mistake(warpflat("flatten", "bad.obj", "--units", "m"))
+    told = command("flatten", "bad.obj", "--units", "m").refusal
     assert told.startswith("bad.obj: ")
     assert re.search(message, told), told
     assert not list(Path("out").glob("*/*"))
 
 
-def test_components_are_chosen_by_the_option(warpflat: Run):
+def test_components_are_chosen_by_the_option(command: Command):
     Path("two.obj").write_text(SQUARE + FAR)
-    told = mistake(warpflat("flatten", "two.obj", "--units", "m"))
+    told = command("flatten", "two.obj", "--units", "m").refusal
     assert "choose it with --component largest or a number from 0 to 1" in told
     for wrong in ("big", "-1"):
-        told = mistake(warpflat("flatten", "two.obj", "--units", "m", "--component", wrong))
+        told = command("flatten", "two.obj", "--units", "m", "--component", wrong).refusal
         assert 'component: should be "largest", "all" or a number from 0' in told
 
 
-def test_parts_that_meet_without_common_vertices_are_told_so(warpflat: Run):
+def test_parts_that_meet_without_common_vertices_are_told_so(command: Command):
     """Two quads, the second half as high as the first and beside it: a T-junction."""
     Path("tee.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 0\nv 2 0 0\nv 2 .5 0\nv 1 .5 0\nf 1 2 3 4\nf 5 6 7 8\n"
     )
-    told = mistake(warpflat("flatten", "tee.obj", "--units", "m"))
+    told = command("flatten", "tee.obj", "--units", "m").refusal
     assert (
         "though they meet: vertices of one lie on edges of another (a T-junction: vertex 7 on the edge between 1 and 2"
         in told
     )
     Path("apart.obj").write_text(SQUARE + FAR)
-    assert "though they meet" not in mistake(warpflat("flatten", "apart.obj", "--units", "m"))
+    assert "though they meet" not in command("flatten", "apart.obj", "--units", "m").refusal
 
 
-def test_a_mesh_that_its_reader_trips_over_is_told_in_words(warpflat: Run):
+def test_a_mesh_that_its_reader_trips_over_is_told_in_words(command: Command):
     Path("short.ply").write_bytes(
         b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
         b"property list uchar float tags\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
         + b"\0"
         * 9
     )
-    told = mistake(warpflat("flatten", "short.ply", "--units", "m"))
+    told = command("flatten", "short.ply", "--units", "m").refusal
     assert re.search(
         r"short.ply: not a readable PLY file: damaged, cut short, .*; save it again with vertices and", told
     )
 
 
-def test_a_pattern_is_exported_from_its_folder_or_its_file(warpflat: Run):
+def test_a_pattern_is_exported_from_its_folder_or_its_file(command: Command):
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 5\n" + BARE)
-    assert warpflat("run", "cap.toml", "--out", "out")[0] == 0
+    assert command("run", "cap.toml", "--out", "out")[0] == 0
     Path("out/cap.svg").unlink()
-    assert warpflat("export", "out/pattern.json", "--format", "svg")[:2] == (0, "out: cap.svg\n")
+    assert command("export", "out/pattern.json", "--format", "svg")[:2] == (0, "out: cap.svg\n")
     assert Path("out/cap.svg").exists()
-    told = mistake(warpflat("export", "out/cap.obj", "--format", "svg"))
+    told = command("export", "out/cap.obj", "--format", "svg").refusal
     assert told == "out/cap.obj: is a file; give the folder of a run, where its pattern.json lies"
 
 
-def test_a_tube_is_cut_open_with_a_note_and_a_line_of_ones_own_is_checked(warpflat: Run):
+def test_a_tube_is_cut_open_with_a_note_and_a_line_of_ones_own_is_checked(command: Command):
     Path("ring.obj").write_text(RING)
-    code, _, told = warpflat("flatten", "ring.obj", "--units", "ft", "--no-picture")
+    code, _, told, _ = command("flatten", "ring.obj", "--units", "ft", "--no-picture")
     assert code == 0
     assert "it is a tube, cut open where its borders are nearest, 30.5 cm" in told
-    assert warpflat("flatten", "ring.obj", "--units", "ft", "--no-picture", "--open", "1,5")[0] == 0
-    assert "no line 'back'" in mistake(warpflat("flatten", "ring.obj", "--units", "ft", "--open", "back"))
+    assert command("flatten", "ring.obj", "--units", "ft", "--no-picture", "--open", "1,5")[0] == 0
+    assert "no line 'back'" in command("flatten", "ring.obj", "--units", "ft", "--open", "back").refusal
 
 
 @pytest.mark.parametrize("suffix", ["ply", "stl", "glb", "usd", "usda", "usdc", "obj"])
 @pytest.mark.parametrize(
     "content", [b"", os.urandom(64), bytes(range(255, -1, -1)) * 64], ids=["empty", "short", "long"]
 )
-def test_noise_in_any_format_is_refused(warpflat: Run, suffix: str, content: bytes):
+def test_noise_in_any_format_is_refused(command: Command, suffix: str, content: bytes):
     Path(f"noise.{suffix}").write_bytes(content)
-    assert f"noise.{suffix}" in mistake(warpflat("flatten", f"noise.{suffix}", "--units", "m"))
+    assert f"noise.{suffix}" in command("flatten", f"noise.{suffix}", "--units", "m").refusal
 
 
-def test_paths_that_are_no_mesh(warpflat: Run):
+def test_paths_that_are_no_mesh(command: Command):
     Path("folder.obj").mkdir()
     Path("cloth.obj").write_text(SQUARE)
     Path("cloth.xyz").write_text(SQUARE)
-    assert "folder" in mistake(warpflat("flatten", "folder.obj", "--units", "m"))
-    assert "absent.obj" in mistake(warpflat("flatten", "absent.obj", "--units", "m"))
-    assert ".obj" in mistake(warpflat("flatten", "cloth.xyz", "--units", "m"))
-    assert "is a directory" in mistake(warpflat("run", "folder.obj"))
-    assert "no such file" in mistake(warpflat("run", "absent.toml"))
-    assert "did you mean" in mistake(warpflat("run", "cloth.obj".replace("o.", "ob.").replace("cloth", "clotj")))
-    assert "is not valid TOML" in mistake(warpflat("run", "cloth.obj"))
+    assert "folder" in command("flatten", "folder.obj", "--units", "m").refusal
+    assert "absent.obj" in command("flatten", "absent.obj", "--units", "m").refusal
+    assert ".obj" in command("flatten", "cloth.xyz", "--units", "m").refusal
+    assert "is a directory" in command("run", "folder.obj").refusal
+    assert "no such file" in command("run", "absent.toml").refusal
+    assert "did you mean" in command("run", "cloth.obj".replace("o.", "ob.").replace("cloth", "clotj")).refusal
+    assert "is not valid TOML" in command("run", "cloth.obj").refusal
 
 
-def test_units_are_asked_for_and_checked(warpflat: Run):
+def test_units_are_asked_for_and_checked(command: Command):
     Path("cloth.obj").write_text(SQUARE)
-    told = mistake(warpflat("flatten", "cloth.obj"))
+    told = command("flatten", "cloth.obj").refusal
     assert "cloth.obj" in told
     assert "units" in told
-    assert "cm" in mistake(warpflat("flatten", "cloth.obj", "--units", "centimeter-ish"))
+    assert "cm" in command("flatten", "cloth.obj", "--units", "centimeter-ish").refusal
 
 
 @pytest.mark.parametrize(
@@ -339,9 +315,9 @@ def test_units_are_asked_for_and_checked(warpflat: Run):
         (["--untis", "m"], "'--untis'.*'--units'"),
     ],
 )
-def test_wrong_options_are_told_in_one_line(warpflat: Run, options: list[str], message: str):
+def test_wrong_options_are_told_in_one_line(command: Command, options: list[str], message: str):
     Path("cloth.obj").write_text(SQUARE)
-    told = mistake(warpflat("flatten", "cloth.obj", "--units", "m", *options))
+    told = command("flatten", "cloth.obj", "--units", "m", *options).refusal
     assert re.search(message, told), told
 
 
@@ -349,42 +325,42 @@ def test_wrong_options_are_told_in_one_line(warpflat: Run, options: list[str], m
     ("file", "piece"),
     [("Ärmel.obj", "Armel"), ("Łokieć (1).obj", "Lokiec_1"), ("Maß-Rücken.obj", "Mass-Rucken"), ("袖.obj", "piece")],
 )
-def test_a_file_names_its_piece_without_accents(warpflat: Run, file: str, piece: str):
+def test_a_file_names_its_piece_without_accents(command: Command, file: str, piece: str):
     Path(file).write_text(SQUARE)
-    code, _, _ = warpflat("flatten", file, "--units", "m", "--frames", "0", "--no-picture")
+    code, _, _, _ = command("flatten", file, "--units", "m", "--frames", "0", "--no-picture")
     assert code == 0
     assert (Path("out") / piece / f"{piece}.obj").exists()
 
 
 @pytest.mark.parametrize("value", ["0", "-100", "nan", "1e99", '"soft"'])
-def test_impossible_stiffness_is_refused_by_name(warpflat: Run, value: str):
+def test_impossible_stiffness_is_refused_by_name(command: Command, value: str):
     Path("cap.toml").write_text(f"[surface]\nshape = 'dome'\n[fabric]\nbase = 'woven'\nstiffness_weft = {value}\n")
-    told = mistake(warpflat("run", "cap.toml"))
+    told = command("run", "cap.toml").refusal
     assert told.startswith("cap.toml: ")
     assert "stiffness_weft" in told
 
 
-def test_a_datum_that_does_not_touch_the_piece(warpflat: Run):
+def test_a_datum_that_does_not_touch_the_piece(command: Command):
     line = "[lines.far]\nplane = { point = [9.0, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }\n"
     Path("cap.toml").write_text(f"datum = 'far'\n[surface]\nshape = 'dome'\n{line}")
-    told = mistake(warpflat("run", "cap.toml"))
+    told = command("run", "cap.toml").refusal
     assert told.startswith("cap.toml: lines.far")
 
 
-def test_an_output_folder_that_cannot_be_written(warpflat: Run):
+def test_an_output_folder_that_cannot_be_written(command: Command):
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 7\n")
     Path("taken").write_text("a file")
-    assert "taken" in mistake(warpflat("run", "cap.toml", "--out", "taken"))
-    assert "taken" in mistake(warpflat("run", "cap.toml", "--out", "taken/below"))
+    assert "taken" in command("run", "cap.toml", "--out", "taken").refusal
+    assert "taken" in command("run", "cap.toml", "--out", "taken/below").refusal
     assert Path("taken").read_text() == "a file"
-    assert "/proc" in mistake(warpflat("run", "cap.toml", "--out", "/proc/warpflat"))
+    assert "/proc" in command("run", "cap.toml", "--out", "/proc/warpflat").refusal
 
 
 # --- fabrics, help
 
 
-def test_fabrics_lists_the_library(warpflat: Run):
-    code, out, err = warpflat("fabrics")
+def test_fabrics_lists_the_library(command: Command):
+    code, out, err, _ = command("fabrics")
     assert (code, err) == (0, "")
     assert re.search(r"^denim +0\.324 +411 +2,028 +27 ", out, re.MULTILINE)
     assert re.search(r"^linen +~0\.170 +~25,000 ", out, re.MULTILINE)
@@ -392,44 +368,44 @@ def test_fabrics_lists_the_library(warpflat: Run):
     assert "A read from data or code" in out
 
 
-def test_one_fabric_shows_unit_test_load_grade_and_source(warpflat: Run):
-    out = warpflat("fabrics", "jersey")[1]
+def test_one_fabric_shows_unit_test_load_grade_and_source(command: Command):
+    out = command("fabrics", "jersey")[1]
     assert re.search(r"^stiffness_weft +69 +N/m +low strain +A +\[1\]$", out, re.MULTILINE)
     assert "[1] Wang, O'Brien, Ramamoorthi 2011" in out
     assert "16.7 %: 136 N/m" in out
-    assert "estimate" in warpflat("fabrics", "linen")[1]
+    assert "estimate" in command("fabrics", "linen")[1]
 
 
-def test_fabrics_as_json_and_from_a_file(warpflat: Run):
+def test_fabrics_as_json_and_from_a_file(command: Command):
     Path("mine.toml").write_text("[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n")
-    code, out, _ = warpflat("fabrics", "mine", "--file", "mine.toml", "--json")
+    code, out, _, _ = command("fabrics", "mine", "--file", "mine.toml", "--json")
     assert code == 0
     data = json.loads(out)["mine"]
     assert data["shear_stiffness"] == 40.0
     assert data["provenance"]["stiffness_warp"]["grade"] == "A"
-    assert set(json.loads(warpflat("fabrics", "--json")[1])) >= {"woven", "denim", "power-net"}
-    assert "did you mean 'denim'" in mistake(warpflat("fabrics", "demin"))
+    assert set(json.loads(command("fabrics", "--json")[1])) >= {"woven", "denim", "power-net"}
+    assert "did you mean 'denim'" in command("fabrics", "demin").refusal
     Path("mine.toml").write_text("[mine]\nbase = 'denim'\nstifness_warp = 40.0\n")
-    assert "did you mean 'stiffness_warp'" in mistake(warpflat("fabrics", "--file", "mine.toml"))
+    assert "did you mean 'stiffness_warp'" in command("fabrics", "--file", "mine.toml").refusal
 
 
-def test_usage_errors_are_one_line(warpflat: Run):
-    assert "Did you mean 'fabrics'" in mistake(warpflat("fabric"))
-    assert "Did you mean '--out'" in mistake(warpflat("run", "--otu", "x", "y.toml"))
-    assert "warpflat run --help" in mistake(warpflat("run"))
+def test_usage_errors_are_one_line(command: Command):
+    assert "Did you mean 'fabrics'" in command("fabric").refusal
+    assert "Did you mean '--out'" in command("run", "--otu", "x", "y.toml").refusal
+    assert "warpflat run --help" in command("run").refusal
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["flatten"], ["compare"], ["cuts"], ["fabrics"]])
-def test_help_teaches(warpflat: Run, command: list[str]):
-    code, out, err = warpflat(*command, "--help")
+@pytest.mark.parametrize("name", [[], ["run"], ["flatten"], ["compare"], ["cuts"], ["fabrics"]])
+def test_help_teaches(command: Command, name: list[str]):
+    code, out, err, _ = command(*name, "--help")
     assert (code, err) == (0, "")
     assert "Examples:" in out
-    if command != ["fabrics"]:
+    if name != ["fabrics"]:
         assert re.search(r"Exit codes:\n +0 +done\n", out)
 
 
 @pytest.mark.parametrize(
-    ("command", "printed", "folder"),
+    ("name", "printed", "folder"),
     [
         ("run", "metrics.json", "out/NAME"),
         ("flatten", "metrics.json", "out/NAME"),
@@ -437,14 +413,14 @@ def test_help_teaches(warpflat: Run, command: list[str]):
         ("cuts", "ledger.json, with --apply metrics.json,", "out/NAME"),
     ],
 )
-def test_help_says_what_is_printed_and_where_files_go(warpflat: Run, command: str, printed: str, folder: str):
-    told = " ".join(warpflat(command, "--help")[1].split())
+def test_help_says_what_is_printed_and_where_files_go(command: Command, name: str, printed: str, folder: str):
+    told = " ".join(command(name, "--help")[1].split())
     assert f"--json Print {printed} on standard output" in told
     assert f"Folder for the files. [default: {folder}]" in told
 
 
-def test_version(warpflat: Run):
-    code, out, _ = warpflat("--version")
+def test_version(command: Command):
+    code, out, _, _ = command("--version")
     assert code == 0
     assert __version__ in out
 
@@ -466,38 +442,37 @@ def test_a_mistake_found_late_is_one_line_in_a_fresh_process_too(tmp_path: Path)
         [sys.executable, "-m", "warpflat", "flatten", "cloth.obj", "--units", "m", "--device", "cuda:99"],
         capture_output=True, text=True, check=False, cwd=tmp_path,
     )  # fmt: skip
-    assert mistake((result.returncode, result.stdout, result.stderr)).startswith("command line: device 'cuda:99'")
+    ended = Ended(result.returncode, result.stdout, result.stderr, frozenset())
+    assert ended.refusal.startswith("command line: device 'cuda:99'")
 
 
 @pytest.mark.skipif(wp.is_cuda_available(), reason="this machine has a CUDA device")
-def test_a_machine_without_cuda_is_told_in_one_line(warpflat: Run):
+def test_a_machine_without_cuda_is_told_in_one_line(command: Command):
     Path("cloth.obj").write_text(SQUARE)
-    told = mistake(warpflat("flatten", "cloth.obj", "--units", "m", "--device", "cuda"))
+    told = command("flatten", "cloth.obj", "--units", "m", "--device", "cuda").refusal
     assert told == "command line: device 'cuda' is not available; did you mean 'cpu'? valid: cpu"
 
 
-def test_memory_that_runs_out_is_one_line(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
+def test_memory_that_runs_out_is_one_line(command: Command, monkeypatch: pytest.MonkeyPatch):
     def short(*_: object, **__: object) -> None:
         raise RuntimeError("Failed to allocate 9586176 bytes on device 'cpu'")
 
     monkeypatch.setattr("warpflat.cli.progress_bar.ProgressBar.__call__", short)
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
-    assert mistake(warpflat("run", "cap.toml")).startswith("not enough memory: Failed to allocate 9586176 bytes")
+    assert command("run", "cap.toml").refusal.startswith("not enough memory: Failed to allocate 9586176 bytes")
     assert not Path("out").exists()
 
 
-def test_a_run_that_fails_leaves_no_folder(warpflat: Run, tmp_path: Path):
+def test_a_run_that_fails_leaves_no_folder(command: Command, tmp_path: Path):
     (tmp_path / "hung.toml").write_text(
         'form = "dress"\n[mannequin]\nsize = "EU 38"\n[[seams]]\nname = "sid left"\nease = 0.1\n'
     )
     (tmp_path / "flat.toml").write_text("datum = 'centr'\n[surface]\nshape = 'dome'\nresolution = 9\n")
-    for command in (("run", "hung.toml"), ("run", "flat.toml"), ("cuts", "flat.toml")):
-        mistake(warpflat(*command, "--out", "deep/inside"))
-        assert not (tmp_path / "deep").exists(), command
+    for arguments in (("run", "hung.toml"), ("run", "flat.toml"), ("cuts", "flat.toml")):
+        assert command(*arguments, "--out", "deep/inside").refusal
     # One that was there stays, with what it holds.
     (tmp_path / "mine").mkdir()
-    mistake(warpflat("run", "flat.toml", "--out", "mine/inside"))
-    assert not list((tmp_path / "mine").iterdir())
+    assert command("run", "flat.toml", "--out", "mine/inside").refusal
 
 
 def test_the_module_runs_as_a_program(tmp_path: Path):
@@ -524,8 +499,8 @@ def test_progress_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch):
         assert ("model energy 2.1 mJ, residual 5.0e-01" in stream.getvalue()) == shown
 
 
-def test_a_size_takes_measures_of_ones_own(warpflat: Run):
-    code, out, err = warpflat("mannequin", "--size", "EU 38", "--measure", "waist=0.76", "--resolution", "30")
+def test_a_size_takes_measures_of_ones_own(command: Command):
+    code, out, err, _ = command("mannequin", "--size", "EU 38", "--measure", "waist=0.76", "--resolution", "30")
     assert code == 0
     assert "waist = 76.0 cm instead of the 72.0 cm of size EU 38" in err
     assert "size EU 38 with waist = 76 cm" in out
@@ -545,8 +520,8 @@ def test_a_size_takes_measures_of_ones_own(warpflat: Run):
         (["--size", "EU 38", "--resolution", "50"], "'--resolution'"),
     ],
 )
-def test_a_mannequin_asked_for_in_two_ways_is_one_line_of_options(warpflat: Run, arguments: list[str], words: str):
-    code, _, err = warpflat("mannequin", *arguments)
+def test_a_mannequin_asked_for_in_two_ways_is_one_line_of_options(command: Command, arguments: list[str], words: str):
+    code, _, err, _ = command("mannequin", *arguments)
     assert code == 2
     assert words in err
     assert err.count("\n") == 1

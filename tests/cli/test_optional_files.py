@@ -58,12 +58,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.fixture(params=["1", "2"], ids=["alone", "beside"])
-def threads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files are written in this process, or in others."""
-    monkeypatch.setenv("WARPFLAT_THREADS", request.param)
-
-
 def fail(monkeypatch: pytest.MonkeyPatch, places: Iterable[str], error: Callable[[str], BaseException]) -> None:
     """Let functions raise an error made from the place of each."""
     for place in places:
@@ -83,29 +77,44 @@ def fail(monkeypatch: pytest.MonkeyPatch, places: Iterable[str], error: Callable
         monkeypatch.setattr(owner, parts[-1], broken)
 
 
-def check_left_out(out: Path, told: str, missing: Iterable[str]) -> None:
-    """Each of the files is missing, and notes on the console and in the metrics say so in a line each."""
-    notes = json.loads((out / "metrics.json").read_text())["notes"]
-    for what in missing:
-        said = [note for note in notes if note.startswith(f"{what} was left out")]
-        assert len(said) == 1, (what, notes)
-        assert told.splitlines().count(f"warpflat: note: {out}: {said[0]}") == 1, told
-        assert not (out / what).exists()
-    assert len(notes) == len(list(missing)), notes
-    assert "Traceback" not in told
-    assert not [path.name for path in out.iterdir() if path.name.startswith(".")]
+def left_out(told: str) -> list[str]:
+    """What is missing in `out` by the notes of its metrics, each of which the console tells in a line of its own."""
+    notes = json.loads(Path("out/metrics.json").read_text())["notes"]
+    lines = told.splitlines()
+    told_once = {note: lines.count(f"warpflat: note: out: {note}") == 1 for note in notes}
+    whats = [note.partition(" was left out")[0] if is_told else note for note, is_told in told_once.items()]
+    return sorted(what for what in whats if not Path("out", what).exists())
 
 
-@pytest.mark.usefixtures("threads")
-@pytest.mark.parametrize("kind", [ValueError, InputError, OSError])
-def test_a_surface_is_flattened_without_its_pictures(
-    kind: type[Exception], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("scene", "places", "kind", "threads"),  # with one, files are written in this process, with two in others
+    [
+        (DOME, SURFACE, ValueError, "1"),
+        (DOME, SURFACE, InputError, "2"),
+        (DOME, SURFACE, OSError, "1"),
+        (DOME, SURFACE, OSError, "2"),
+        (SKIRT, GARMENT, RuntimeError, "1"),
+        (SKIRT, GARMENT, RuntimeError, "2"),
+    ],
+)
+def test_a_pattern_is_made_without_its_pictures(
+    scene: str,
+    places: dict[str, str],
+    kind: type[Exception],
+    threads: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
-    Path("dome.toml").write_text(DOME)
-    fail(monkeypatch, SURFACE.values(), kind)
+    monkeypatch.setenv("WARPFLAT_THREADS", threads)
+    Path("dome.toml").write_text(scene)
+    fail(monkeypatch, places.values(), kind)
     assert main(["run", "dome.toml", "--out", "out"]) == 0
-    check_left_out(Path("out"), capfd.readouterr().err, SURFACE)
-    for file in ("dome.obj", "dome.dxf", "dome.svg", "pattern.pdf", "pattern.json"):
+    told = capfd.readouterr().err
+    assert left_out(told) == sorted(places)
+    assert "Traceback" not in told
+    assert not list(Path("out").glob(".*"))
+    assert len(list(Path("out").glob("*.obj"))) == len(json.loads(Path("out/metrics.json").read_text())["pieces"])
+    for file in ("dome.dxf", "dome.svg", "pattern.pdf", "pattern.json"):
         assert (Path("out") / file).stat().st_size > 500
 
 
@@ -127,19 +136,6 @@ def test_a_drape_is_done_without_its_pictures(
     ]
     assert "the drape was left out of frames.usdc: RuntimeError: " in capfd.readouterr().err
     assert Path("out/frames.usdc").stat().st_size > 1000  # how it was flattened
-
-
-@pytest.mark.usefixtures("threads")
-def test_a_garment_is_flattened_without_its_pictures(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    Path("skirt.toml").write_text(SKIRT)
-    fail(monkeypatch, GARMENT.values(), RuntimeError)
-    assert main(["run", "skirt.toml", "--out", "out"]) == 0
-    check_left_out(Path("out"), capfd.readouterr().err, GARMENT)
-    assert len(list(Path("out").glob("*.obj"))) == len(json.loads(Path("out/metrics.json").read_text())["pieces"])
-    for file in ("skirt.dxf", "skirt.svg", "pattern.pdf", "pattern.json"):
-        assert (Path("out") / file).stat().st_size > 500
 
 
 @pytest.mark.parametrize(

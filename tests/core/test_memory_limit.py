@@ -24,51 +24,48 @@ sys.exit(program())
 """
 
 
-def refused(folder: Path, limit: int, *arguments: str) -> str:
-    """What the program tells that has so much address space [bytes], exits with 2 and writes nothing."""
-    before = sorted(path.name for path in folder.iterdir())
+def ended(folder: Path, limit: int, *arguments: str) -> tuple[int, str, str, list[str]]:
+    """Exit code, standard output and error of the program with so much address space [bytes], and what it left in the folder."""
+    before = {path.name for path in folder.iterdir()}
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(limit=limit), *arguments],
         cwd=folder, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert (done.returncode, done.stdout) == (2, ""), done.stderr
-    assert done.stderr.count("\n") == 1, done.stderr
-    assert sorted(path.name for path in folder.iterdir()) == before
-    return done.stderr
+    left = sorted({path.name for path in folder.iterdir()} - before)
+    return done.returncode, done.stdout, done.stderr, left
 
 
-@pytest.fixture
-def large(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a mesh of 100,000 vertices."""
-    side = 317
+    folder, side = tmp_path_factory.mktemp("large"), 317
     x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 1, side), np.linspace(0, 1, side)))
     corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel() + 1
-    with open(tmp_path / "large.obj", "w", encoding="ascii") as file:
+    with open(folder / "large.obj", "w", encoding="ascii") as file:
         np.savetxt(file, np.c_[x, y, 0.1 * x * y], fmt="v %.6f %.6f %.6f")
         np.savetxt(file, np.c_[corner, corner + 1, corner + side + 1, corner + side], fmt="f %d %d %d %d")
-    return tmp_path
+    return folder
 
 
 @linux
-@pytest.mark.parametrize("gigabytes", [0.3, 0.8, 1.2, 2.0])
-def test_a_large_mesh_in_too_little_memory_is_refused(gigabytes: float, large: Path):
-    told = refused(large, int(gigabytes * GIGABYTE), "flatten", "large.obj", "--units", "m")
-    assert told.startswith("warpflat: not enough memory: ")
-    assert f"limit for this process is {1000 * gigabytes:,.0f} MB" in told
-
-
-@linux
-@pytest.mark.parametrize("gigabytes", [0.3, 1.0, 1.2])
-def test_a_mannequin_in_too_little_memory_is_refused(gigabytes: float, tmp_path: Path):
-    told = refused(tmp_path, int(gigabytes * GIGABYTE), "mannequin", "--size", "EU 38")
-    assert told.startswith("warpflat: not enough memory: loading the ")
-
-
-@linux
-def test_a_usd_file_in_too_little_memory_is_refused(tmp_path: Path):
-    (tmp_path / "cloth.usda").write_text("#usda 1.0\n")
-    told = refused(tmp_path, int(1.0 * GIGABYTE), "flatten", "cloth.usda", "--frames", "0")
-    assert told.startswith("warpflat: cloth.usda: not enough memory: loading the USD library")
+@pytest.mark.parametrize(
+    ("gigabytes", "arguments", "words"),
+    [
+        (0.3, "flatten large.obj --units m", "not enough memory: "),
+        (0.8, "flatten large.obj --units m", "not enough memory: "),
+        (2.0, "flatten large.obj --units m", "not enough memory: "),
+        (0.3, "mannequin --resolution 40", "not enough memory: loading the "),
+        (1.2, "mannequin --resolution 40", "not enough memory: loading the "),
+        (1.0, "flatten cloth.usda --frames 0", "cloth.usda: not enough memory: loading the USD library"),
+    ],
+)
+def test_what_takes_more_memory_than_there_is_is_refused(gigabytes: float, arguments: str, words: str, large: Path):
+    (large / "cloth.usda").write_text("#usda 1.0\n")
+    size = ["--size", "EU 38"] if arguments.startswith("mannequin") else []
+    code, out, told, left = ended(large, int(gigabytes * GIGABYTE), *arguments.split(), *size)
+    assert (code, out, told.count("\n"), left) == (2, "", 1, [])
+    assert told.startswith(f"warpflat: {words}")
+    assert "large" not in arguments or f"limit for this process is {1000 * gigabytes:,.0f} MB" in told
 
 
 def test_more_memory_than_any_process_can_have_is_refused(monkeypatch: pytest.MonkeyPatch):

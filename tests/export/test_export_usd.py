@@ -87,14 +87,14 @@ def test_stage_says_what_it_is(tmp_path: Path) -> None:
     from pxr import Kind, Usd, UsdGeom
 
     shape = mixed()
-    with FrameWriter(tmp_path / "frames.usdc", frames_per_second=30, scale=1.0) as writer:
+    with FrameWriter(tmp_path / "frames.usdc", scale=1.0) as writer:
         writer.add_piece("Ärmel links", shape)
         for _ in range(3):
             writer.write("Ärmel links", positions=shape.vertices[:, :2], face_energy_density=np.ones(3))
     stage = open_stage(tmp_path / "frames.usdc")
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     assert UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
-    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetTimeCodesPerSecond()) == (1, 3, 30)
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetTimeCodesPerSecond()) == (1, 3, 24)
     assert stage.GetDefaultPrim().GetPath() == "/World"
     (piece,) = pieces_of(stage)
     assert piece.GetDisplayName() == "Ärmel links"

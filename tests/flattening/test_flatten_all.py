@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 from devices import DEVICE
@@ -59,8 +57,33 @@ def outline_difference(one: Flattening, other: Flattening) -> float:
     return float(cKDTree(lines[0]).query(lines[1])[0].max())
 
 
-def check(surfaces: Sequence[Surface], **options: object) -> list[Flattening]:
-    """That all at once give what one after the other do."""
+TOGETHER = {
+    "sizes of a grid of quads": ([shape("dome", 21, size=size) for size in (0.9, 1.0, 1.15)], {}),
+    # Onsets of their own, and some that need many more iterations than others.
+    "unlike sizes and meshes": (
+        [
+            shape("bodice", 33), shape("dome", 9), shape("saddle", 17), shape("bodice", 33, triangles=True),
+            shape("dome", 21, size=0.5, triangles=True),
+        ],
+        {"fabric": find_fabric("interlock")},
+    ),
+    "soft cloth on quads and triangles": (
+        [shape("dome", 17, triangles=True), shape("bodice", 15, triangles=True), shape("bodice", 17)],
+        {"fabric": "woven"},
+    ),
+    "the paper's steps": (
+        [shape("dome", 15), shape("bodice", 15), shape("dome", 15, size=1.2)], {"relax": RelaxOptions(solver="paper")},
+    ),
+    "the membrane worn stretched": (
+        [shape("dome", 13, triangles=True), shape("bodice", 13)],
+        {"fabric": "jersey", "model": "membrane", "wear": Wear(stretch_warp=0.05, stretch_weft=0.1)},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", TOGETHER)
+def test_pieces_flattened_at_once_are_what_each_is_alone(case: str):
+    surfaces, options = TOGETHER[case]
     given = {"fabric": CLOTH, "datum": "centre", "device": DEVICE, **options}
     batch = flatten_all(surfaces, **given)
     assert len(batch) == len(surfaces)
@@ -76,60 +99,20 @@ def check(surfaces: Sequence[Surface], **options: object) -> list[Flattening]:
         assert [stage.name for stage in piece.stages] == ["develop", *steps, "relax"]
         assert piece.stages[0].model_energy_j == pytest.approx(alone.stages[0].model_energy_j, rel=1e-12)
         assert piece.stages[0].strain_energy_j == pytest.approx(alone.stages[0].strain_energy_j, rel=1e-12)
-        assert piece.stages[-1].strain_energy_j == pytest.approx(piece.worn.energy.sum(), rel=1e-12)
-        options, left = RelaxOptions(), piece.stages[-1].left
-        if left is None:
-            assert piece.stages[-1].residual <= options.residual_tolerance
+        last = piece.stages[-1]
+        assert last.strain_energy_j == pytest.approx(piece.worn.energy.sum(), rel=1e-12)
+        limits = RelaxOptions()
+        if last.left is None:
+            assert last.residual <= limits.residual_tolerance
         else:
-            assert left.energy_share <= options.energy_left
-            assert left.outline_mm <= options.outline_left_mm
-        np.testing.assert_allclose(
-            piece.history[-1, 1:3], [piece.stages[-1].model_energy_j, piece.stages[-1].guard_energy_j]
-        )
+            assert last.left.energy_share <= limits.energy_left
+            assert last.left.outline_mm <= limits.outline_left_mm
+        np.testing.assert_allclose(piece.history[-1, 1:3], [last.model_energy_j, last.guard_energy_j])
         assert piece.history[-1, 0] == sum(stage.steps for stage in piece.stages)
         assert piece.notes == alone.notes
         assert piece.measures["length_error"] == pytest.approx(alone.measures["length_error"], rel=1e-2)
-    return batch
-
-
-@pytest.mark.parametrize("name", ["dome", "bodice"])
-def test_sizes_of_a_grid(name: str):
-    check([shape(name, 21, size=size) for size in (0.9, 1.0, 1.15)])
-
-
-def test_pieces_of_unlike_sizes_and_meshes():
-    """Levels of other depths, onsets of their own, some that need many more cycles than others, and one of a single level."""
-    check(
-        [
-            shape("bodice", 33),
-            shape("dome", 9),
-            shape("saddle", 17),
-            shape("bodice", 33, triangles=True),
-            shape("dome", 21, size=0.5, triangles=True),
-        ],
-        fabric=find_fabric("interlock"),
-    )
-
-
-def test_soft_cloth_on_quads_and_triangles():
-    pieces = [shape("dome", 17, triangles=True), shape("bodice", 15, triangles=True), shape("bodice", 17)]
-    check(pieces, fabric="woven")
-
-
-def test_plain_steps():
-    batch = check(
-        [shape("dome", 15), shape("bodice", 15), shape("dome", 15, size=1.2)], relax=RelaxOptions(solver="paper")
-    )
-    assert batch[0].stages[-1].steps < batch[1].stages[-1].steps
-
-
-def test_the_membrane_worn_stretched():
-    check(
-        [shape("dome", 13, triangles=True), shape("bodice", 13)],
-        fabric="jersey",
-        model="membrane",
-        wear=Wear(stretch_warp=0.05, stretch_weft=0.1),
-    )
+    if case == "the paper's steps":  # each stops for itself
+        assert batch[0].stages[-1].steps < batch[1].stages[-1].steps
 
 
 def test_repeated_pieces_are_as_alone_bit_for_bit():

@@ -40,12 +40,11 @@ def cost(result: Flattening) -> tuple[float, float]:
     return result.stages[-1].model_energy_j, sum(stage.work_units for stage in result.stages)
 
 
-def assert_same_cost(ours: Flattening, theirs: Flattening) -> None:
+def costs_the_same(ours: Flattening, theirs: Flattening) -> bool:
+    """Whether one converged without a flip at the other's energy, with a third more or less work at most."""
     (energy, work), (wished, most) = cost(ours), cost(theirs)
-    assert ours.converged
-    assert ours.flipped_faces == 0
-    assert energy == pytest.approx(wished, rel=TOLERANCE)
-    assert max(work, most) <= 1.3 * min(work, most)
+    is_sound = ours.converged and ours.flipped_faces == 0
+    return is_sound and energy == pytest.approx(wished, rel=TOLERANCE) and max(work, most) <= 1.3 * min(work, most)
 
 
 @pytest.fixture(scope="module", params=["isotropic quads", "woven quads", "woven triangles", "linen triangles"])
@@ -92,7 +91,7 @@ def test_a_grid_costs_the_same_however_it_is_numbered_and_wound(
         faces = faces[:, ::-1]
     c, s = np.cos(turn), np.sin(turn)
     vertices = vertices * [-1.0 if mirrored else 1.0, 1.0, 1.0] @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    assert_same_cost(flattened(vertices, faces, number[WHOLE.lines["centre"]], whole.fabric.name), whole)
+    assert costs_the_same(flattened(vertices, faces, number[WHOLE.lines["centre"]], whole.fabric.name), whole)
 
 
 @pytest.mark.parametrize("fabric", ["isotropic", "denim"])
@@ -104,7 +103,7 @@ def test_both_diagonals_of_a_split_grid_cost_the_same(reversed_winding: bool, fa
         flattened(WHOLE.vertices, faces[:, ::-1] if reversed_winding and k else faces, centre, fabric)
         for k, faces in enumerate((split(WHOLE.faces, 0), split(WHOLE.faces, 1)))
     )
-    assert_same_cost(first, second)
+    assert costs_the_same(first, second)
 
 
 @pytest.mark.parametrize("fabric", ["woven", "linen"])

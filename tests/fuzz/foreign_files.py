@@ -216,7 +216,7 @@ def foreign_bounds() -> Iterator[Case]:
     head = _tags((0, "SECTION"), (2, "ENTITIES"))
     star = [
         _tags((0, "LINE"), (8, 1), (10, 0), (20, 0), (11, f"{1e3 * math.cos(k):.3f}"), (21, f"{1e3 * math.sin(k):.3f}"))
-        for k in range(20_000)
+        for k in range(10_000)
     ]
     circles = [_tags((0, "CIRCLE"), (8, 1), (10, k % 100 * 30), (20, k // 100 * 30), (40, 40)) for k in range(10_000)]
     rings = [_tags((0, "CIRCLE"), (8, 1), (10, 0), (20, 0), (40, 1 + 0.01 * k)) for k in range(10_000)]
@@ -244,4 +244,4 @@ def foreign_bounds() -> Iterator[Case]:
 
 def _too_much(kind: str, content: bytes, name: str, seconds: float) -> Iterator[Case]:
     for case in foreign_cases_of_file(kind, content):
-        yield replace(case, name=name, seconds=max(seconds, 20.0))
+        yield replace(case, name=name, seconds=max(seconds, 10.0))

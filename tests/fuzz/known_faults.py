@@ -197,7 +197,7 @@ def _meshes() -> Iterator[Case]:
         "--no-picture",
         "-q",
         "--max-steps",
-        "200",
+        "50",
     )
     yield Case(
         "obj",

@@ -24,6 +24,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 
+from .snapshot import snapshot
+
 __all__ = ["Case", "Environment", "Verdict", "Worker"]
 
 MEMORY = 2 * 1024**3
@@ -99,22 +101,6 @@ class Verdict:
         elif extra := [line for line in self.stderr.splitlines() if not line.startswith("warpflat: ")]:
             cause += f": {extra[0][:100]}"
         return re.sub(r"-?\b(0x[0-9a-f]+|\d{5,})", "#", re.sub(r"/tmp/\S+", "PATH", cause))
-
-
-def _snapshot(root: Path) -> dict[str, bytes | None]:
-    """Every file below a folder with its content, every link with its target, and every folder with None."""
-    found: dict[str, bytes | None] = {}
-    for folder, folders, files in os.walk(os.fsencode(root)):
-        for entry in folders + files:
-            path = os.path.join(folder, entry)
-            name = os.fsdecode(os.path.relpath(path, os.fsencode(root)))
-            if os.path.islink(path):
-                found[name] = b"link to " + os.readlink(path)
-            elif os.path.isfile(path):
-                found[name] = Path(os.fsdecode(path)).read_bytes()
-            else:
-                found[name] = None
-    return found
 
 
 def _broken_message(case: Case, stdout: str, stderr: str) -> str:
@@ -227,12 +213,12 @@ class _Place:
         for name, target in case.links.items():
             (self.here / name).parent.mkdir(parents=True, exist_ok=True)
             (self.here / name).symlink_to(target)
-        self.case, self.before = case, _snapshot(self.root)
+        self.case, self.before = case, snapshot(self.root)
 
     def judge(self, code: int | None, seconds: float, memory: int) -> Verdict:
         stdout, stderr = (file.read_text(encoding="utf-8", errors="replace") for file in (self.stdout, self.stderr))
         ended = Verdict(code, seconds, memory, stdout, stderr)
-        broken = _broken(self.case, self.here.name, ended, self.before, _snapshot(self.root))
+        broken = _broken(self.case, self.here.name, ended, self.before, snapshot(self.root))
         return Verdict(code, seconds, memory, stdout, stderr, broken)
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
+import functools
 
 import numpy as np
 import pytest
 from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_turn
+from scans import needs_bodies, scan, scanned_body
 
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import flatten_form
@@ -15,25 +16,16 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.outside import BodySurface, push_outside
 from warpflat.mannequin.scan_levels import trunk_sections
 from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
-from warpflat.surface.io.read import read_scan
 
-needs_bodies = pytest.mark.skipif(
-    "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"
-)
 BODIES = ["child", pytest.param("scan child", marks=needs_bodies)]
 
 
+@functools.cache
 def _body(name: str) -> Mannequin:
-    if name.startswith("scan"):
-        points, faces = _scan(name[5:])
-        return Mannequin.from_scan(points, faces, resolution_mm=15)
+    if name.startswith("scan "):
+        return scanned_body(name.removeprefix("scan "), 15.0)
     given = {"bust": 0.64, "waist": 0.58, "hip": 0.68, "stature": 1.28, "shoulder": 0.095}
     return Mannequin.from_measurements(resolution_mm=15, **given)
-
-
-def _scan(name: str) -> tuple[np.ndarray, np.ndarray]:
-    points, faces = read_scan(os.path.join(os.environ["WARPFLAT_DATA"], f"body_{name}.obj"))
-    return np.asarray(points, float), np.asarray(faces)
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -66,9 +58,9 @@ def test_armholes_have_no_horns_and_sleeves_can_be_sewn(name: str) -> None:
 @needs_bodies
 @pytest.mark.parametrize("name", ["female", "male_heavy"])
 def test_scanned_armholes_end_below_the_armpit(name: str) -> None:
-    slicer, _ = turn_scan_upright(*_scan(name), ScanOptions())
+    slicer, _ = turn_scan_upright(*scan(name), ScanOptions())
     armpits = trunk_sections(slicer).armpits
-    body = Mannequin.from_scan(*_scan(name), resolution_mm=20)
+    body = scanned_body(name)
     for side in ("left", "right"):
         hole, line = body.line(f"armhole {side}"), body.line(f"side {side}")
         assert 0.020 < armpits[side][0] - hole[0, 1] < 0.031
@@ -110,7 +102,7 @@ def test_a_dent_is_pushed_out_smoothly_and_negative_ease_is_not() -> None:
 def test_a_t_shirt_on_a_scan_has_no_hook_under_the_arm_and_a_round_neck(name: str) -> None:
     # With the fold that is found, at 1.195 m, the heavy man's back neck turns by 31 degrees per cm between two other vertices.
     landmarks = {"underbust": 1.245} if name == "male_heavy" else {}
-    body = Mannequin.from_scan(*_scan(name), options=ScanOptions(landmarks=landmarks), resolution_mm=15)
+    body = Mannequin.from_scan(*scan(name), options=ScanOptions(landmarks=landmarks), resolution_mm=15)
     made = body.form("tshirt", half=True)
     layout = body.layout
     side = made.vertices[layout.rings[layout.level_row["underbust"] :, layout.quarter]]

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from body_copies import copy_of_body
 from body_tapes import armpit_and_crotch
+from scans import needs_bodies, posed_body, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
 from warpflat.mannequin.body_model import BodyModel, Person, rotation
-from warpflat.mannequin.fit_body import Mesh, fit_body
+from warpflat.mannequin.fit_body import Mesh
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.stand_body import finer_body, stand_body
-from warpflat.surface.io.read import read_scan
-
-needs_bodies = pytest.mark.skipif(
-    "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"
-)
 
 
 def _person(random: np.random.Generator, spread: float, bend: float) -> Person:
@@ -84,7 +77,7 @@ def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
         np.testing.assert_allclose(weight @ vertices[triangles[face]], place, atol=1e-5)
 
 
-@pytest.mark.parametrize("arms", [0.0, 0.8, -0.5])
+@pytest.mark.parametrize("arms", [0.8, -0.5])
 def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     model, random = BodyModel.load(), np.random.default_rng(4)
     person = _person(random, 0.6, 0.08)
@@ -94,26 +87,14 @@ def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     person = replace(person, bend=person.bend @ rotation(bend))
     wanted = model.vertices(person)
     wanted -= [0.0, wanted[:, 1].min(), 0.0]
-    fit = fit_body(wanted, model.triangles)
-    plain = ~model.detail
+    stood = stand_body(wanted, model.triangles)
+    fit, plain = stood.fit, ~model.detail
     found = np.isfinite(fit.distance)
     assert found[plain].mean() > 0.98
     assert fit.distance[plain & found].mean() < 0.003
     assert np.linalg.norm(model.vertices(fit.person) - wanted, axis=1)[plain].mean() < 0.012
-    stood = stand_body(wanted, model.triangles)
     assert stood.unsure is None
     assert np.quantile(Mesh(wanted, model.triangles).closest(stood.posed)[2] - stood.posed, 0.9) < 0.001
-
-
-def _body(name: str) -> tuple[np.ndarray, np.ndarray]:
-    points, faces = read_scan(Path(os.environ["WARPFLAT_DATA"]) / f"body_{name}.obj")
-    points = np.asarray(points, float)
-    return points - [0.0, points[:, 1].min(), 0.0], np.asarray(faces)
-
-
-def _tapes(points: np.ndarray, faces: np.ndarray) -> tuple[dict[str, float], tuple[str, ...]]:
-    body = Mannequin.from_scan(points, faces, resolution_mm=25.0)
-    return {name: tape.girth for name, tape in body.measures.items()}, body.notes
 
 
 @needs_bodies
@@ -127,10 +108,10 @@ def _tapes(points: np.ndarray, faces: np.ndarray) -> tuple[dict[str, float], tup
 def test_bodies_whose_shape_does_not_show_the_levels_are_read_from_the_model(
     name: str, wanted: dict[str, float]
 ) -> None:
-    girths, notes = _tapes(*_body(name))
+    body = scanned_body(name)
     for tape, girth in wanted.items():
-        assert girths[tape] == pytest.approx(girth, abs=0.009), tape
-    assert sum("a body model laid on the scan" in note for note in notes) == 1
+        assert body.measures[tape].girth == pytest.approx(girth, abs=0.009), tape
+    assert sum("a body model laid on the scan" in note for note in body.notes) == 1
 
 
 def _without(which: Callable[[np.ndarray], np.ndarray], points: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -140,10 +121,8 @@ def _without(which: Callable[[np.ndarray], np.ndarray], points: np.ndarray, face
 @needs_bodies
 @pytest.mark.parametrize("case", ["arms as separate meshes", "no forearms", "legs apart", "floor", "T-pose"])
 def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
-    points, faces = _body("female")
-    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    marks = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
-    armpit, _, half = marks
+    points, faces = scan("female")
+    armpit, _, half = armpit_and_crotch(trimesh.Trimesh(points, triangles_of(faces), process=False))
     if case == "arms as separate meshes":
         faces = _without(
             lambda at: (
@@ -171,34 +150,31 @@ def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
             floor = floor.subdivide()
         new = np.column_stack([floor.faces + len(points), np.full(len(floor.faces), -1)])
         points, faces = np.concatenate([points, floor.vertices - [0.0, 0.01, 0.0]]), np.concatenate([faces, new])
+    if case == "T-pose":
+        body = posed_body("female", "arms up")
     else:
-        points, _ = copy_of_body(points, faces, "arms up", *marks)
-    girths, notes = _tapes(points, faces)
-    assert any("a body model laid on the scan" in note for note in notes)
+        body = Mannequin.from_scan(points, faces, resolution_mm=20.0)
+    assert any("a body model laid on the scan" in note for note in body.notes)
     wanted = {"bust": 0.845, "underbust": 0.702, "waist": 0.652, "hip": 0.904}
     if case == "legs apart":
         del wanted["hip"]
     for tape, girth in wanted.items():
-        assert girths[tape] == pytest.approx(girth, abs=0.012), tape
+        assert body.measures[tape].girth == pytest.approx(girth, abs=0.012), tape
 
 
 @needs_bodies
 def test_sleeves_of_a_t_pose_hang_from_the_shoulders() -> None:
-    points, faces = _body("female")
-    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    marks = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
-    posed, _ = copy_of_body(points, faces, "arms up", *marks)
-    body = Mannequin.from_scan(posed, faces, resolution_mm=25.0)
+    body = posed_body("female", "arms up")
     assert any("its arms are raised by" in note for note in body.notes)
-    scan, _ = body.scan
-    wide, tall = np.abs(scan[:, 0]).max(), scan[:, 1].max()
-    hand = scan[np.abs(scan[:, 0]) > 0.95 * wide]
+    points, _ = body.scan
+    wide, tall = np.abs(points[:, 0]).max(), points[:, 1].max()
+    hand = points[np.abs(points[:, 0]) > 0.95 * wide]
     assert hand[:, 1].mean() < 0.72 * tall
 
 
 @needs_bodies
 def test_one_arm_is_refused_in_one_line() -> None:
-    points, faces = _body("female")
+    points, faces = scan("female")
     faces = _without(lambda at: (at[:, 0] > 0.2) & (at[:, 1] > 0.5 * points[:, 1].max()), points, faces)
     with pytest.raises(InputError, match="a body model does not fit, either: the scan does not show two upper arms"):
-        Mannequin.from_scan(points, faces, resolution_mm=25.0)
+        Mannequin.from_scan(points, faces, resolution_mm=20.0)

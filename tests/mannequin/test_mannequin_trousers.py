@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from armhole_curves import depth_inside
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
@@ -95,13 +96,7 @@ def test_trousers_take_waist_darts(body: Mannequin) -> None:
 
 
 def test_trousers_lie_outside_the_body(body: Mannequin) -> None:
-    made = body.form("trousers")
-    # Every third vertex; `benchmarks/forms.py --inside` measures all of them, of all forms.
-    used = np.unique(np.concatenate([piece.grid_vertices for piece in made.pieces.values()]))[::3]
-    mesh = _mesh(body)
-    place, distance, triangle = trimesh.proximity.closest_point_naive(mesh, made.vertices[used])
-    out = np.einsum("nd,nd->n", made.vertices[used] - place, mesh.face_normals[triangle])
-    assert distance[out < 0.0].max(initial=0.0) < 1e-4
+    assert depth_inside(body.form("trousers"), body) < 1e-4
 
 
 def test_the_crotch_curve_moves_up_and_down_only(body: Mannequin) -> None:

@@ -48,6 +48,15 @@ def test_the_ledger_knows_the_darts_of_a_book_and_what_they_release(ledger):
     )
 
 
+def test_the_ledger_of_a_half_garment_is_half_of_the_whole(ledger):
+    names = ("bust dart", "waist dart")
+    halves = {(e.cut["piece"], e.cut["name"]): e for e in scene_ledger(scene(half=True), by="released").entries}
+    for whole in (entry for entry in ledger.entries if entry.cut["name"] in names):
+        half = halves[whole.cut["piece"], whole.cut["name"]]
+        assert 2.0 * half.released == pytest.approx(whole.released, rel=0.05)
+        assert half.mouth == pytest.approx(whole.mouth, rel=0.02)
+
+
 def test_a_trial_tells_the_energy_of_the_piece_in_the_garment(ledger):
     entry = next(
         entry for entry in ledger.entries if entry.cut["name"] == "waist dart" and entry.cut["piece"] == "front"
@@ -133,9 +142,10 @@ def test_a_seam_takes_over_the_darts_that_a_scene_asks_for():
         scene_form(scene(cuts=[{"piece": "front", "line": "bust"}, seam]))
 
 
-def test_a_dart_turned_into_gathers_lengthens_its_seam():
+@pytest.mark.parametrize("half", [False, True])
+def test_a_dart_turned_into_gathers_lengthens_its_seam(half: bool):
     edit = edit_dart(
-        scene(cuts=[{"piece": "front", "line": "bust", "name": "bust dart"}]),
+        scene(half=half, cuts=[{"piece": "front", "line": "bust", "name": "bust dart"}]),
         "front.bust dart",
         how="turn",
         aim="gathers",
@@ -209,7 +219,9 @@ def test_a_dart_that_the_body_does_not_want_is_left_out(tmp_path: Path):
     belly = {"measurements": {"bust": 1.12, "waist": 1.02, "hip": 1.08}, "resolution_mm": 40}
     tables = {
         "form": "skirt",
+        "half": True,
         "output": {"picture": False, "frames": 0},
+        "pattern": {"formats": ["json"]},
         "shape": "darts",
         "ease": "close",
         "mannequin": belly,

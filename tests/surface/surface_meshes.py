@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,22 +60,21 @@ def scattered(
     return place(points[:, 0], points[:, 1]), triangles, column
 
 
-def check_invariants(surface: Surface) -> None:
-    """What the rest of the package relies on."""
-    faces = surface.faces
-    assert faces.dtype == np.int32
-    assert faces.shape[1] == 4
-    assert surface.vertices.dtype == np.float64
-    assert np.isfinite(surface.vertices).all()
-    assert np.array_equal(np.unique(faces[faces >= 0]), np.arange(len(surface.vertices)))
-    assert len(non_manifold_edges(faces)) == 0
-    assert len(non_manifold_vertices(faces)) == 0
-    assert components(faces).max() == 0
-    assert len(border_edges(faces)) > 0
-    assert orient(faces)[1] == 0
-    he = half_edges(faces)
-    assert len(np.unique(np.stack([he.tail, he.head], axis=1), axis=0)) == len(he.tail)
-    assert np.array_equal(surface.vertices, surface.input_vertices[surface.input_index])
+def broken_invariants(surface: Surface) -> list[str]:
+    """What the rest of the package relies on and a surface does not keep."""
+    faces, vertices, he = surface.faces, surface.vertices, half_edges(surface.faces)
     edges = {tuple(edge) for edge in mesh_edges(faces).tolist()}
-    for line in surface.lines.values():
-        assert all((min(a, b), max(a, b)) in edges for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True))
+    steps = [tuple(sorted(step)) for line in surface.lines.values() for step in pairwise(line.tolist())]
+    holds = {
+        "faces are #F by 4 of 32 bits": faces.dtype == np.int32 and faces.shape[1] == 4,
+        "vertices are finite and of 64 bits": vertices.dtype == np.float64 and np.isfinite(vertices).all(),
+        "faces use every vertex": np.array_equal(np.unique(faces[faces >= 0]), np.arange(len(vertices))),
+        "it is a manifold": len(non_manifold_edges(faces)) == len(non_manifold_vertices(faces)) == 0,
+        "it is one part": components(faces).max() == 0,
+        "it has a border": len(border_edges(faces)) > 0,
+        "faces are wound alike": orient(faces)[1] == 0,
+        "no two half-edges are one": len(np.unique(np.stack([he.tail, he.head], axis=1), axis=0)) == len(he.tail),
+        "vertices are those of the input": np.array_equal(vertices, surface.input_vertices[surface.input_index]),
+        "lines run along edges": all(step in edges for step in steps),
+    }
+    return [what for what, is_so in holds.items() if not is_so]

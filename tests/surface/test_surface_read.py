@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from pxr import Gf, Sdf, Usd, UsdGeom
-from surface_meshes import check_invariants, cylinder, grid
+from surface_meshes import broken_invariants, cylinder, grid
 
 from warpflat.core.errors import InputError
 from warpflat.surface.io.read import read_surface
@@ -41,7 +41,7 @@ def obj_text(vertices, faces):
 def test_obj_keeps_quads_order_and_every_digit(tmp_path):
     vertices, quads = grid(4, 3, cylinder)
     surface = read_surface(write(tmp_path / "half.obj", obj_text(vertices, quads)), units="m")
-    check_invariants(surface)
+    assert broken_invariants(surface) == []
     assert np.array_equal(surface.vertices, vertices)
     assert np.array_equal(surface.faces, quads)
     assert surface.name == "half"
@@ -113,7 +113,7 @@ def test_line_elements_become_feature_lines(tmp_path):
     vertices, quads = grid(4, 4)
     single = "g front\nl 3 7\nl 11 7\nl 11 15\ng hem\nl 1 2 3 4\ng two\nl 1 5\nl 4 8"
     surface = read_surface(write(tmp_path / "a.obj", obj_text(vertices, quads) + "\n" + single), units="m")
-    check_invariants(surface)
+    assert broken_invariants(surface) == []
     lines = {name: line.tolist() for name, line in surface.lines.items()}
     assert lines == {"front": [2, 6, 10, 14], "hem": [0, 1, 2, 3], "two_1": [0, 4], "two_2": [3, 7]}
 
@@ -224,7 +224,7 @@ def test_trimesh_formats_come_welded_and_in_metres(tmp_path, suffix):
     path = tmp_path / f"half{suffix}"
     trimesh.Trimesh(vertices, triangulate(quads)[0], process=False).export(path)
     surface = read_surface(path, units=None if suffix == ".glb" else "m")
-    check_invariants(surface)
+    assert broken_invariants(surface) == []
     assert len(surface.vertices) == 30
     assert len(surface.faces) == 40
     assert surface.name == "half"
@@ -307,7 +307,7 @@ def test_usd_unit_transform_and_quads(tmp_path, suffix):
     mesh.AddScaleOp().Set(Gf.Vec3f(2, 2, 2))
     stage.Save()
     surface = read_surface(tmp_path / f"a{suffix}")
-    check_invariants(surface)
+    assert broken_invariants(surface) == []
     assert surface.name == "Front"
     assert np.array_equal(surface.faces, quads)
     assert surface.vertices == pytest.approx(vertices * 0.6 + [0, 0.1, 0], abs=1e-7)
@@ -391,7 +391,7 @@ def test_curves_beside_and_below_become_feature_lines(tmp_path):
     curve("/World/elsewhere", vertices[:2] + np.array([0, 0, 50.0]), [2])
     stage.Save()
     surface = read_surface(tmp_path / "a.usda")
-    check_invariants(surface)
+    assert broken_invariants(surface) == []
     lines = {name: line.tolist() for name, line in surface.lines.items()}
     assert set(lines) == {"centre", "hems_1", "hems_2", "dart"}
     assert lines["centre"] == [2, 7, 12, 17, 22]

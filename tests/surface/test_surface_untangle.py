@@ -70,7 +70,7 @@ def test_only_suspects_are_looked_at_to_begin_with():
 def test_layout_folded_at_large_is_given_up_with_the_count():
     surface = make_surface(*grid(9, 9))
     flat = surface.vertices[:, :2] * [-1.0, 1.0]
-    out, left = untangle(surface, flat, most_sweeps=5)
+    out, left = untangle(surface, flat)
     assert left > 0
     assert np.isfinite(out).all()
 

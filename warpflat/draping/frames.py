@@ -83,7 +83,7 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         if written.is_file():
             begin = int(stage.GetEndTimeCode()) + 1
         else:
-            begin_stage(stage, rate=24.0)
+            begin_stage(stage, is_film=True)
         group = define_group(stage, "/World/drape", kind=Kind.Tokens.component)
         chosen = choose_frames(drape.frames)
         stage.SetEndTimeCode(begin + len(chosen) - 1)

@@ -11,7 +11,6 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
 
 import numpy as np
 
@@ -48,7 +47,6 @@ def write_dxf(
     dialect: str = "aama",
     units: str = "metric",
     sizes: Sequence[str] | None = None,
-    created: datetime | None = None,
     rul: str | os.PathLike[str] | None = None,
 ) -> None:
     """Write all pieces, one block per piece and size, in one file (a graded nest where there are several sizes).
@@ -61,7 +59,6 @@ def write_dxf(
         dialect: "aama" (which most systems read) or "astm".
         units: "metric" (millimetres) or "english" (inches).
         sizes: those to write; None writes all.
-        created: date and time for the file's text; None takes SOURCE_DATE_EPOCH, or the present.
         rul: the table of grade rules that is written for a nest; None writes none, nor any numbers.
 
     Raises:
@@ -74,7 +71,7 @@ def write_dxf(
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
     for size in chosen:
         garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
-    scale, created = UNITS[units], created or source_date()
+    scale, created = UNITS[units], source_date()
     rules = grade_rules(garment, chosen) if rul is not None and len(chosen) > 1 else None
     blocks, space = list[str](), list[str]()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]

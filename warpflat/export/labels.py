@@ -64,16 +64,15 @@ class LabelRoom:
     """The free room on one page [in]: keeps what is occupied, and finds places for labels."""
 
     def __init__(self) -> None:
-        self._taken, self._passable = list[Geometry](), list[Geometry]()
+        self._taken = list[Geometry]()
 
     def take_box(self, left: float, bottom: float, right: float, top: float) -> None:
         """Keep labels out of a box."""
         self._taken.append(shapely.box(left, bottom, right, top))
 
-    def take_line(self, points: FloatArray, thickness: float, *, passable: bool = False) -> None:
-        """Keep labels off a polyline (#N by 2) [in], and leaders too unless it is passable."""
-        line = shapely.LineString(points).buffer(0.5 * thickness, cap_style="square")
-        (self._passable if passable else self._taken).append(line)
+    def take_line(self, points: FloatArray, thickness: float) -> None:
+        """Keep labels and leaders off a polyline (#N by 2) [in]."""
+        self._taken.append(shapely.LineString(points).buffer(0.5 * thickness, cap_style="square"))
 
     def place(
         self,
@@ -96,11 +95,10 @@ class LabelRoom:
             avoid: polylines, #N by 2 [in] each.
             may_cross: whether those lines may be crossed.
         """
-        taken = [*self._taken, *self._passable]
         whole = shapely.box(*page)
         # In batches where one pass is enough: making a spot may take longer than testing it.
         spots = list(spots) if may_cross else spots
-        for obstacles in ([*taken, *map(shapely.LineString, avoid)], taken)[: 1 + may_cross]:
+        for obstacles in ([*self._taken, *map(shapely.LineString, avoid)], self._taken)[: 1 + may_cross]:
             tree = shapely.STRtree(obstacles)
             for batch in _in_batches(spots):
                 corners = _placed_points(batch, 0.5 * width * _CORNERS[:, 0], 0.5 * height * _CORNERS[:, 1])

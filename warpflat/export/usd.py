@@ -164,7 +164,6 @@ class FrameWriter:
         path: str | os.PathLike[str],
         *,
         scale: float,
-        frames_per_second: float = 24.0,
         save_every: int | None = None,
     ) -> None:
         """Prepare a writer; nothing is touched before the ``with`` block is entered.
@@ -172,13 +171,11 @@ class FrameWriter:
         Args:
             path: the file, ``*.usdc``.
             scale: upper end of the colour scale [J/m2]; see :func:`film_scale`.
-            frames_per_second: of playback.
             save_every: frames kept in memory at most; if not given 16, or more of a small mesh.
         """
-        if (save_every is not None and save_every < 1) or not frames_per_second > 0.0:
-            raise ValueError("save_every must be at least 1, and frames_per_second above 0")
+        if save_every is not None and save_every < 1:
+            raise ValueError("save_every must be at least 1")
         self._final = Path(path)
-        self._rate = float(frames_per_second)
         self._save_every = _FRAMES if save_every is None else int(save_every)
         self._save_after = _VERTICES if save_every is None else 0
         self._scale = float(scale)
@@ -203,7 +200,7 @@ class FrameWriter:
             self._working = self._hidden.enter_context(hidden_file(self._final))
             with usd_errors(self._final):
                 self._stage = Usd.Stage.CreateNew(str(self._working))
-            begin_stage(self._stage, rate=self._rate)
+            begin_stage(self._stage, is_film=True)
             self._stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
         except BaseException:
             self._hidden.close()

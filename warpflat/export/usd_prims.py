@@ -49,6 +49,8 @@ __all__ = [
 
 #: Number of a film's first frame.
 FIRST_FRAME = 1
+# Frames of a film in a second.
+_RATE = 24.0
 _CONSTANT = "constant"
 
 
@@ -118,15 +120,15 @@ def define_group(stage: Any, path: str, *, label: str | None = None, kind: str |
     return prim
 
 
-def begin_stage(stage: Any, *, rate: float | None = None) -> None:
-    """Set a stage to metres and Y up, and define `/World`, its default prim; `rate` [1/s] begins a film at frame 1."""
+def begin_stage(stage: Any, *, is_film: bool = False) -> None:
+    """Set a stage to metres and Y up, and define `/World`, its default prim; a film begins at frame 1."""
     from pxr import Kind, UsdGeom
 
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    if rate is not None:
-        stage.SetTimeCodesPerSecond(rate)
-        stage.SetFramesPerSecond(rate)
+    if is_film:
+        stage.SetTimeCodesPerSecond(_RATE)
+        stage.SetFramesPerSecond(_RATE)
         stage.SetStartTimeCode(FIRST_FRAME)
         stage.SetEndTimeCode(FIRST_FRAME)
     stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))

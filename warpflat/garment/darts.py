@@ -51,9 +51,9 @@ def pleat_depths(form: FormResult) -> dict[tuple[str, str], float]:
 def dart_constraints(form: FormResult) -> list[DartMouth]:
     """Return the widths of mouths that the form asks for."""
     found = []
+    legs = form.legs()
     for dart in form.darts:
-        # A half piece has the left darts only.
-        if dart.piece not in form.pieces or dart.name not in form.pieces[dart.piece].legs():
+        if (dart.piece, dart.name) not in legs:
             continue
         if dart.asked.mouth_mm is not None:
             found.append(DartMouth(piece=dart.piece, dart=dart.name, width=1e-3 * dart.asked.mouth_mm))
@@ -71,11 +71,11 @@ def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[
         positions: by piece, #V by 2, its pattern [m].
     """
     found = []
+    legs = form.legs()
     for dart in form.darts:
-        legs = {} if dart.piece not in form.pieces else form.pieces[dart.piece].legs()
-        if dart.name not in legs or dart.asked in found:
+        if (dart.piece, dart.name) not in legs or dart.asked in found:
             continue
-        left, right = (positions[dart.piece][leg] for leg in legs[dart.name])
+        left, right = (positions[dart.piece][leg] for leg in legs[dart.piece, dart.name])
         # The tips of a fish-eye dart may close a little.
         overlap = open_length(left, right)[1]
         most = OVERLAP if dart.name in form.pieces[dart.piece].fisheyes else CLOSED

@@ -118,6 +118,10 @@ class FormResult:
     darts: tuple[PlacedDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
 
+    def legs(self) -> dict[tuple[str, str], tuple[IntArray, IntArray]]:
+        """Return the legs of every dart that the pieces have, by piece and dart; half pieces have those on the left."""
+        return {(name, dart): legs for name, piece in self.pieces.items() for dart, legs in piece.legs().items()}
+
     def differs_by_darts(self, body: FloatArray, form: Form, half: bool) -> bool:
         """Return whether another form on a body is this one with other darts, if any."""
         return body is self.body and half == self.half and replace(form, darts=self.recipe.darts) == self.recipe

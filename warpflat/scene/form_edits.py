@@ -214,7 +214,7 @@ def _shares(dart: FormDart, garment: Garment) -> Mapping[str, tuple[str, float]]
     seams = plan_form(form).seams
     taken: dict[tuple[str, str], float] = {}
     for placed in form.darts:
-        if placed.asked.place == dart.place and placed.piece in form.pieces:
+        if placed.asked.place == dart.place and (placed.piece, placed.name) in form.legs():
             # The edge on which its mouth lies, and how wide that is.
             piece, positions = form.pieces[placed.piece], garment.pieces[placed.piece].positions
             left, right = (piece.edges[leg] for leg in piece.darts[placed.name])

@@ -200,7 +200,8 @@ def try_cuts(
         try:
             form = scene_form(scene, base.mannequin)[1]
             before = base.plan.form.pieces
-            darts = [dart for dart in form.darts if dart.asked.place == place_of(cut) and dart.piece in form.pieces]
+            legs = form.legs()
+            darts = [d for d in form.darts if d.asked.place == place_of(cut) and (d.piece, d.name) in legs]
             changed = {dart.piece for dart in darts} or set(form.pieces) - set(before)
             garment = _flatten(base.plan, [name for name in form.pieces if name in changed], scene)
         except InputError as reason:
@@ -217,7 +218,7 @@ def try_cuts(
             [base.garment.pieces[name] for name in before if name in changed or name not in form.pieces],
             list(garment.pieces.values()),
             paths=paths,
-            cracks=[(garment.pieces[d.piece], *form.pieces[d.piece].legs()[d.name]) for d in darts],
+            cracks=[(garment.pieces[d.piece], *legs[d.piece, d.name]) for d in darts],
             cut=cut,
         )
 

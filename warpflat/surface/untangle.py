@@ -19,6 +19,8 @@ __all__ = ["signed_cell_areas", "untangle"]
 
 # Sweeps without a new least number of mirrored triangles after which it gives up.
 _PATIENCE = 25
+# Sweeps after which it gives up in any case.
+_MOST_SWEEPS = 200
 # Rings of vertices around mirrored triangles that are prepared for moving; more are prepared once sweeps reach their edge.
 _RINGS = 6
 
@@ -28,7 +30,6 @@ def untangle(
     positions: FloatArray,
     *,
     least_area: float = 1e-3,
-    most_sweeps: int = 200,
     suspects: NDArray[np.integer] | None = None,
 ) -> tuple[FloatArray, int]:
     """Move the vertices of mirrored faces, and their neighbours, towards the mean of their neighbours until no face is mirrored.
@@ -40,8 +41,6 @@ def untangle(
         surface: the piece.
         positions: #V by 2 [m], the layout.
         least_area: a corner triangle with less than this share of its area on the body counts as mirrored.
-        most_sweeps: the largest number of sweeps; it also gives up once sweeps stop helping, as on a layout that is folded
-            at large.
         suspects: corner triangles that hold all mirrored ones, if they are known.
 
     Returns:
@@ -61,7 +60,7 @@ def untangle(
     turned = np.unique(mirrored)
     patch = _Patch(surface, turned, _RINGS)
     fewest, since = len(mirrored), 0
-    for _ in range(most_sweeps):
+    for _ in range(_MOST_SWEEPS):
         if not patch.inside[turned].all():
             patch = _Patch(surface, np.flatnonzero(patch.near), _RINGS)
         moving = np.union1d(turned, patch.transposed[turned].indices)

@@ -91,7 +91,7 @@ def times(folder: Path) -> dict[Path, int]:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 0.95])
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.95])
 def test_a_full_disk_leaves_the_folder_as_it_was(
     name: str,
     share: float,
@@ -163,6 +163,16 @@ def _change(folder: Path) -> None:
 
 BEFORE = dict.fromkeys(("metrics.json", "a.txt", "b.txt", "stale.txt", "users.txt"), b"before")
 AFTER = {**dict.fromkeys(("metrics.json", "a.txt", "b.txt", "new.txt"), b"after"), "users.txt": b"before"}
+
+
+def _small_change(folder: Path) -> None:
+    with output_folder(folder):
+        write(folder, "a.txt", "new.txt", text="after")
+        remove_file(folder / "stale.txt")
+
+
+AFTER_SMALL = {**BEFORE, "a.txt": b"after", "new.txt": b"after"}
+del AFTER_SMALL["stale.txt"]
 
 
 def _filled(folder: Path) -> Path:
@@ -328,7 +338,7 @@ def _frames(folder: Path) -> None:
 )  # interrupted while a generator is closed
 @pytest.mark.parametrize(
     ("action", "watched", "step"),
-    [(_change, _WATCHED, 3), (_frames, (*_WATCHED, "/usd.py"), 23)],
+    [(_small_change, _WATCHED, 3), (_frames, (*_WATCHED, "/usd.py"), 23)],
     ids=["folder", "frames"],
 )
 def test_an_interruption_anywhere_leaves_nothing_behind(
@@ -344,7 +354,7 @@ def test_an_interruption_anywhere_leaves_nothing_behind(
         gc.collect()
         output._clear_all()  # as at the end of the process
         left = files(out)
-        assert left in (BEFORE, AFTER) or set(left) == {*BEFORE, "frames.usdc"}, number
+        assert left in (BEFORE, AFTER_SMALL) or set(left) == {*BEFORE, "frames.usdc"}, number
         assert set(os.listdir(out)) == set(left), number
         assert not output._unfinished
     assert number > 100

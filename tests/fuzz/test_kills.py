@@ -1,6 +1,6 @@
 """Runs that are killed at times spread over them: the folder is as it was, or complete, and the next run leaves nothing of them.
 
-`WARPFLAT_KILLS=60 python -m pytest -s tests/cli/test_kills.py` kills so many instead of a few, and prints what it has found.
+`WARPFLAT_KILLS=60 python -m pytest -s tests/fuzz/test_kills.py` kills so many instead of a few, and prints what it has found.
 """
 
 from __future__ import annotations

@@ -124,27 +124,22 @@ def test_read_only_folder_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
 
 
-def test_a_signal_while_a_place_is_tried_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    touch = Path.touch
+@pytest.mark.parametrize("place", ["pathlib.Path.touch", "warpflat.export.usd.begin_stage"])
+def test_a_signal_while_a_film_is_opened_leaves_no_file(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    touch, there = Path.touch, list[str]()
 
-    def interrupted(path: Path, **options: bool) -> None:
-        touch(path, **options)
+    def interrupted(path: object, **options: bool) -> None:
+        if isinstance(path, Path):
+            touch(path, **options)
+        there.extend(os.listdir(tmp_path))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Path, "touch", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        FrameWriter(tmp_path / "frames.usdc", scale=1.0).__enter__()
-    assert os.listdir(tmp_path) == []
-
-
-def test_a_signal_while_a_film_is_opened_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        assert len(os.listdir(tmp_path)) == 1
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("warpflat.export.usd.begin_stage", interrupted)
+    monkeypatch.setattr(place, interrupted)
     with pytest.raises(KeyboardInterrupt), FrameWriter(tmp_path / "frames.usdc", scale=1.0):
         pass
+    assert len(there) == 1
     assert os.listdir(tmp_path) == []
 
 
