@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.pattern.corners import find_corners, find_cracks
-from warpflat.pattern.label import default_grain
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Piece
+from warpflat.pattern.placement import default_grain
 from warpflat.surface.connectivity import border_loops
 
 __all__ = ["MeshFeatures", "inner_stretches", "line_labels", "piece_from_mesh"]
