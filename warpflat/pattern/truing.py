@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths
-from warpflat.pattern.curves import Curve
+from warpflat.pattern.curves import Curve, cubic_weights, split_bezier
 from warpflat.pattern.fitting import EdgeKey
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
@@ -289,14 +289,11 @@ class _Stretch:
     def __init__(self, curve: Curve, reach: float) -> None:
         t = np.linspace(0.0, 1.0, POINTS // 4 + 1)
         s = 1 - t
-        weights = np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=1)
         slopes = np.stack([-3 * s**2, 3 * s**2 - 6 * s * t, 6 * s * t - 3 * t**2, 3 * t**2], axis=1)
         places, tangents, reached, total, number, at = [], [], [], 0.0, 0, 1.0
         for number in range(len(curve.bezier)):
-            control = curve.bezier[number]
-            line = weights @ control
+            line, tangent = cubic_weights(t) @ curve.bezier[number], slopes @ curve.bezier[number]
             arc = total + arc_lengths(line)
-            tangent = slopes @ control
             places.append(line)
             tangents.append(tangent / np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None])
             reached.append(arc)
@@ -310,15 +307,8 @@ class _Stretch:
         self.reach = float(np.interp(at, t, reached[-1]))
         rest, straight = curve.bezier[number + 1 :], curve.straight[number + 1 :]
         if at < 1.0:
-            # The rest of the Bézier, by de Casteljau's scheme.
-            control = curve.bezier[number]
-            points, last = control, [control[-1]]
-            while len(points) > 1:
-                points = (1 - at) * points[:-1] + at * points[1:]
-                last.append(points[-1])
-            tail = np.array(last[::-1])
-            rest = np.concatenate([tail[None], rest])
-            straight = np.concatenate([curve.straight[number : number + 1], straight])
+            rest = np.concatenate([split_bezier(curve.bezier[number], at)[1][None], rest])
+            straight = curve.straight[number:]
         self.rest = rest, straight
 
     def moved(self, slope: float, back: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:
