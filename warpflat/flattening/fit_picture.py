@@ -193,7 +193,21 @@ def write_wear_sheet(
         )
         drawn = _draw_row(page, sheet, result, top, height, scales, body)
         top += height
-    _draw_scales(figure, sheet, top, drawn, scales, limit)
+    # Draw the title of every column, and below the rows its colour scale.
+    for number, name in enumerate(drawn):
+        label, _, unit = _ALL_MAPS[name]
+        x = _LABEL + number * sheet.column
+        figure.text(*sheet.point(x + 0.5 * sheet.column, 0.75), label, ha="center", fontsize=10)
+        axis = figure.add_axes(sheet.box(x + 0.2, top + 0.25, sheet.column - 0.4, 0.13))
+        bar = figure.colorbar(drawn[name], cax=axis, orientation="horizontal", extend=scales[name].extend)
+        bar.ax.tick_params(labelsize=8)
+        bar.ax.locator_params(nbins=5)
+        bar.set_label(unit, fontsize=9)
+        _mark_limit(bar, name, limit, scales[name])
+        if unit == "Pa":
+            above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
+            above.tick_params(labelsize=7)
+            above.set_xlabel("mmHg", fontsize=8)
     unfit = [result.surface.name for result in results if not result.fit.fits]
     word = "lies on the form" if on_body else "fits"
     verdict = (
@@ -292,31 +306,6 @@ class _Strokes:
         return cls(
             lines=np.concatenate([none, *lines]), border=border_edges(faces), beyond=np.concatenate([none, *beyond])
         )
-
-
-def _draw_scales(
-    figure: Figure,
-    sheet: _Sheet,
-    top: float,
-    drawn: dict[str, ScalarMappable],
-    scales: dict[str, _Scale],
-    limit: float,
-) -> None:
-    """Draw the title of every column, and below the rows its colour scale."""
-    for number, name in enumerate(drawn):
-        label, _, unit = _ALL_MAPS[name]
-        x = _LABEL + number * sheet.column
-        figure.text(*sheet.point(x + 0.5 * sheet.column, 0.75), label, ha="center", fontsize=10)
-        axis = figure.add_axes(sheet.box(x + 0.2, top + 0.25, sheet.column - 0.4, 0.13))
-        bar = figure.colorbar(drawn[name], cax=axis, orientation="horizontal", extend=scales[name].extend)
-        bar.ax.tick_params(labelsize=8)
-        bar.ax.locator_params(nbins=5)
-        bar.set_label(unit, fontsize=9)
-        _mark_limit(bar, name, limit, scales[name])
-        if unit == "Pa":
-            above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
-            above.tick_params(labelsize=7)
-            above.set_xlabel("mmHg", fontsize=8)
 
 
 def _to_mmhg(pascals: Any) -> Any:

@@ -50,7 +50,11 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
             if end <= begin:
                 continue
             if opening.kind == "keyhole":
-                pattern = _with_keyhole(pattern, opening, part.piece)
+                pieces = {
+                    size: [_keyhole(piece, opening) if piece.name == part.piece else piece for piece in row]
+                    for size, row in pattern.pieces.items()
+                }
+                pattern = replace(pattern, pieces=pieces)
                 continue
             seam = next((each for each in pattern.seams if each.name == part.seam), None)
             if seam is None:
@@ -172,15 +176,6 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, p
     still_sewn = opening.length < at
     seams = [each for each in pattern.seams if each.name != seam.name or still_sewn]
     return replace(pattern, pieces=pieces, seams=seams)
-
-
-def _with_keyhole(pattern: Pattern, opening: Opening, name: str) -> Pattern:
-    """Return a pattern with a keyhole drawn on one piece: its slit, its round end, its button and loop."""
-    pieces = {
-        size: [_keyhole(piece, opening) if piece.name == name else piece for piece in row]
-        for size, row in pattern.pieces.items()
-    }
-    return replace(pattern, pieces=pieces)
 
 
 def _keyhole(piece: Piece, opening: Opening) -> Piece:

@@ -93,7 +93,23 @@ def _with_patch(pattern: Pattern, pocket: Pocket) -> Pattern:
                 )
             made.append(replace(piece, internal_lines=lines, marks=marks))
             count *= piece.quantity * (2 if piece.on_fold else 1)
-        made.append(_patch(pocket, title, next(p for p in row if p.name == pocket.where), count))
+        # The piece of a patch pocket.
+        like = next(p for p in row if p.name == pocket.where)
+        half, low = 0.5 * pocket.width, -pocket.height
+        corners = np.array([(half, 0.0), (-half, 0.0), (-half, low), (0.0, low - _POINT), (half, low)])
+        names = ["upper", "left side", "lower left", "lower right", "right side"]
+        edges = [
+            Edge(
+                name=name, points=corners[[k, (k + 1) % 5]], kind="hem" if k == 0 else "cut",
+                allowance=_HEM if k == 0 else 0.010,
+            )
+            for k, name in enumerate(names)
+        ]  # fmt: skip
+        made.append(
+            Piece(
+                name=title, size=like.size, fabric=like.fabric, quantity=count, edges=edges, role="pocket", paired=False
+            )
+        )
         pieces[size] = made
     return replace(pattern, pieces=pieces)
 
@@ -123,23 +139,6 @@ def _places(piece: Piece, pocket: Pocket) -> list[FloatArray]:
         corners = [(half, top), (-half, top), (-half, low), (0.0, low - _POINT), (half, low)]
         found.append(np.array([(middle + x) * across + y * up for x, y in corners]))
     return found
-
-
-def _patch(pocket: Pocket, title: str, like: Piece, count: int) -> Piece:
-    """Return the piece of a patch pocket."""
-    half, low = 0.5 * pocket.width, -pocket.height
-    corners = np.array([(half, 0.0), (-half, 0.0), (-half, low), (0.0, low - _POINT), (half, low)])
-    names = ["upper", "left side", "lower left", "lower right", "right side"]
-    edges = [
-        Edge(
-            name=name, points=corners[[k, (k + 1) % 5]], kind="hem" if k == 0 else "cut",
-            allowance=_HEM if k == 0 else 0.010,
-        )
-        for k, name in enumerate(names)
-    ]  # fmt: skip
-    return Piece(
-        name=title, size=like.size, fabric=like.fabric, quantity=count, edges=edges, role="pocket", paired=False
-    )
 
 
 def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:

@@ -88,7 +88,22 @@ class PatternMap:
         Raises:
             InputError: if it leaves the pattern.
         """
-        return self.to_body(self._crossings(_checked(points, 2)), tolerance=tolerance)
+        # A polyline in the pattern with a point added wherever it crosses an edge.
+        points = _checked(points, 2)
+        a, b = self._pattern[self._edges[:, 0]], self._pattern[self._edges[:, 1]]
+        along = b - a
+        parts: list[FloatArray] = []
+        for p, q in itertools.pairwise(points):
+            d = q - p
+            bottom = d[0] * along[:, 1] - d[1] * along[:, 0]
+            safe = np.abs(bottom) > 1e-15
+            inverse = np.where(safe, 1.0 / np.where(safe, bottom, 1.0), 0.0)
+            t = ((a[:, 0] - p[0]) * along[:, 1] - (a[:, 1] - p[1]) * along[:, 0]) * inverse
+            u = ((a[:, 0] - p[0]) * d[1] - (a[:, 1] - p[1]) * d[0]) * inverse
+            hit = safe & (t > 1e-9) & (t < 1 - 1e-9) & (u >= -1e-9) & (u <= 1 + 1e-9)
+            at = np.unique(np.round(np.concatenate([[0.0], t[hit]]), 9))[:, None]
+            parts.append(p + at * d)
+        return self.to_body(np.concatenate([*parts, points[-1:]]), tolerance=tolerance)
 
     def polyline_to_pattern(self, points: FloatArray, *, tolerance: float = 0.005) -> FloatArray:
         """Map a polyline on the body to the pattern, in steps of a quarter of an edge.
@@ -126,23 +141,6 @@ class PatternMap:
                 f"at most {tolerance * 1000:g} mm is allowed"
             )
         return np.asarray(np.einsum("nk,nkd->nd", weights, target[self._triangles[triangle]]))
-
-    def _crossings(self, points: FloatArray) -> FloatArray:
-        """Return a polyline in the pattern with a point added wherever it crosses an edge."""
-        a, b = self._pattern[self._edges[:, 0]], self._pattern[self._edges[:, 1]]
-        along = b - a
-        parts: list[FloatArray] = []
-        for p, q in itertools.pairwise(points):
-            d = q - p
-            bottom = d[0] * along[:, 1] - d[1] * along[:, 0]
-            safe = np.abs(bottom) > 1e-15
-            inverse = np.where(safe, 1.0 / np.where(safe, bottom, 1.0), 0.0)
-            t = ((a[:, 0] - p[0]) * along[:, 1] - (a[:, 1] - p[1]) * along[:, 0]) * inverse
-            u = ((a[:, 0] - p[0]) * d[1] - (a[:, 1] - p[1]) * d[0]) * inverse
-            hit = safe & (t > 1e-9) & (t < 1 - 1e-9) & (u >= -1e-9) & (u <= 1 + 1e-9)
-            at = np.unique(np.round(np.concatenate([[0.0], t[hit]]), 9))[:, None]
-            parts.append(p + at * d)
-        return np.concatenate([*parts, points[-1:]])
 
 
 def _checked(points: FloatArray, width: int) -> FloatArray:
