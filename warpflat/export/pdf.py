@@ -181,7 +181,26 @@ def _pages(
         legend_page(canvas, printed, chosen, tiling.sheet, tiling)
         guide_pages(canvas, whole, printed, kind)
     for row, column in tiling.tiles:
-        _tile(canvas, tiling, row, column, whole.name.replace("_", " "))
+        # Draw one page.
+        title = whole.name.replace("_", " ")
+        paper = tiling.paper
+        inner = np.array([paper.width, paper.height]) - 2 * paper.margin
+        corner = tiling.corner(row, column)
+        canvas.saveState()
+        window = canvas.beginPath()
+        window.rect(paper.margin * POINT, paper.margin * POINT, *(inner * POINT))
+        canvas.clipPath(window, stroke=0, fill=0)
+        canvas.translate(*((paper.margin - corner) * POINT))
+        canvas.doForm("sheet")
+        canvas.restoreState()
+        if tiling.joined:
+            _joining_marks(canvas, tiling, row, column)
+        canvas.setFillColor("#555555")
+        canvas.setFont(FONT, 7)
+        sheet = translate("sheet {name}", name=tiling.name(row, column))
+        page = f"{title}  -  {sheet}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
+        canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
+        canvas.showPage()
     if len(chosen) > 1:
         # The layers of the sheet, one a size, are optional content that readers list and can hide.
         document = canvas._doc
@@ -290,28 +309,6 @@ def _words(canvas: Any, words: Words, matrix: FloatArray, colour: str) -> None:
     canvas.setFont(font, size)
     canvas.drawCentredString(0, -words.height / 2 * POINT, words.text)
     canvas.restoreState()
-
-
-def _tile(canvas: Any, tiling: Tiling, row: int, column: int, title: str) -> None:
-    """Draw one page."""
-    paper = tiling.paper
-    inner = np.array([paper.width, paper.height]) - 2 * paper.margin
-    corner = tiling.corner(row, column)
-    canvas.saveState()
-    window = canvas.beginPath()
-    window.rect(paper.margin * POINT, paper.margin * POINT, *(inner * POINT))
-    canvas.clipPath(window, stroke=0, fill=0)
-    canvas.translate(*((paper.margin - corner) * POINT))
-    canvas.doForm("sheet")
-    canvas.restoreState()
-    if tiling.joined:
-        _joining_marks(canvas, tiling, row, column)
-    canvas.setFillColor("#555555")
-    canvas.setFont(FONT, 7)
-    sheet = translate("sheet {name}", name=tiling.name(row, column))
-    page = f"{title}  -  {sheet}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
-    canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
-    canvas.showPage()
 
 
 def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:

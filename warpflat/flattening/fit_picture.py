@@ -191,7 +191,14 @@ def write_wear_sheet(
         _write_row_label(
             figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15), on_form=bool(on_body)
         )
-        drawn = _draw_row(page, sheet, result, top, height, scales, body)
+        # Draw all maps of a piece side by side.
+        drawn = {}
+        middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
+        inches = (result.positions - middle) * sheet.inches
+        strokes = _Strokes.of(result)
+        for number, name in enumerate((*body, *MAPS)):
+            centre = _LABEL + (number + 0.5) * sheet.column, sheet.size[1] - top - 0.5 * height
+            drawn[name] = _draw_map(page, inches + centre, result, strokes, name, scales[name], body)
         top += height
     # Draw the title of every column, and below the rows its colour scale.
     for number, name in enumerate(drawn):
@@ -268,26 +275,6 @@ class _Sheet:
     def box(self, x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
         """Return a box of the figure, given from its upper left corner, as shares of its size."""
         return (x / self.size[0], 1.0 - (y + height) / self.size[1], width / self.size[0], height / self.size[1])
-
-
-def _draw_row(
-    page: Axes,
-    sheet: _Sheet,
-    result: Flattening,
-    top: float,
-    height: float,
-    scales: dict[str, _Scale],
-    body: OnBody,
-) -> dict[str, ScalarMappable]:
-    """Draw all maps of a piece side by side."""
-    drawn = {}
-    middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
-    inches = (result.positions - middle) * sheet.inches
-    strokes = _Strokes.of(result)
-    for number, name in enumerate((*body, *MAPS)):
-        centre = _LABEL + (number + 0.5) * sheet.column, sheet.size[1] - top - 0.5 * height
-        drawn[name] = _draw_map(page, inches + centre, result, strokes, name, scales[name], body)
-    return drawn
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

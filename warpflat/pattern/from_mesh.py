@@ -82,10 +82,32 @@ def piece_from_mesh(
     if flat.ndim != 2 or flat.shape[1] != 2 or not np.isfinite(flat).all():
         raise InputError(f"piece {name!r}: positions have shape {flat.shape}; they must be #V by 2, finite, in metres")
     lines = {key: np.asarray(value, dtype=np.int32) for key, value in features.lines.items()}
-    flat, outer, inner = _front_up(faces, flat, name)
+    loops = border_loops(faces, np.column_stack([flat, np.zeros(len(flat))]))
+    if not loops:
+        raise InputError(f"piece {name!r}: the mesh is closed and has no border; cut it open first")
+    areas = [_signed_area(flat[loop]) for loop in loops]
+    largest = int(np.argmax(np.abs(areas)))
+    if areas[largest] < 0:  # it lies on its back
+        flat = flat * [-1.0, 1.0]
+    outer, inner = loops[largest], [loop for i, loop in enumerate(loops) if i != largest]
     labels = line_labels(outer, lines)
     corners = find_corners(flat[outer], CORNER)
-    darts, corners = _find_darts(flat, outer, corners, features.darts, name)
+    # The places in the loop of each dart's left mouth, tip and right mouth; cracks that are found are darts, too.
+    where = {vertex: place for place, vertex in enumerate(outer.tolist())}
+    darts = {}
+    for key, dart in features.darts.items():
+        for vertex in dart:
+            if vertex not in where:
+                raise InputError(f"piece {name!r}: dart {key!r}: vertex {vertex} is not on the outer border")
+        left, tip, right = (where[vertex] for vertex in dart)
+        if (tip - left) % len(outer) >= (right - left) % len(outer):
+            raise InputError(
+                f"piece {name!r}: dart {key!r}: give its vertices counter-clockwise: left mouth, tip, right mouth"
+            )
+        darts[key] = (left, tip, right)
+    corners = corners | {place for places in darts.values() for place in places}
+    found = find_cracks(flat[outer], corners, {places[1] for places in darts.values()})
+    darts |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
     grain = None if features.grain_line is None else _grain_along(flat, outer, lines, features.grain_line, name)
     changes = {i for i in range(len(labels)) if labels[i] != labels[i - 1]}
     inside_leg = {place for places in darts.values() for place in _between_mouths(places, len(labels))}
@@ -127,41 +149,6 @@ def piece_from_mesh(
         grain=grain,
         holes=_holes(flat, inner, features.fisheyes),
     )
-
-
-def _front_up(faces: IntArray, flat: FloatArray, name: str) -> tuple[FloatArray, IntArray, list[IntArray]]:
-    """Return the positions, turned over if they lie on their back, the outer border and the loops inside."""
-    loops = border_loops(faces, np.column_stack([flat, np.zeros(len(flat))]))
-    if not loops:
-        raise InputError(f"piece {name!r}: the mesh is closed and has no border; cut it open first")
-    areas = [_signed_area(flat[loop]) for loop in loops]
-    outer = int(np.argmax(np.abs(areas)))
-    if areas[outer] < 0:
-        flat = flat * [-1.0, 1.0]
-    return flat, loops[outer], [loop for i, loop in enumerate(loops) if i != outer]
-
-
-def _find_darts(
-    flat: FloatArray, loop: IntArray, corners: set[int], given: Mapping[str, DartPlaces], name: str
-) -> tuple[dict[str, DartPlaces], set[int]]:
-    """Return the places of all darts, given ones and cracks that are found, and the corners with theirs."""
-    # The places in the loop of each dart's left mouth, tip and right mouth.
-    where = {vertex: place for place, vertex in enumerate(loop.tolist())}
-    darts = {}
-    for key, dart in given.items():
-        for vertex in dart:
-            if vertex not in where:
-                raise InputError(f"piece {name!r}: dart {key!r}: vertex {vertex} is not on the outer border")
-        left, tip, right = (where[vertex] for vertex in dart)
-        if (tip - left) % len(loop) >= (right - left) % len(loop):
-            raise InputError(
-                f"piece {name!r}: dart {key!r}: give its vertices counter-clockwise: left mouth, tip, right mouth"
-            )
-        darts[key] = (left, tip, right)
-    corners = corners | {place for places in darts.values() for place in places}
-    found = find_cracks(flat[loop], corners, {places[1] for places in darts.values()})
-    darts |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
-    return darts, corners
 
 
 def _between_mouths(places: DartPlaces, count: int) -> set[int]:

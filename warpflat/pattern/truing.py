@@ -79,6 +79,8 @@ def true_corners(
     Returns:
         All curves, and a report on each corner.
     """
+    import shapely
+
     start = dict(curves)
     found = {frozenset(corner.ends): corner for corner in [*_seam_corners(pieces, seams), *_fold_corners(pieces)]}
     corners = [corner for corner in found.values() if abs(corner.angle(start) - corner.wanted) < MEANT]
@@ -96,7 +98,18 @@ def true_corners(
             flipped = curve.reversed() if at_end else curve
             result, move = turned_end(flipped, turn if at_end else -turn, reach, keep_length=key in sewn)
             trued[key], moves[key, at_end] = (result.reversed() if at_end else result), move
-        trued, moves = _without_crossings(pieces, start, trued, moves)
+        # The curves, with those of a piece as they were where its border would cross itself.
+        for piece in pieces:
+            keys = [(piece.name, edge.name) for edge in piece.edges]
+            if all(trued[key] is start[key] for key in keys):
+                continue
+            outlines = [
+                shapely.Polygon(np.concatenate([curves[key].sample()[:-1] for key in keys]))
+                for curves in (start, trued)
+            ]
+            if outlines[0].is_valid and not outlines[1].is_valid:
+                trued = trued | {key: start[key] for key in keys}
+                moves = {end: move for end, move in moves.items() if end[0] not in keys}
     reports = [
         CornerReport(
             place=corner.place,
@@ -125,25 +138,6 @@ def _least_turns(corners: Sequence[_Corner], curves: Mapping[EdgeKey, Curve]) ->
     missing = np.array([corner.wanted - corner.angle(curves) for corner in corners])
     solved = np.linalg.lstsq(rates, missing, rcond=1e-9)[0]
     return {end: float(turn) for end, turn in zip(ends, solved, strict=True) if abs(turn) > LEAST_TURN}
-
-
-def _without_crossings(
-    pieces: Sequence[Piece], start: Mapping[EdgeKey, Curve], trued: dict[EdgeKey, Curve], moves: dict[End, float]
-) -> tuple[dict[EdgeKey, Curve], dict[End, float]]:
-    """Return the curves, with those of a piece as they were where its border would cross itself."""
-    import shapely
-
-    for piece in pieces:
-        keys = [(piece.name, edge.name) for edge in piece.edges]
-        if all(trued[key] is start[key] for key in keys):
-            continue
-        outlines = [
-            shapely.Polygon(np.concatenate([curves[key].sample()[:-1] for key in keys])) for curves in (start, trued)
-        ]
-        if outlines[0].is_valid and not outlines[1].is_valid:
-            trued = trued | {key: start[key] for key in keys}
-            moves = {end: move for end, move in moves.items() if end[0] not in keys}
-    return trued, moves
 
 
 def _inner_angle(arrive: Curve, leave: Curve) -> float:

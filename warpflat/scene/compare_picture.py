@@ -96,7 +96,19 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
         places = _furthest_apart(comparison, piece)
         for number, (label, at, apart) in enumerate(places):
             close = figure.add_subplot(grid[row * _CLOSE_UPS + number, 1])
-            _draw_close_up(close, comparison, piece, label, at, apart)
+            _draw_outlines(close, comparison, piece, width=1.8)
+            reach = max(2.0 * apart, 0.004)
+            close.set_xlim(at[0] - 1.6 * reach, at[0] + 1.6 * reach)
+            close.set_ylim(at[1] - reach, at[1] + reach)
+            close.set_xticks([])
+            close.set_yticks([])
+            length = 10.0 ** np.floor(np.log10(1.6 * reach))
+            x, y = at[0] - 1.5 * reach, at[1] - 0.9 * reach
+            close.plot([x, x + length], [y, y], color="black", linewidth=2)
+            close.annotate(
+                f"{1e3 * length:g} mm", (x + length, y), xytext=(4, -3), textcoords="offset points", fontsize=9
+            )
+            close.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=10)
             whole.plot(*at, "o", mfc="none", mec="#555555", ms=11)
             whole.annotate(
                 str(number + 1),
@@ -156,17 +168,3 @@ def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, Float
         apart = max(float(np.linalg.norm(other[vertex] - layouts[0][vertex])) for other in layouts[1:])
         found.append((label, np.mean([layout[vertex] for layout in layouts], axis=0), apart))
     return sorted(found, key=lambda entry: -entry[2])[:_CLOSE_UPS]
-
-
-def _draw_close_up(axis: Axes, comparison: Comparison, piece: str, label: str, at: FloatArray, apart: float) -> None:
-    _draw_outlines(axis, comparison, piece, width=1.8)
-    reach = max(2.0 * apart, 0.004)
-    axis.set_xlim(at[0] - 1.6 * reach, at[0] + 1.6 * reach)
-    axis.set_ylim(at[1] - reach, at[1] + reach)
-    axis.set_xticks([])
-    axis.set_yticks([])
-    length = 10.0 ** np.floor(np.log10(1.6 * reach))
-    x, y = at[0] - 1.5 * reach, at[1] - 0.9 * reach
-    axis.plot([x, x + length], [y, y], color="black", linewidth=2)
-    axis.annotate(f"{1e3 * length:g} mm", (x + length, y), xytext=(4, -3), textcoords="offset points", fontsize=9)
-    axis.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=10)
