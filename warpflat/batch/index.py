@@ -97,8 +97,8 @@ class BatchIndex:
             _numbers("time [s]", [row.seconds for row in rows], 1.0, ".1f"),
             _column("message", [row.message for row in rows]),
         ]
-        head, *lines = zip(*filter(None, columns), strict=True)
-        body = "\n".join(f"<tr>{''.join(cells)}</tr>" for cells in lines)
+        headings, *body_rows = zip(*filter(None, columns), strict=True)
+        body = "\n".join(f"<tr>{''.join(cells)}</tr>" for cells in body_rows)
         counts = {status: sum(row.status == status for row in rows) for status in (*_COLOURS, TO_DO)}
         totals = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
         style = resources.files("warpflat.review").joinpath("data", "page.css").read_text(encoding="utf-8")
@@ -110,7 +110,7 @@ class BatchIndex:
                 f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}{_STYLE}</style></head>'
                 f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(totals)}. '
                 "Girths are of the pattern. A click on a heading sorts.</p>"
-                f'<div class="scroll"><table><thead><tr>{"".join(head)}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+                f'<div class="scroll"><table><thead><tr>{"".join(headings)}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
                 f"{_BODIES if bodies else ''}</main>"
                 f"<script>{script}</script></body></html>\n"
             ),

@@ -149,10 +149,10 @@ def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Can
             or not _mirror_each_other(result.surface, a, b)
         ):
             continue
-        line = a.name.rpartition(" from ")[0]
-        same = line and b.name.startswith(f"{line} from ")
+        along = a.name.rpartition(" from ")[0]
+        same = along and b.name.startswith(f"{along} from ")
         both = Candidate(
-            name=f"{a.name} and {b.name.removeprefix(line + ' from ')}" if same else f"{a.name} + {b.name}",
+            name=f"{a.name} and {b.name.removeprefix(along + ' from ')}" if same else f"{a.name} + {b.name}",
             paths=a.paths + b.paths,
             drawn=a.drawn + b.drawn,
             peaks=tuple(sorted({*a.peaks, *b.peaks})),

@@ -181,7 +181,6 @@ def _pages(
         legend_page(canvas, printed, chosen, tiling.sheet, tiling)
         guide_pages(canvas, whole, printed, kind)
     for row, column in tiling.tiles:
-        # Draw one page.
         title = whole.name.replace("_", " ")
         paper = tiling.paper
         inner = np.array([paper.width, paper.height]) - 2 * paper.margin
@@ -197,8 +196,8 @@ def _pages(
             _joining_marks(canvas, tiling, row, column)
         canvas.setFillColor("#555555")
         canvas.setFont(FONT, 7)
-        sheet = translate("sheet {name}", name=tiling.name(row, column))
-        page = f"{title}  -  {sheet}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
+        number = translate("sheet {name}", name=tiling.name(row, column))
+        page = f"{title}  -  {number}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
         canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
         canvas.showPage()
     if len(chosen) > 1:

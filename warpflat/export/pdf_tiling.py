@@ -137,12 +137,12 @@ def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
         around = [_window(tiling, other) for other in kept - {tile} if max(np.abs(np.subtract(other, tile))) == 1]
         if parts[tile].difference(shapely.union_all(around)).area < 1e-9:
             kept.remove(tile)
-    tiles = tuple(tile for tile in tiles if tile in kept)
+    shown = tuple(tile for tile in tiles if tile in kept)
     # Sheets are joined if a shape spreads over two of them.
-    lower_left = [tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) for tile in tiles]
+    lower_left = [tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) for tile in shown]
     cells = [shapely.box(*corner, *(corner + tiling.paper.step)) for corner in lower_left]
     return replace(
-        tiling, tiles=tiles, joined=any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
+        tiling, tiles=shown, joined=any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
     )
 
 

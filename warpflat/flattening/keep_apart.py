@@ -61,15 +61,14 @@ def keep_apart(
             if dear and len(surface.vertices) <= _MOST_SWIRLED:
                 # Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be
                 # wound up or unwound.
-                best, layout = (state, outcome), state.positions()
+                layout = state.positions()
                 for turn in _SWIRLS:
                     other = Relaxation(
                         state.network, state.options, start=swirl(layout, turn), alignments=state.alignments
                     )
-                    end = relax_with_contact(other, 1e-3 * state.options.gap_mm)
-                    if end is not None and end.converged and end.energies.potential < best[1].energies.potential:
-                        best = other, end
-                state, outcome = best
+                    wound = relax_with_contact(other, 1e-3 * state.options.gap_mm)
+                    if wound is not None and wound.converged and wound.energies.potential < outcome.energies.potential:
+                        state, outcome = other, wound
             after = outcome.energies.potential
             share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
             task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")

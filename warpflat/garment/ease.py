@@ -111,9 +111,9 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
                 eased[name] = CAP_PART
                 # By what factors the mesh edges of each run of a cap's seam are longer than the armhole's, and where
                 # it is full.
-                seam, factors, edges = form.seams[number], list[FloatArray](), list[FullEdge]()
-                piece = form.pieces[seam.pieces[side]]
-                for run in seam.runs:
+                factors, edges = list[FloatArray](), list[FullEdge]()
+                piece = form.pieces[here.pieces[side]]
+                for run in here.runs:
                     cap, row = piece.edges[run.edges[side]], run.vertices[side]
                     shares = _shares(piece, cap)
                     part = _part(shares)

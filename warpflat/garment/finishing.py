@@ -81,44 +81,7 @@ def finish_edges(
                     length = wish.share * sum(
                         pattern.piece(side.piece, size).edge(side.edge).length for side in chain.sides
                     )
-                    # A strip of one size; its grain runs along a waistband, across a band and aslant over a binding.
-                    folded = wish.kind != "binding"
-                    high, whole = wish.width * (2 if folded else 1), length + wish.overlap
-                    corners = [[0.0, 0.0], [length, 0.0], [whole, 0.0], [whole, high], [0.0, high]]
-                    names = ["lower", "overlap", "right end", "upper", "left end"]
-                    edges = []
-                    for i, edge in enumerate(names):
-                        ends = np.array([corners[i], corners[(i + 1) % len(corners)]])
-                        if np.linalg.norm(ends[1] - ends[0]) > 0.0:
-                            sewn = edge == "lower" or (ring and edge.endswith("end"))
-                            # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
-                            turned_in = 0.0 if wish.kind == "binding" and edge == "upper" else DEFAULT_ALLOWANCE["seam"]
-                            edges.append(
-                                Edge(
-                                    name=edge,
-                                    points=ends,
-                                    kind="seam" if sewn else "cut",
-                                    allowance=None if sewn else turned_in,
-                                )
-                            )
-                    along = {"waistband": [1.0, 0.0], "band": [0.0, 1.0], "binding": [0.7071, 0.7071]}[wish.kind]
-                    middle, reach = (
-                        np.array([0.5 * whole, 0.5 * high]),
-                        0.4 * (whole if wish.kind == "waistband" else high),
-                    )
-                    grain = middle + np.outer([-reach, reach], along)
-                    lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
-                    strip = Piece(
-                        name=name,
-                        size=row[0].size,
-                        fabric=row[0].fabric,
-                        quantity=2 if sided else 1,
-                        edges=edges,
-                        internal_lines=lines,
-                        grain=grain,
-                        paired=False,
-                        role="waistband" if wish.kind == "waistband" else "strip",
-                    )
+                    strip = _strip(wish, name, length, row[0], quantity=2 if sided else 1, ring=ring)
                     pieces[size] = (*row, strip)
                 taken = {seam.name for seam in pattern.seams}
                 words = name.replace("_", " ")
@@ -157,3 +120,29 @@ def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
         for end, length, crosses in zip(ends, lengths, whole, strict=True)
         if crosses
     )
+
+
+def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, ring: bool) -> Piece:
+    """Return a strip of one size; its grain runs along a waistband, across a band and aslant over a binding."""
+    folded = wish.kind != "binding"
+    high, whole = wish.width * (2 if folded else 1), length + wish.overlap
+    corners = [[0.0, 0.0], [length, 0.0], [whole, 0.0], [whole, high], [0.0, high]]
+    names = ["lower", "overlap", "right end", "upper", "left end"]
+    edges = []
+    for i, edge in enumerate(names):
+        ends = np.array([corners[i], corners[(i + 1) % len(corners)]])
+        if np.linalg.norm(ends[1] - ends[0]) > 0.0:
+            sewn = edge == "lower" or (ring and edge.endswith("end"))
+            # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
+            turned_in = 0.0 if wish.kind == "binding" and edge == "upper" else DEFAULT_ALLOWANCE["seam"]
+            edges.append(
+                Edge(name=edge, points=ends, kind="seam" if sewn else "cut", allowance=None if sewn else turned_in)
+            )
+    along = {"waistband": [1.0, 0.0], "band": [0.0, 1.0], "binding": [0.7071, 0.7071]}[wish.kind]
+    middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if wish.kind == "waistband" else high)
+    grain = middle + np.outer([-reach, reach], along)
+    lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
+    return Piece(
+        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, internal_lines=lines, grain=grain,
+        paired=False, role="waistband" if wish.kind == "waistband" else "strip",
+    )  # fmt: skip

@@ -255,12 +255,12 @@ def _plan_seams(
     # The names of seams that are several of the form's: that of the whole edge, "armhole left".
     parts: dict[Place, set[str]] = {}
     for number, both in enumerate(sewing.sides):
-        for hub in [side[0].place for side in both if side[0].place in sewing.hubs][:1]:
-            parts.setdefault(hub, set()).add(form.seams[number].name)
+        for around_hub in [side[0].place for side in both if side[0].place in sewing.hubs][:1]:
+            parts.setdefault(around_hub, set()).add(form.seams[number].name)
     of_hubs: dict[Place, str] = {}
-    for place, own in parts.items():
-        others = {seam.name for seam in form.seams} - own
-        of_hubs[place] = find_unused_name(place[1], others | set(of_hubs.values()))
+    for around_hub, joined in parts.items():
+        others = {seam.name for seam in form.seams} - joined
+        of_hubs[around_hub] = find_unused_name(around_hub[1], others | set(of_hubs.values()))
     seams: dict[Place | int, Seam] = {}
     of_form: list[tuple[Place | int, int]] = []
     for number, both in enumerate(sewing.sides):

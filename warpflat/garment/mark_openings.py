@@ -69,7 +69,7 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
                     raise InputError(
                         f"openings[{number}]: a {opening.kind} begins at the lower end of a seam between two edges"
                     )
-                pieces = dict(pattern.pieces)
+                pieces = {size: list(row) for size, row in pattern.pieces.items()}
                 for size in pieces:
                     part = _part_of(placed, size, number, seam.name)
                     if part.whole - opening.length < _LEAST_SEWN:

@@ -170,7 +170,7 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
         radius = min(0.4 * deep, 0.4 * length)
         upper = np.array([-deep + radius, length - radius]) + radius * np.column_stack([-np.sin(turn), np.cos(turn)])
         lower = np.array([-deep + radius, low + radius]) + radius * np.column_stack([-np.cos(turn), -np.sin(turn)])
-        rim = np.vstack([[0.0, length], upper, lower, [-0.02, low], [0.0, 0.0]])
+        around = np.vstack([[0.0, length], upper, lower, [-0.02, low], [0.0, 0.0]])
         past = pocket.below - start
         ends = {"pocket opening": length - past, "pocket opening end": length - past - pocket.height}
         pieces[size] = (
@@ -183,7 +183,7 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
                 role="pocket",
                 edges=[
                     Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=0.010),
-                    Edge(name="rim", points=rim),
+                    Edge(name="rim", points=around),
                 ],
                 internal_lines={name: np.array([[-0.012, y], [0.0, y]]) for name, y in ends.items()},
                 grain=np.array([[-0.5 * deep, 0.1 * length], [-0.5 * deep, 0.7 * length]]),

@@ -153,42 +153,7 @@ def sew(
     joined = SewingNetwork(pieces)
     folds = folds or {}
     unsewn = np.concatenate([piece.positions for piece in pieces.values()])
-    # The equations of seams and constraints in the numbering of the joined pieces.
-    groups: dict[tuple[str, str], list[ConstraintEquations]] = {}
-    oriented: set[str] = set()
-    on_fold = {name: joined.numbers(name, ids) for name, ids in folds.items()}
-    # A drawn line keeps its shape: nothing else need keep it smooth.
-    lines = [each for each in constraints if isinstance(each, DrawnLine)]
-    drawn = {vertex for each in lines for vertex in joined.numbers(each.piece, each.vertices).tolist()}
-    for seam in seams:
-        first, second = (joined.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
-        sides = zip((first, second), seam.pieces, strict=True)
-        smooth = [
-            smooth_equations(side, unsewn, on_fold.get(name)) for side, name in sides if not drawn.issuperset(side)
-        ]
-        if seam.joints is None:
-            sewn = seam_equations(first, second, seam.ratio)
-        else:
-            sewn = stretch_equations(first, second, seam.joints, joined.surface.vertices, unsewn, seam.ratio)
-        groups.setdefault((seam.name, "seam"), []).append(one_group(sewn, *smooth))
-    grouped, kinds = [one_group(*runs) for runs in groups.values()], list(groups)
-    for constraint in constraints:
-        if isinstance(constraint, KeptGirth):
-            parts = [
-                girth_equations(joined.numbers(name, edges), constraint.lengths[name], constraint.shares[name])
-                for name, edges in constraint.edges.items()
-            ]
-            grouped.append(one_group(*parts))
-            kinds.append((constraint.name, constraint.kind))
-            continue
-        own, orients = equations_of_constraint(
-            constraint, find_piece(constraint, joined.pieces), folds.get(constraint.piece)
-        )
-        grouped.append(replace(own, ends=joined.numbers(constraint.piece, own.ends)))
-        kinds.append((constraint.name, constraint.kind))
-        if orients:
-            oriented.add(constraint.piece)
-    equations = join_equations(grouped)
+    equations, kinds, oriented = _constraint_equations(joined, unsewn, seams, constraints, folds)
     start = np.concatenate([_straighten_fold(piece, folds.get(name)) for name, piece in pieces.items()])
     network = joined.network()
     if folds:
@@ -275,6 +240,55 @@ def _offsets(
         return {}
     offset = network.seams.offset.numpy()
     return {key: offset[own] for key, own in _held(equations, kinds)}
+
+
+def _constraint_equations(
+    joined: SewingNetwork,
+    unsewn: FloatArray,
+    seams: Sequence[SeamPair],
+    constraints: Sequence[Constraint],
+    folds: Mapping[str, IntArray],
+) -> tuple[ConstraintEquations, list[tuple[str, str]], set[str]]:
+    """Return the equations of seams and constraints in the numbering of the joined pieces.
+
+    With them come name and kind of each group, and the names of the pieces that are oriented on the cloth, which need no
+    other constraint against turning.
+    """
+    groups: dict[tuple[str, str], list[ConstraintEquations]] = {}
+    oriented: set[str] = set()
+    on_fold = {name: joined.numbers(name, ids) for name, ids in folds.items()}
+    # A drawn line keeps its shape: nothing else need keep it smooth.
+    lines = [each for each in constraints if isinstance(each, DrawnLine)]
+    drawn = {vertex for each in lines for vertex in joined.numbers(each.piece, each.vertices).tolist()}
+    for seam in seams:
+        first, second = (joined.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
+        sides = zip((first, second), seam.pieces, strict=True)
+        smooth = [
+            smooth_equations(side, unsewn, on_fold.get(name)) for side, name in sides if not drawn.issuperset(side)
+        ]
+        if seam.joints is None:
+            sewn = seam_equations(first, second, seam.ratio)
+        else:
+            sewn = stretch_equations(first, second, seam.joints, joined.surface.vertices, unsewn, seam.ratio)
+        groups.setdefault((seam.name, "seam"), []).append(one_group(sewn, *smooth))
+    equations, kinds = [one_group(*runs) for runs in groups.values()], list(groups)
+    for constraint in constraints:
+        if isinstance(constraint, KeptGirth):
+            parts = [
+                girth_equations(joined.numbers(name, edges), constraint.lengths[name], constraint.shares[name])
+                for name, edges in constraint.edges.items()
+            ]
+            equations.append(one_group(*parts))
+            kinds.append((constraint.name, constraint.kind))
+            continue
+        own, orients = equations_of_constraint(
+            constraint, find_piece(constraint, joined.pieces), folds.get(constraint.piece)
+        )
+        equations.append(replace(own, ends=joined.numbers(constraint.piece, own.ends)))
+        kinds.append((constraint.name, constraint.kind))
+        if orients:
+            oriented.add(constraint.piece)
+    return join_equations(equations), kinds, oriented
 
 
 def _part(

@@ -300,8 +300,9 @@ def _annotations(
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
             spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=side)
             write(text, NAME, spots, avoid=[*drawn[:index], *drawn[index + 1 :]], least=CLEAR, enough=WELL_CLEAR)
-    for notch in piece.notches if paper is not None else ():
-        letter = paper.letters.get(notch.seam)
+    letters = {} if paper is None else paper.letters
+    for notch in piece.notches:
+        letter = letters.get(notch.seam)
         if letter is not None:
             along = np.array([notch.direction[1], -notch.direction[0]])
             middle = (notch.depth / 2 + 0.0004) * notch.direction
@@ -312,8 +313,8 @@ def _annotations(
                 notch.base[0] + middle + sign * (out + half) * along
                 for sign, out in zip((1.0, -1.0), aside, strict=True)
             ]
-            spots = [Spot(x=float(x), y=float(y)) for x, y in places]
-            write(letter, LETTER, spots, bold=True, enough=LETTER_CLEAR)
+            beside = [Spot(x=float(x), y=float(y)) for x, y in places]
+            write(letter, LETTER, beside, bold=True, enough=LETTER_CLEAR)
     for fold in piece.fold_edges:
         # A line beside the fold whose two arms point to it, with words along it.
         start, span = fold.line[0], fold.line[-1] - fold.line[0]
@@ -331,8 +332,8 @@ def _annotations(
         if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
             angle += np.pi
         places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
-        spots = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
-        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), spots, enough=CLEAR)
+        inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
+        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
     return strokes, words
 
 

@@ -346,7 +346,8 @@ class Film:
                     count = max(wanted for _, _, wanted in shots.values())
                     frames = {name: self._frames(stage, keys, count) for name, (stage, keys, _) in shots.items()}
                     for frame in range(count):
-                        for name, (stage, _, _) in shots.items():
+                        for name, shot in shots.items():
+                            stage = shot[0]
                             begins = frame == 0 and number < len(pieces[name])
                             shown = next(frames[name])
                             measures = {
