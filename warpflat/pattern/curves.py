@@ -51,7 +51,7 @@ def split_bezier(control: FloatArray, t: float) -> tuple[FloatArray, FloatArray]
     """Return the two parts of a Bézier (#C by 2) before and after a parameter, by de Casteljau's scheme."""
     before, points, after = [control[0]], control, [control[-1]]
     while len(points) > 1:
-        points = points[:-1] + t * (points[1:] - points[:-1])
+        points = (1 - t) * points[:-1] + t * points[1:]
         before.append(points[0])
         after.append(points[-1])
     return np.array(before), np.array(after[::-1])
