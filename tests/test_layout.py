@@ -31,7 +31,7 @@ ROOMS = {
     "export": "core surface pattern kernels",
     "flattening": "core surface fabric model solver export kernels",
     "cutting": "core surface model solver export flattening",
-    "mannequin": "core surface export kernels",
+    "mannequin": "core surface pattern export kernels",
     "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
     "draping": "core surface fabric model solver pattern export flattening mannequin garment kernels",
     "seams": "core surface fabric model solver flattening cutting",

@@ -12,7 +12,13 @@ from warpflat.core.sums import weighted_percentile
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
 from warpflat.export.figure import GREY, Pen, new_figure, write_figure
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
-from warpflat.export.labels import (
+from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
+from warpflat.export.picture import PicturePiece, write_picture
+from warpflat.export.picture_garment import Body, crop_body
+from warpflat.export.picture_page import BETWEEN, pack_boxes, pack_rows, place_views
+from warpflat.export.picture_views import Silhouette, make_facets, pattern_view
+from warpflat.export.raster import Lighting, Samples, rasterise, shade
+from warpflat.pattern.placement import (
     LabelRoom,
     Spot,
     leader_line,
@@ -21,12 +27,6 @@ from warpflat.export.labels import (
     spots_beside,
     spots_beyond_ends,
 )
-from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
-from warpflat.export.picture import PicturePiece, write_picture
-from warpflat.export.picture_garment import Body, crop_body
-from warpflat.export.picture_page import BETWEEN, pack_boxes, pack_rows, place_views
-from warpflat.export.picture_views import Silhouette, make_facets, pattern_view
-from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
 
@@ -448,7 +448,7 @@ def test_a_label_follows_its_line() -> None:
     assert list(spots_along(steep[:, ::-1] * 0.2, 0.5, 0.1)) == []
 
 
-def test_labels_and_leaders_keep_off_lines() -> None:
+def test_a_leader_runs_over_nothing_that_is_taken() -> None:
     page = (0.0, 0.0, 3.0, 2.0)
     led = [Spot(x=1.5, y=1.0, angle=0.0, leader=(0.2, 1.0)), Spot(x=1.5, y=1.5, angle=0.0, leader=(0.2, 1.0))]
     wall = np.array([[0.8, 0.5], [0.8, 1.1]])
@@ -456,6 +456,7 @@ def test_labels_and_leaders_keep_off_lines() -> None:
     room = LabelRoom()
     room.take_line(wall, 0.05)
     assert room.place(led, 0.5, 0.1, page) == led[1]
+    # A text does not stand on it, either.
     assert room.place([Spot(x=0.8, y=0.8, angle=0.0)], 0.5, 0.1, page) is None
     ends = leader_line(led[0], 0.5)
     assert ends is not None

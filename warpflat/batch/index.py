@@ -80,7 +80,41 @@ class BatchIndex:
                     *(row.seconds, row.memory_mb, row.message),
                 ]
             )
-        texts = {"index.csv": table.getvalue(), "index.html": _page(rows, bodies=bodies)}
+        levels = _levels(rows)
+        statuses = [f'<span class="{_COLOURS.get(row.status, "")}">{row.status}</span>' for row in rows]
+        pictures = []
+        for row in rows:
+            key, target = row.task.key, "review.html" if "review.html" in row.files else ""
+            shown = f'<img loading="lazy" alt="{key}" src="{key}/picture.png">' if "picture.png" in row.files else key
+            pictures.append(f'<a href="{key}/{target}">{shown}</a>' if row.files else key)
+        columns = [
+            _column("", [row.task.key for row in rows], pictures),
+            *(_column(name, [str(getattr(row.task, name)) for row in rows]) for name in _NAMES),
+            _column("status", [row.status for row in rows], statuses),
+            _numbers("strain energy [mJ]", [row.strain_energy_j for row in rows], 1e3, ".4g"),
+            _column("fits", [_FITS[row.fits] for row in rows]),
+            *(_numbers(f"{level} [cm]", [row.girths_m.get(level) for row in rows], 100.0, ".1f") for level in levels),
+            _numbers("time [s]", [row.seconds for row in rows], 1.0, ".1f"),
+            _column("message", [row.message for row in rows]),
+        ]
+        headings, *body_rows = zip(*filter(None, columns), strict=True)
+        body = "\n".join(f"<tr>{''.join(cells)}</tr>" for cells in body_rows)
+        counts = {status: sum(row.status == status for row in rows) for status in (*_COLOURS, TO_DO)}
+        totals = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
+        style = resources.files("warpflat.review").joinpath("data", "page.css").read_text(encoding="utf-8")
+        script = resources.files("warpflat.batch").joinpath("data", "sort.js").read_text(encoding="utf-8")
+        texts = {
+            "index.csv": table.getvalue(),
+            "index.html": (
+                '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>warpflat batch</title>'
+                f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}{_STYLE}</style></head>'
+                f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(totals)}. '
+                "Girths are of the pattern. A click on a heading sorts.</p>"
+                f'<div class="scroll"><table><thead><tr>{"".join(headings)}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+                f"{_BODIES if bodies else ''}</main>"
+                f"<script>{script}</script></body></html>\n"
+            ),
+        }
         with output_folder(self._out, [*texts, "batch.json"], guard=True) as folder:
             for name, text in texts.items():
                 with atomic_path(folder / name) as temporary:
@@ -93,41 +127,6 @@ class BatchIndex:
 def _levels(rows: Sequence[Row]) -> list[str]:
     """Return the levels of all girths, in their first order."""
     return list(dict.fromkeys(level for row in rows for level in row.girths_m))
-
-
-def _page(rows: Sequence[Row], *, bodies: bool) -> str:
-    levels = _levels(rows)
-    statuses = [f'<span class="{_COLOURS.get(row.status, "")}">{row.status}</span>' for row in rows]
-    pictures = []
-    for row in rows:
-        key, target = row.task.key, "review.html" if "review.html" in row.files else ""
-        shown = f'<img loading="lazy" alt="{key}" src="{key}/picture.png">' if "picture.png" in row.files else key
-        pictures.append(f'<a href="{key}/{target}">{shown}</a>' if row.files else key)
-    columns = [
-        _column("", [row.task.key for row in rows], pictures),
-        *(_column(name, [str(getattr(row.task, name)) for row in rows]) for name in _NAMES),
-        _column("status", [row.status for row in rows], statuses),
-        _numbers("strain energy [mJ]", [row.strain_energy_j for row in rows], 1e3, ".4g"),
-        _column("fits", [_FITS[row.fits] for row in rows]),
-        *(_numbers(f"{level} [cm]", [row.girths_m.get(level) for row in rows], 100.0, ".1f") for level in levels),
-        _numbers("time [s]", [row.seconds for row in rows], 1.0, ".1f"),
-        _column("message", [row.message for row in rows]),
-    ]
-    head, *lines = zip(*filter(None, columns), strict=True)
-    body = "\n".join(f"<tr>{''.join(cells)}</tr>" for cells in lines)
-    counts = {status: sum(row.status == status for row in rows) for status in (*_COLOURS, TO_DO)}
-    totals = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
-    style = resources.files("warpflat.review").joinpath("data", "page.css").read_text(encoding="utf-8")
-    script = resources.files("warpflat.batch").joinpath("data", "sort.js").read_text(encoding="utf-8")
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>warpflat batch</title>'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}{_STYLE}</style></head>'
-        f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(totals)}. '
-        "Girths are of the pattern. A click on a heading sorts.</p>"
-        f'<div class="scroll"><table><thead><tr>{"".join(head)}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
-        f"{_BODIES if bodies else ''}</main>"
-        f"<script>{script}</script></body></html>\n"
-    )
 
 
 def _column(name: str, values: Sequence[str], shown: Sequence[str] | None = None) -> list[str]:

@@ -124,21 +124,18 @@ def _can_fork() -> bool:
     return sys.platform == "linux" and thread_count() > 1 and (warp is None or not warp.is_cuda_available())
 
 
-def _die_with(parent: int) -> None:
-    """Let the system kill this process when its parent dies, so that it does not write into a folder that is being cleared."""
-    import ctypes
-
-    ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
-    if os.getppid() != parent:  # it has died meanwhile
-        os._exit(0)
-
-
 def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
     """Run the function, write its result or error into the pipe, and end the process without any cleaning up of the parent's."""
+    import ctypes
+
     try:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
-        _die_with(parent)
+        # Let the system kill this process when its parent dies, so that it does not write into a folder that is being
+        # cleared.
+        ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
+        if os.getppid() != parent:  # it has died meanwhile
+            os._exit(0)
         read, left_out = list[Path](), list[tuple[Path, str]]()
         try:
             with (

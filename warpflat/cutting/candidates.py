@@ -124,8 +124,40 @@ def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Can
         found += [] if free is None else [free]
         if free is None or _cut_length(result.surface, free) < _REACH * _diagonal(result.surface):
             found += _cuts_inwards(result, number, peaks)
-    singles = _without_duplicates(found)
-    pairs = _pairs(result.surface, singles)
+    seen: set[tuple[int, ...]] = set()
+    names: dict[str, int] = {}
+    singles = []
+    for one in found:
+        key = tuple(sorted(v for path in one.paths for v in path.tolist()))
+        if key and key in seen:
+            continue
+        seen.add(key)
+        names[one.name] = names.get(one.name, 0) + 1
+        if names[one.name] > 1:
+            one = Candidate(name=f"{one.name} ({names[one.name]})", paths=one.paths, drawn=one.drawn, peaks=one.peaks)
+        singles.append(one)
+    # Pairs of cuts of one length that lead to two peaks and share no vertex, each pair as one cut, with both names.
+    pairs = []
+    for a, b in combinations(singles, 2):
+        if not (a.peaks and b.peaks) or set(a.peaks) & set(b.peaks) or bool(a.drawn) != bool(b.drawn):
+            continue
+        lengths = _cut_length(result.surface, a), _cut_length(result.surface, b)
+        shared = {int(v) for path in a.paths for v in path} & {int(v) for path in b.paths for v in path}
+        if (
+            shared
+            or abs(lengths[0] - lengths[1]) > _ALIKE * max(lengths)
+            or not _mirror_each_other(result.surface, a, b)
+        ):
+            continue
+        along = a.name.rpartition(" from ")[0]
+        same = along and b.name.startswith(f"{along} from ")
+        both = Candidate(
+            name=f"{a.name} and {b.name.removeprefix(along + ' from ')}" if same else f"{a.name} + {b.name}",
+            paths=a.paths + b.paths,
+            drawn=a.drawn + b.drawn,
+            peaks=tuple(sorted({*a.peaks, *b.peaks})),
+        )
+        pairs.append((both, (a.name, b.name)))
     twins = {name for pair in pairs for name in pair[1]}
     return (*(pair for pair, _ in pairs), *(replace(one, has_twin=one.name in twins) for one in singles))
 
@@ -360,44 +392,6 @@ def _corners(points: FloatArray, stray: float) -> list[int]:
 
 def _cut_length(surface: Surface, one: Candidate) -> float:
     return path_length(surface, one.paths) + sum(path.length for path in one.drawn)
-
-
-def _without_duplicates(candidates: list[Candidate]) -> list[Candidate]:
-    seen: set[tuple[int, ...]] = set()
-    names: dict[str, int] = {}
-    kept = []
-    for one in candidates:
-        key = tuple(sorted(v for path in one.paths for v in path.tolist()))
-        if key and key in seen:
-            continue
-        seen.add(key)
-        names[one.name] = names.get(one.name, 0) + 1
-        if names[one.name] > 1:
-            one = Candidate(name=f"{one.name} ({names[one.name]})", paths=one.paths, drawn=one.drawn, peaks=one.peaks)
-        kept.append(one)
-    return kept
-
-
-def _pairs(surface: Surface, singles: list[Candidate]) -> list[tuple[Candidate, tuple[str, str]]]:
-    """Return pairs of cuts of one length that lead to two peaks and share no vertex, each pair as one cut, with both names."""
-    pairs = []
-    for a, b in combinations(singles, 2):
-        if not (a.peaks and b.peaks) or set(a.peaks) & set(b.peaks) or bool(a.drawn) != bool(b.drawn):
-            continue
-        lengths = _cut_length(surface, a), _cut_length(surface, b)
-        shared = {int(v) for path in a.paths for v in path} & {int(v) for path in b.paths for v in path}
-        if shared or abs(lengths[0] - lengths[1]) > _ALIKE * max(lengths) or not _mirror_each_other(surface, a, b):
-            continue
-        line = a.name.rpartition(" from ")[0]
-        same = line and b.name.startswith(f"{line} from ")
-        both = Candidate(
-            name=f"{a.name} and {b.name.removeprefix(line + ' from ')}" if same else f"{a.name} + {b.name}",
-            paths=a.paths + b.paths,
-            drawn=a.drawn + b.drawn,
-            peaks=tuple(sorted({*a.peaks, *b.peaks})),
-        )
-        pairs.append((both, (a.name, b.name)))
-    return pairs
 
 
 def _mirror_each_other(surface: Surface, a: Candidate, b: Candidate) -> bool:

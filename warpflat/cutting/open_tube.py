@@ -17,7 +17,7 @@ from warpflat.surface.cut.pieces import lines_after_cut
 from warpflat.surface.cut.split_faces import split_faces_along
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph
-from warpflat.surface.paths.trace import SurfacePath, geodesic_path
+from warpflat.surface.paths.trace import geodesic_path
 from warpflat.surface.tubes import tube_borders
 
 __all__ = ["open_tube", "open_with_cuts", "without_overlaps"]
@@ -146,13 +146,30 @@ def _draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface,
     Returns:
         The surface, uncut, with the lines "opening", "opening_2" and so on; the cuts along these.
     """
+    from scipy.sparse.csgraph import dijkstra
+
     whole, openings = surface, list[CutPlan]()
     made = make_cuts(surface, plans)
     cut = made.surface
     origin = np.arange(len(surface.vertices)) if made.cut is None else made.cut.vertex_origin.astype(np.int64)
     while borders := tube_borders(cut):
         name = find_unused_name("opening", {line.removesuffix(".left") for line in whole.lines})
-        path = _between_borders(cut, geodesic_path(cut, *_nearest_borders(cut, borders[0])))
+        # The ends of the shortest path along edges from a border to any other.
+        loops = border_loops(cut.faces)
+        others = np.concatenate([loop for loop in loops if loop[0] not in borders[0]])
+        graph = EdgeGraph(cut)
+        far, _, source = dijkstra(
+            graph.matrix(graph.length), indices=borders[0], min_only=True, return_predecessors=True
+        )
+        end = int(others[np.argmin(far[others])])
+        path = geodesic_path(cut, int(source[end]), end)
+        # The part of the path from where it leaves one border to where it reaches the next.
+        of = {vertex: number for number, loop in enumerate(loops) for vertex in loop.tolist()}
+        at = [of.get(place[0], -1) if place[1] < 0 else -1 for place in path.support.tolist()]
+        end = next(index for index, loop in enumerate(at) if loop >= 0 and loop != at[0])
+        start = max(index for index in range(end) if at[index] >= 0)
+        part = slice(start, end + 1)
+        path = replace(path, support=path.support[part], weights=path.weights[part], points=path.points[part])
         split = split_faces_along(cut, path)
         new = np.arange(len(cut.vertices), len(split.surface.vertices))
         # New vertices lie inside the cut surface: beside a cut there are none, and its sides can be closed again.
@@ -191,25 +208,3 @@ def _with_between(line: IntArray, between: Mapping[tuple[int, ...], list[tuple[f
         found = [vertex for _, vertex in sorted(between.get(tuple(sorted((a, b))), []))]
         vertices += [*(found if a < b else found[::-1]), b]
     return np.array(vertices, dtype=np.int32)
-
-
-def _between_borders(surface: Surface, path: SurfacePath) -> SurfacePath:
-    """Return the part of a path from where it leaves one border to where it reaches the next."""
-    of = {vertex: number for number, loop in enumerate(border_loops(surface.faces)) for vertex in loop.tolist()}
-    at = [of.get(place[0], -1) if place[1] < 0 else -1 for place in path.support.tolist()]
-    end = next(index for index, loop in enumerate(at) if loop >= 0 and loop != at[0])
-    start = max(index for index in range(end) if at[index] >= 0)
-    part = slice(start, end + 1)
-    return replace(path, support=path.support[part], weights=path.weights[part], points=path.points[part])
-
-
-def _nearest_borders(surface: Surface, border: IntArray) -> tuple[int, int]:
-    """Return the ends of the shortest path along edges from a border to any other."""
-    from scipy.sparse.csgraph import dijkstra
-
-    loops = border_loops(surface.faces)
-    others = np.concatenate([loop for loop in loops if loop[0] not in border])
-    graph = EdgeGraph(surface)
-    far, _, source = dijkstra(graph.matrix(graph.length), indices=border, min_only=True, return_predecessors=True)
-    end = int(others[np.argmin(far[others])])
-    return int(source[end]), end

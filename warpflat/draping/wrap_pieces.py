@@ -138,24 +138,22 @@ def wrap_pieces(
             placed |= {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in laid.items()}
     for name, side in at.items():
         if side.endswith(" arm"):
-            placed[name] = _around_arm(meshes[name].points, body, side.removesuffix(" arm"))
+            # Roll a sleeve up around an arm: its middle above, its highest point at the armhole's.
+            flat = meshes[name].points
+            side = side.removesuffix(" arm")
+            hole, wrist = body.line(f"armhole {side}"), body.line(f"wrist {side}").mean(axis=0)
+            shoulder = hole[hole[:, 1].argmax()]
+            up = hole.mean(axis=0) - wrist
+            up /= np.linalg.norm(up)
+            front = shoulder - hole.mean(axis=0)
+            front -= (front @ up) * up
+            front /= np.linalg.norm(front)
+            middle = 0.5 * (flat[:, 0].min() + flat[:, 0].max())
+            # The highest point of the cap lies beside the shoulder.
+            beyond = float((shoulder - hole.mean(axis=0)) @ up)
+            frame = _Frame(hole.mean(axis=0) + beyond * up, up, front)
+            placed[name] = frame.roll(flat - [middle, flat[:, 1].max()], float(np.ptp(flat[:, 0])), 1.0)
     return placed
-
-
-def _around_arm(flat: FloatArray, body: Mannequin, side: str) -> FloatArray:
-    """Roll a sleeve up around an arm: its middle above, its highest point at the armhole's."""
-    hole, wrist = body.line(f"armhole {side}"), body.line(f"wrist {side}").mean(axis=0)
-    shoulder = hole[hole[:, 1].argmax()]
-    up = hole.mean(axis=0) - wrist
-    up /= np.linalg.norm(up)
-    front = shoulder - hole.mean(axis=0)
-    front -= (front @ up) * up
-    front /= np.linalg.norm(front)
-    middle = 0.5 * (flat[:, 0].min() + flat[:, 0].max())
-    # The highest point of the cap lies beside the shoulder.
-    beyond = float((shoulder - hole.mean(axis=0)) @ up)
-    frame = _Frame(hole.mean(axis=0) + beyond * up, up, front)
-    return frame.roll(flat - [middle, flat[:, 1].max()], float(np.ptp(flat[:, 0])), 1.0)
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,38 @@ def write_pdf(
         InputError: unknown paper or size.
     """
     with printed_in(garment.garment.words):
-        return _write(garment, path, paper, sizes)
+        if paper not in PAPERS:
+            raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
+        chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
+        for size in chosen:
+            garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+        whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
+        printed = halved(whole)
+        kind = PAPERS[paper]
+        if told := too_many_sheets(printed, paper):
+            raise InputError(f"{path}: {told}")
+        sheet, tiling = _arranged(nests(printed), kind)
+        # Labels move to where no joint of two sheets crosses them, where there is room for that.
+        placed = []
+        for place in sheet.placed:
+            joints = [place.on_piece(joint) for joint in tiling.joints]
+            pieces = (
+                tuple(relabelled(piece, garment.name, joints) for piece in place.pieces) if joints else place.pieces
+            )
+            if any(piece.label.leader is not None for piece in pieces):
+                pieces = place.pieces
+            placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
+        kind, sheet = tiling.paper, replace(sheet, placed=tuple(placed))
+        tiling = replace(tiling, sheet=sheet)
+        content, guided = b"", list[str]()
+        if kind.tiled:
+            with optional_file(path, guided, part="the guide"):
+                content = _pages(whole, printed, tiling, chosen, guide=True)
+        if not guided:
+            content = _pages(whole, printed, tiling, chosen, guide=False)
+        with atomic_path(path) as temporary:
+            Path(temporary).write_bytes(content)
+        return tiling
 
 
 def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
@@ -93,39 +124,6 @@ def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
     area = sum(shapely.Polygon(piece.cut_line).area for row in garment.pieces.values() for piece in row)
     sheets = area / float(np.prod(PAPERS[paper].step))
     return f"it would take some {sheets:,.0f} sheets; check the units, or take A0 paper" if sheets > MOST_SHEETS else ""
-
-
-def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, sizes: Sequence[str] | None) -> Tiling:
-    if paper not in PAPERS:
-        raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
-    chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
-    for size in chosen:
-        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
-    whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
-    printed = halved(whole)
-    kind = PAPERS[paper]
-    if told := too_many_sheets(printed, paper):
-        raise InputError(f"{path}: {told}")
-    sheet, tiling = _arranged(nests(printed), kind)
-    # Labels move to where no joint of two sheets crosses them, where there is room for that.
-    placed = []
-    for place in sheet.placed:
-        joints = [place.on_piece(joint) for joint in tiling.joints]
-        pieces = tuple(relabelled(piece, garment.name, joints) for piece in place.pieces) if joints else place.pieces
-        if any(piece.label.leader is not None for piece in pieces):
-            pieces = place.pieces
-        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
-    kind, sheet = tiling.paper, replace(sheet, placed=tuple(placed))
-    tiling = replace(tiling, sheet=sheet)
-    content, guided = b"", list[str]()
-    if kind.tiled:
-        with optional_file(path, guided, part="the guide"):
-            content = _pages(whole, printed, tiling, chosen, guide=True)
-    if not guided:
-        content = _pages(whole, printed, tiling, chosen, guide=False)
-    with atomic_path(path) as temporary:
-        Path(temporary).write_bytes(content)
-    return tiling
 
 
 def _pages(
@@ -183,7 +181,25 @@ def _pages(
         legend_page(canvas, printed, chosen, tiling.sheet, tiling)
         guide_pages(canvas, whole, printed, kind)
     for row, column in tiling.tiles:
-        _tile(canvas, tiling, row, column, whole.name.replace("_", " "))
+        title = whole.name.replace("_", " ")
+        paper = tiling.paper
+        inner = np.array([paper.width, paper.height]) - 2 * paper.margin
+        corner = tiling.corner(row, column)
+        canvas.saveState()
+        window = canvas.beginPath()
+        window.rect(paper.margin * POINT, paper.margin * POINT, *(inner * POINT))
+        canvas.clipPath(window, stroke=0, fill=0)
+        canvas.translate(*((paper.margin - corner) * POINT))
+        canvas.doForm("sheet")
+        canvas.restoreState()
+        if tiling.joined:
+            _joining_marks(canvas, tiling, row, column)
+        canvas.setFillColor("#555555")
+        canvas.setFont(FONT, 7)
+        number = translate("sheet {name}", name=tiling.name(row, column))
+        page = f"{title}  -  {number}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
+        canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
+        canvas.showPage()
     if len(chosen) > 1:
         # The layers of the sheet, one a size, are optional content that readers list and can hide.
         document = canvas._doc
@@ -292,28 +308,6 @@ def _words(canvas: Any, words: Words, matrix: FloatArray, colour: str) -> None:
     canvas.setFont(font, size)
     canvas.drawCentredString(0, -words.height / 2 * POINT, words.text)
     canvas.restoreState()
-
-
-def _tile(canvas: Any, tiling: Tiling, row: int, column: int, title: str) -> None:
-    """Draw one page."""
-    paper = tiling.paper
-    inner = np.array([paper.width, paper.height]) - 2 * paper.margin
-    corner = tiling.corner(row, column)
-    canvas.saveState()
-    window = canvas.beginPath()
-    window.rect(paper.margin * POINT, paper.margin * POINT, *(inner * POINT))
-    canvas.clipPath(window, stroke=0, fill=0)
-    canvas.translate(*((paper.margin - corner) * POINT))
-    canvas.doForm("sheet")
-    canvas.restoreState()
-    if tiling.joined:
-        _joining_marks(canvas, tiling, row, column)
-    canvas.setFillColor("#555555")
-    canvas.setFont(FONT, 7)
-    sheet = translate("sheet {name}", name=tiling.name(row, column))
-    page = f"{title}  -  {sheet}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
-    canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
-    canvas.showPage()
 
 
 def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:

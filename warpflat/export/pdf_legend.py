@@ -11,8 +11,9 @@ from warpflat.core.arrays import FloatArray
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.export.svg import STYLE
 from warpflat.pattern.drafted import DraftedGarment
-from warpflat.pattern.label import BOLD, CAPITALS, FONT, fit_label, printed_size, text_width
+from warpflat.pattern.label import BOLD, CAPITALS, FONT, printed_size, text_width
 from warpflat.pattern.layout import Sheet
+from warpflat.pattern.placement import fit_label
 from warpflat.pattern.sewing_order import piece_titles
 from warpflat.pattern.words import translate
 

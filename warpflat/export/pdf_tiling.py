@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -128,22 +127,7 @@ def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
     shapes += [shapely.Polygon(placed.on_sheet(label.box)) for label, placed in labels if label.leader is not None]
     if sheet.reserved is not None:
         shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
-    tiles = _drawn_tiles(tiling, shapes)
-    # Sheets are joined if a shape spreads over two of them.
-    lower_left = [tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) for tile in tiles]
-    cells = [shapely.box(*corner, *(corner + tiling.paper.step)) for corner in lower_left]
-    return replace(
-        tiling, tiles=tiles, joined=any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
-    )
-
-
-def _drawn_tiles(tiling: Tiling, shapes: Sequence[Polygon]) -> tuple[tuple[int, int], ...]:
-    """Return the tiles on which a part of a shape lies that no other tile shows.
-
-    Neighbours share a strip: a tile whose part lies in such strips of kept tiles is dropped, the emptiest first.
-    """
-    import shapely
-
+    # The tiles on which a part of a shape lies that no other tile shows.
     # Lines are drawn with their middle on the border.
     drawn = shapely.union_all([shape.buffer(LINE) for shape in shapes])
     tiles = [(row, column) for row in range(tiling.rows) for column in range(tiling.columns)]
@@ -153,7 +137,13 @@ def _drawn_tiles(tiling: Tiling, shapes: Sequence[Polygon]) -> tuple[tuple[int, 
         around = [_window(tiling, other) for other in kept - {tile} if max(np.abs(np.subtract(other, tile))) == 1]
         if parts[tile].difference(shapely.union_all(around)).area < 1e-9:
             kept.remove(tile)
-    return tuple(tile for tile in tiles if tile in kept)
+    shown = tuple(tile for tile in tiles if tile in kept)
+    # Sheets are joined if a shape spreads over two of them.
+    lower_left = [tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) for tile in shown]
+    cells = [shapely.box(*corner, *(corner + tiling.paper.step)) for corner in lower_left]
+    return replace(
+        tiling, tiles=shown, joined=any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
+    )
 
 
 def _window(tiling: Tiling, tile: tuple[int, int]) -> Polygon:

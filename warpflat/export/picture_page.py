@@ -13,9 +13,10 @@ from matplotlib.patches import Rectangle
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen
-from warpflat.export.labels import LabelRoom, Spot, draw_lines
+from warpflat.export.labels import draw_lines
 from warpflat.export.picture_garment import GarmentViews
 from warpflat.export.picture_views import DrawnView, Silhouette, View
+from warpflat.pattern.placement import LabelRoom, Spot
 
 __all__ = [
     "BETWEEN",

@@ -19,6 +19,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
 from warpflat.core.text import quote_value
 from warpflat.export.read_dxf import MOST_POINTS, check_closed, outermost, read_quantity
+from warpflat.pattern.curves import as_cubic, cubic_weights
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
 from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.seam_words import seams_of_words
@@ -28,7 +29,7 @@ __all__ = ["read_svg"]
 _MILLIMETRES = {"": 25.4 / 96, "px": 25.4 / 96, "mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6}
 _LENGTH = re.compile(r"\s*([0-9.eE+-]*[0-9.])\s*([a-z]*)\s*")
 _TRANSFORM = re.compile(r"(\w+)\s*\(([^)]*)\)")
-_SAMPLES = np.linspace(0.0, 1.0, 25)[1:]
+_SAMPLES = cubic_weights(np.linspace(0.0, 1.0, 25)[1:])
 _KINDS = {"sew": "seam", "hem": "hem", "fold": "fold", "dart": "dart"}
 # Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
 _DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
@@ -255,16 +256,8 @@ def _flatten(text: str) -> Iterator[tuple[FloatArray, bool]]:
         elif command == "lineTo":
             points.append(control[0][None])
         elif command in ("curveTo", "qCurveTo"):
-            points.append(_bezier(np.array([points[-1][-1], *control])))
+            points.append(_SAMPLES @ as_cubic(np.array([points[-1][-1], *control])))
         else:
             line = np.concatenate(points)
             ends_meet = bool(np.linalg.norm(line[0] - line[-1]) < 1e-6)
             yield line, command == "closePath" or ends_meet
-
-
-def _bezier(control: FloatArray) -> FloatArray:
-    """Return points of a Bézier curve (#C by 2) but its first, by de Casteljau's algorithm."""
-    rows = np.repeat(control[None], len(_SAMPLES), axis=0)
-    while rows.shape[1] > 1:
-        rows = (1.0 - _SAMPLES)[:, None, None] * rows[:, :-1] + _SAMPLES[:, None, None] * rows[:, 1:]
-    return np.asarray(rows[:, 0])

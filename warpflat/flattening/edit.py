@@ -92,7 +92,43 @@ def change_surface(
     before, options = result.surface, given_options(relax)
     expect_callback(callback)
     # The faces stay, and with them what has been found out about the mesh.
-    surface = replace(_moved(before, surface), faces=before.faces, of_faces=before.of_faces)
+    # The surface with the moved vertices, checked to be the mesh before.
+    given = surface
+    if isinstance(given, Surface):
+        surface = given
+        if len(surface.vertices) != len(before.vertices) or not np.array_equal(surface.faces, before.faces):
+            raise InputError(
+                f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
+                f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
+            )
+        vertices = check_positions(surface.vertices)
+        # Of a surface made by `replace(surface, vertices=...)` what was read has not moved with it.
+        if not np.array_equal(given.input_vertices[given.input_index], vertices):
+            surface = replace(given, input_vertices=_as_read(before, vertices), input_index=before.input_index)
+    else:
+        try:
+            vertices = check_positions(given)
+        except InputError as error:
+            raise InputError(
+                f"piece {before.name!r}: {error}; give a Surface, or its {len(before.vertices):,} vertices by 3 [m]"
+            ) from None
+        if len(vertices) != len(before.vertices):
+            raise InputError(
+                f"piece {before.name!r} has {len(before.vertices):,} vertices, not {len(vertices):,}: give them all, in the order of its "
+                "surface.vertices, or flatten another mesh afresh"
+            )
+        surface = replace(before, vertices=vertices, input_vertices=_as_read(before, vertices))
+        vertices = surface.vertices
+    collapsed = degenerate_faces(vertices, surface.faces, _COLLAPSED)
+    _refuse_faces(surface, collapsed, "has collapsed to a line or a point", "faces need an area")
+    crossed = find_crossed_quads(vertices, surface.faces)
+    _refuse_faces(
+        surface,
+        crossed,
+        "has become a quad whose sides cross, or is folded by more than 90 degrees",
+        "move its vertices along with those around them",
+    )
+    surface = replace(surface, faces=before.faces, of_faces=before.of_faces)
     cut = result.network.surface
     origin, used = np.empty(len(cut.vertices), dtype=np.int32), cut.faces >= 0
     origin[cut.faces[used]] = before.faces[used]
@@ -127,54 +163,11 @@ def require_unsewn(result: Flattening) -> None:
         )
 
 
-def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
-    """Return the surface with the moved vertices, checked to be the mesh before."""
-    if isinstance(given, Surface):
-        surface = given
-        if len(surface.vertices) != len(before.vertices) or not np.array_equal(surface.faces, before.faces):
-            raise InputError(
-                f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
-                f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
-            )
-        vertices = check_positions(surface.vertices)
-        # Of a surface made by `replace(surface, vertices=...)` what was read has not moved with it.
-        if not np.array_equal(given.input_vertices[given.input_index], vertices):
-            surface = replace(given, input_vertices=_as_read(before, vertices), input_index=before.input_index)
-    else:
-        surface = _with_vertices(before, given)
-        vertices = surface.vertices
-    collapsed = degenerate_faces(vertices, surface.faces, _COLLAPSED)
-    _refuse_faces(surface, collapsed, "has collapsed to a line or a point", "faces need an area")
-    crossed = find_crossed_quads(vertices, surface.faces)
-    _refuse_faces(
-        surface,
-        crossed,
-        "has become a quad whose sides cross, or is folded by more than 90 degrees",
-        "move its vertices along with those around them",
-    )
-    return surface
-
-
 def _refuse_faces(surface: Surface, wrong: NDArray[np.integer], what: str, right: str) -> None:
     if len(wrong):
         corners = ", ".join(str(v) for v in surface.faces[wrong[0]].tolist() if v >= 0)
         more = f" (and {len(wrong) - 1:,} more like it)" if len(wrong) > 1 else ""
         raise InputError(f"piece {surface.name!r}: face {wrong[0]} (vertices {corners}) {what}{more}; {right}")
-
-
-def _with_vertices(before: Surface, given: ArrayLike) -> Surface:
-    try:
-        vertices = check_positions(given)
-    except InputError as error:
-        raise InputError(
-            f"piece {before.name!r}: {error}; give a Surface, or its {len(before.vertices):,} vertices by 3 [m]"
-        ) from None
-    if len(vertices) != len(before.vertices):
-        raise InputError(
-            f"piece {before.name!r} has {len(before.vertices):,} vertices, not {len(vertices):,}: give them all, in the order of its "
-            "surface.vertices, or flatten another mesh afresh"
-        )
-    return replace(before, vertices=vertices, input_vertices=_as_read(before, vertices))
 
 
 def _as_read(before: Surface, vertices: FloatArray) -> FloatArray:

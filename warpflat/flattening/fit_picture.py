@@ -191,9 +191,30 @@ def write_wear_sheet(
         _write_row_label(
             figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15), on_form=bool(on_body)
         )
-        drawn = _draw_row(page, sheet, result, top, height, scales, body)
+        # Draw all maps of a piece side by side.
+        drawn = {}
+        middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
+        inches = (result.positions - middle) * sheet.inches
+        strokes = _Strokes.of(result)
+        for number, name in enumerate((*body, *MAPS)):
+            centre = _LABEL + (number + 0.5) * sheet.column, sheet.size[1] - top - 0.5 * height
+            drawn[name] = _draw_map(page, inches + centre, result, strokes, name, scales[name], body)
         top += height
-    _draw_scales(figure, sheet, top, drawn, scales, limit)
+    # Draw the title of every column, and below the rows its colour scale.
+    for number, name in enumerate(drawn):
+        label, _, unit = _ALL_MAPS[name]
+        x = _LABEL + number * sheet.column
+        figure.text(*sheet.point(x + 0.5 * sheet.column, 0.75), label, ha="center", fontsize=10)
+        axis = figure.add_axes(sheet.box(x + 0.2, top + 0.25, sheet.column - 0.4, 0.13))
+        bar = figure.colorbar(drawn[name], cax=axis, orientation="horizontal", extend=scales[name].extend)
+        bar.ax.tick_params(labelsize=8)
+        bar.ax.locator_params(nbins=5)
+        bar.set_label(unit, fontsize=9)
+        _mark_limit(bar, name, limit, scales[name])
+        if unit == "Pa":
+            above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
+            above.tick_params(labelsize=7)
+            above.set_xlabel("mmHg", fontsize=8)
     unfit = [result.surface.name for result in results if not result.fit.fits]
     word = "lies on the form" if on_body else "fits"
     verdict = (
@@ -256,26 +277,6 @@ class _Sheet:
         return (x / self.size[0], 1.0 - (y + height) / self.size[1], width / self.size[0], height / self.size[1])
 
 
-def _draw_row(
-    page: Axes,
-    sheet: _Sheet,
-    result: Flattening,
-    top: float,
-    height: float,
-    scales: dict[str, _Scale],
-    body: OnBody,
-) -> dict[str, ScalarMappable]:
-    """Draw all maps of a piece side by side."""
-    drawn = {}
-    middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
-    inches = (result.positions - middle) * sheet.inches
-    strokes = _Strokes.of(result)
-    for number, name in enumerate((*body, *MAPS)):
-        centre = _LABEL + (number + 0.5) * sheet.column, sheet.size[1] - top - 0.5 * height
-        drawn[name] = _draw_map(page, inches + centre, result, strokes, name, scales[name], body)
-    return drawn
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Strokes:
     """The edges of a piece that its maps show: of its lines, its border, and what is beyond the cloth's limit; #E by 2 each."""
@@ -292,31 +293,6 @@ class _Strokes:
         return cls(
             lines=np.concatenate([none, *lines]), border=border_edges(faces), beyond=np.concatenate([none, *beyond])
         )
-
-
-def _draw_scales(
-    figure: Figure,
-    sheet: _Sheet,
-    top: float,
-    drawn: dict[str, ScalarMappable],
-    scales: dict[str, _Scale],
-    limit: float,
-) -> None:
-    """Draw the title of every column, and below the rows its colour scale."""
-    for number, name in enumerate(drawn):
-        label, _, unit = _ALL_MAPS[name]
-        x = _LABEL + number * sheet.column
-        figure.text(*sheet.point(x + 0.5 * sheet.column, 0.75), label, ha="center", fontsize=10)
-        axis = figure.add_axes(sheet.box(x + 0.2, top + 0.25, sheet.column - 0.4, 0.13))
-        bar = figure.colorbar(drawn[name], cax=axis, orientation="horizontal", extend=scales[name].extend)
-        bar.ax.tick_params(labelsize=8)
-        bar.ax.locator_params(nbins=5)
-        bar.set_label(unit, fontsize=9)
-        _mark_limit(bar, name, limit, scales[name])
-        if unit == "Pa":
-            above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
-            above.tick_params(labelsize=7)
-            above.set_xlabel("mmHg", fontsize=8)
 
 
 def _to_mmhg(pascals: Any) -> Any:

@@ -79,21 +79,13 @@ def flatten(
     expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
     developed = develop_piece(surface, datum, settings, callback, start)
-    _refuse_unused_stretch(developed)
-    return relax_developed(developed)
-
-
-def _refuse_unused_stretch(piece: DevelopedPiece) -> None:
-    """Refuse a stretch along threads that do not run around the body, which is known once the piece is developed.
-
-    Raises:
-        InputError: there is such a stretch.
-    """
-    wear, notes = piece.task.wear, piece.task.notes
+    # Refuse a stretch along threads that do not run around the body, which is known once the piece is developed.
+    wear, notes = developed.task.wear, developed.task.notes
     unused = [] if wear is None else [unused_stretch(wear, around) for around in ("warp", "weft")]
     for message in unused:
         if message in notes:
-            raise InputError(f"piece {piece.task.surface.name!r}: wear: {message}; leave it out, or the pressure")
+            raise InputError(f"piece {developed.task.surface.name!r}: wear: {message}; leave it out, or the pressure")
+    return relax_developed(developed)
 
 
 def as_surface(surface: Surface | str | Path, units: str | None) -> Surface:

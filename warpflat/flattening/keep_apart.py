@@ -10,7 +10,6 @@ from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
 from warpflat.solver.contact import open_cracks, relax_with_contact, swirl
 from warpflat.solver.grain import grain_alignments
 from warpflat.solver.steps import Relaxation
-from warpflat.solver.stop import Outcome
 from warpflat.surface.connectivity import components_of
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.laplacian import factor_pays
@@ -60,7 +59,16 @@ def keep_apart(
             before = relaxed.model_energy_j
             dear = outcome.energies.potential > (1.0 + task.options.contact_share) * before
             if dear and len(surface.vertices) <= _MOST_SWIRLED:
-                state, outcome = _swirled(state, outcome)
+                # Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be
+                # wound up or unwound.
+                layout = state.positions()
+                for turn in _SWIRLS:
+                    other = Relaxation(
+                        state.network, state.options, start=swirl(layout, turn), alignments=state.alignments
+                    )
+                    wound = relax_with_contact(other, 1e-3 * state.options.gap_mm)
+                    if wound is not None and wound.converged and wound.energies.potential < outcome.energies.potential:
+                        state, outcome = other, wound
             after = outcome.energies.potential
             share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
             task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
@@ -72,17 +80,3 @@ def keep_apart(
             return free, stages
     task.notes.append(f"{words}, and contact could not part it: cut it apart there")
     return free, stages
-
-
-def _swirled(state: Relaxation, outcome: Outcome) -> tuple[Relaxation, Outcome]:
-    """Return the lower end of a relaxation with contact (a state and its outcome) and those that follow from its layout swirled.
-
-    Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be wound up or unwound.
-    """
-    best, layout = (state, outcome), state.positions()
-    for turn in _SWIRLS:
-        other = Relaxation(state.network, state.options, start=swirl(layout, turn), alignments=state.alignments)
-        end = relax_with_contact(other, 1e-3 * state.options.gap_mm)
-        if end is not None and end.converged and end.energies.potential < best[1].energies.potential:
-            best = other, end
-    return best

@@ -273,7 +273,23 @@ class Flattening:
 
     def picture_piece(self) -> PicturePiece:
         """Return the piece's row in a picture."""
-        return _picture_piece(self)
+        from warpflat.export.picture import PicturePiece
+
+        datum = {} if self.datum_name in self.surface.lines else {self.datum_name: self.datum}
+        cut = {int(v) for made in self.cuts for path in made.paths for v in path}
+        lines = {name: line for name, line in self.surface.lines.items() if not cut.issuperset(line.tolist())}
+        return PicturePiece(
+            name=self.surface.name,
+            surface=self.surface,
+            faces=self.faces,
+            positions=self.positions,
+            face_energy_density=self.face_energy_density,
+            lines={**_lines_in_plane(self), **datum},
+            surface_lines={**{**lines, **{f"{made.name} (cut)": list(made.paths) for made in self.cuts}}, **datum},
+            datum=self.datum_name,
+            grain_angle=self.grain_angle,
+            captions=self.captions(),
+        )
 
     def captions(self) -> dict[str, str]:
         """Return the key measures as short texts."""
@@ -331,7 +347,26 @@ def write_files(
     files = [result.write_obj(folder) for result in results]
     if frames:
         with optional_file(folder / "frames.usdc", files) as path:
-            _write_frames(path, results)
+            from warpflat.export.usd import FrameWriter, film_scale
+
+            scale = film_scale(
+                [result.surface for result in results], [result.face_energy_density for result in results]
+            )
+            with FrameWriter(path, scale=scale) as writer:
+                for result in results:
+                    name, surface = result.surface.name, result.surface
+                    writer.add_piece(name, surface)
+                    if not result.cuts:
+                        first = worn_strain(result.network, result.development.positions).energy_density
+                        writer.write(name, positions=result.development.positions, face_energy_density=first)
+                    writer.write(
+                        name,
+                        positions=result.positions,
+                        face_energy_density=result.face_energy_density,
+                        faces=result.faces,
+                        lines=result.network.surface.lines,
+                        cuts={cut.name: [side for s in cut.seams for side in (s.left, s.right)] for cut in result.cuts},
+                    )
     if picture:
         with optional_file(folder / "picture.png", files) as path:
             from warpflat.export.picture import write_picture
@@ -340,68 +375,16 @@ def write_files(
     return files
 
 
-def _picture_piece(result: Flattening) -> PicturePiece:
-    """Return the piece's row in a picture."""
-    from warpflat.export.picture import PicturePiece
-
-    datum = {} if result.datum_name in result.surface.lines else {result.datum_name: result.datum}
-    return PicturePiece(
-        name=result.surface.name,
-        surface=result.surface,
-        faces=result.faces,
-        positions=result.positions,
-        face_energy_density=result.face_energy_density,
-        lines={**_lines_in_plane(result), **datum},
-        surface_lines={**_lines_in_space(result), **datum},
-        datum=result.datum_name,
-        grain_angle=result.grain_angle,
-        captions=result.captions(),
-    )
-
-
-def _lines_in_space(result: Flattening) -> dict[str, Any]:
-    """Return the lines that are drawn on the surface: those that are not cut, and the cuts."""
-    cut = {int(v) for made in result.cuts for path in made.paths for v in path}
-    lines = {name: line for name, line in result.surface.lines.items() if not cut.issuperset(line.tolist())}
-    return {**lines, **{f"{made.name} (cut)": list(made.paths) for made in result.cuts}}
-
-
 def _lines_in_plane(result: Flattening) -> dict[str, Any]:
     """Return the lines that are drawn in the pattern; cuts show as cracks there."""
     own, grain = result.surface.lines, result.datum_name
     lines: dict[str, Any] = {
         name: line
         for name, line in result.network.surface.lines.items()
-        if not result.cuts or not _runs_along_cut(name, own)
+        if not result.cuts or name in own or not (".left" in name or ".right" in name)
     }
     if grain in own and grain not in lines:
         # A cut has parted the datum: its parts are drawn as one line.
         parts = [name for name in lines if name.startswith(f"{grain}.")]
         lines[grain] = [lines.pop(name) for name in parts] or result.datum
     return lines
-
-
-def _runs_along_cut(name: str, own: Mapping[str, Any]) -> bool:
-    """Return whether a line of the cut surface is one side of a crack, which the outline shows already."""
-    return name not in own and (".left" in name or ".right" in name)
-
-
-def _write_frames(path: Path, results: Sequence[Flattening]) -> None:
-    from warpflat.export.usd import FrameWriter, film_scale
-
-    scale = film_scale([result.surface for result in results], [result.face_energy_density for result in results])
-    with FrameWriter(path, scale=scale) as writer:
-        for result in results:
-            name, surface = result.surface.name, result.surface
-            writer.add_piece(name, surface)
-            if not result.cuts:
-                first = worn_strain(result.network, result.development.positions).energy_density
-                writer.write(name, positions=result.development.positions, face_energy_density=first)
-            writer.write(
-                name,
-                positions=result.positions,
-                face_energy_density=result.face_energy_density,
-                faces=result.faces,
-                lines=result.network.surface.lines,
-                cuts={cut.name: [side for s in cut.seams for side in (s.left, s.right)] for cut in result.cuts},
-            )

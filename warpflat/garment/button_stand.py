@@ -109,8 +109,19 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         new = [stand, step, replace(edge, points=_turned(rest, down), vertices=None)]
     edges[at : at + 1] = new if down else new[::-1]
     edges = [own.get(each.name, each) for each in edges]
-    lines = _inside(piece, name, top, top + min(end, edge.length) * along)
-    return _marked(replace(piece, edges=edges, internal_lines=lines), opening, top, along, out, depths)
+    lines = dict(piece.internal_lines)
+    lines = {find_unused_name(name, lines): np.array([top, (top + min(end, edge.length) * along)]), **lines}
+    # A mark for each button, and a line for each buttonhole across the stand.
+    assert opening.buttons is not None
+    marks = dict(piece.marks)
+    for depth in depths:
+        centre = top + depth * along
+        marks[find_unused_name("button", marks)] = centre
+        ends = centre + np.outer([_SHANK, _SHANK - opening.buttons.diameter - _THICKNESS], out)
+        lines[find_unused_name("buttonhole", lines)] = ends
+        for end in ends:
+            lines[find_unused_name("buttonhole end", lines)] = end + np.outer([-_BAR, _BAR], along)
+    return replace(piece, edges=edges, internal_lines=lines, marks=marks)
 
 
 def _turned(points: FloatArray | list[FloatArray], down: bool) -> FloatArray:
@@ -131,28 +142,6 @@ def _mirrored(points: FloatArray, corner: FloatArray, out: FloatArray, width: fl
     # The stand is as wide everywhere.
     end += (width - (end - corner) @ out)[:, None] * out
     return np.vstack([corner, kept[1:], end])
-
-
-def _inside(piece: Piece, name: str, top: FloatArray, low: FloatArray) -> dict[str, FloatArray]:
-    """Return the lines inside with that of the former edge."""
-    lines = dict(piece.internal_lines)
-    return {find_unused_name(name, lines): np.array([top, low]), **lines}
-
-
-def _marked(
-    piece: Piece, opening: Opening, top: FloatArray, along: FloatArray, out: FloatArray, depths: FloatArray
-) -> Piece:
-    """Return a piece with a mark for each button, and a line for each buttonhole across the stand."""
-    assert opening.buttons is not None
-    lines, marks = dict(piece.internal_lines), dict(piece.marks)
-    for depth in depths:
-        centre = top + depth * along
-        marks[find_unused_name("button", marks)] = centre
-        ends = centre + np.outer([_SHANK, _SHANK - opening.buttons.diameter - _THICKNESS], out)
-        lines[find_unused_name("buttonhole", lines)] = ends
-        for end in ends:
-            lines[find_unused_name("buttonhole end", lines)] = end + np.outer([-_BAR, _BAR], along)
-    return replace(piece, internal_lines=lines, marks=marks)
 
 
 def bust_depth(piece: Piece, name: str, top_first: bool) -> float | None:

@@ -197,11 +197,19 @@ def equations_of_constraint(
     if isinstance(constraint, DrawnLine):
         return shape_equations(constraint.vertices, constraint.shape), False
     surface = piece.network.surface
-    line = _line(constraint, piece)
+    lines = piece.network.surface.lines
+    if constraint.line not in lines:
+        raise InputError(
+            f"piece {constraint.piece!r} has no line {constraint.line!r}; {nearest(constraint.line, lines)}"
+        )
+    line = np.asarray(lines[constraint.line], dtype=np.int32)
+    if len(line) < 2:
+        raise InputError(f"{constraint.name}: the line has {len(line)} vertex; it needs two or more")
     if isinstance(constraint, FixedLength):
         lengths = segment_lengths(surface.vertices[line])
         if constraint.length is not None:
-            there = lengths.sum() * (2.0 if _crosses_fold(fold, line) else 1.0)
+            on_fold = np.isin(line, [] if fold is None else fold)
+            there = lengths.sum() * (2.0 if bool((on_fold[0] or on_fold[-1]) and not on_fold.all()) else 1.0)
             lengths = lengths * (constraint.length / there)
         return one_group(length_equations(line, lengths), smooth_equations(line, piece.positions, fold)), False
     if line[0] == line[-1]:
@@ -240,25 +248,6 @@ def _mouth_equations(constraint: DartMouth, piece: Flattening) -> ConstraintEqua
     if constraint.width is not None:
         return length_equations(mouths[0], np.array([constraint.width]))
     return seam_equations(mouths[0], mouths[1])
-
-
-def _crosses_fold(fold: IntArray | None, line: IntArray) -> bool:
-    """Return whether a line ends on the fold, and does not run along it."""
-    on_fold = np.isin(line, [] if fold is None else fold)
-    return bool((on_fold[0] or on_fold[-1]) and not on_fold.all())
-
-
-def _line(constraint: FixedLength | Straight | Symmetric, piece: Flattening) -> IntArray:
-    """Return the vertices of a constraint's line."""
-    lines = piece.network.surface.lines
-    if constraint.line not in lines:
-        raise InputError(
-            f"piece {constraint.piece!r} has no line {constraint.line!r}; {nearest(constraint.line, lines)}"
-        )
-    line = np.asarray(lines[constraint.line], dtype=np.int32)
-    if len(line) < 2:
-        raise InputError(f"{constraint.name}: the line has {len(line)} vertex; it needs two or more")
-    return line
 
 
 def find_piece(constraint: PieceConstraint, pieces: Mapping[str, Flattening]) -> Flattening:

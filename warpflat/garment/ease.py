@@ -89,7 +89,14 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
     edge_ratios: dict[int, tuple[FloatArray, ...]] = {}
     caps = {name: seam for name, seam in by_name.items() if _is_cap(form, seam)}
     for wish in wishes:
-        name = _seam_name(wish, by_name, also, ease)
+        # The pattern's name of the seam that a wish is about; the form's names are accepted too.
+        name = wish.name if wish.name in by_name else also.get(wish.name, "")
+        if not name:
+            raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
+        if name in ease:
+            raise InputError(f"seam {name!r} is named twice; give its fullness or gather once")
+        if not 1.0 <= wish.factor <= 5.0:
+            raise InputError(f"seam {name!r}: one side is {wish.factor:g} times as long as the other; must be 1 to 5")
         longer = _longer_side(by_name[name], wish.longer)
         ease[name] = wish.factor - 1.0 if longer == 1 else 1.0 / wish.factor - 1.0
         for number, (seam, first_side) in enumerate(plan.of_form):
@@ -102,7 +109,19 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
             here = form.seams[number]
             if wish.upper and name in caps and longer == 1 and not wish.gathered:
                 eased[name] = CAP_PART
-                factors, edges = _upper_factors(form, number, side, wish.factor)
+                # By what factors the mesh edges of each run of a cap's seam are longer than the armhole's, and where
+                # it is full.
+                factors, edges = list[FloatArray](), list[FullEdge]()
+                piece = form.pieces[here.pieces[side]]
+                for run in here.runs:
+                    cap, row = piece.edges[run.edges[side]], run.vertices[side]
+                    shares = _shares(piece, cap)
+                    part = _part(shares)
+                    place = dict(zip(cap.tolist(), shares.tolist(), strict=True))
+                    share = np.array([place[vertex] for vertex in row.tolist()])
+                    factors.append(_factors(share, wish.factor, part))
+                    upper = row[(share >= part[0]) & (share <= part[1])]
+                    edges.append(FullEdge(vertices=upper, factor=_upper_factor(wish.factor, part), gathered=False))
                 edge_ratios[number] = tuple(each if side == 0 else 1.0 / each for each in factors)
                 full.setdefault(here.pieces[side], []).extend(edges)
                 continue
@@ -133,43 +152,6 @@ def _is_cap(form: FormResult, seam: Seam) -> bool:
     (cap,) = seam.sides[1]
     hole, _, side = cap.edge.partition(" ")
     return hole == "armhole" and f"underarm {side}" in form.pieces[cap.piece].edges
-
-
-def _upper_factors(form: FormResult, number: int, side: int, factor: float) -> tuple[list[FloatArray], list[FullEdge]]:
-    """Return by what factors the mesh edges of each run of a cap's seam are longer than the armhole's, and where it is full.
-
-    Args:
-        form: with the seam.
-        number: of the form's seam, along a part of the cap.
-        side: the cap's, 0 or 1.
-        factor: length of the whole cap over that of the armhole.
-    """
-    seam, factors, edges = form.seams[number], list[FloatArray](), list[FullEdge]()
-    piece = form.pieces[seam.pieces[side]]
-    for run in seam.runs:
-        cap, row = piece.edges[run.edges[side]], run.vertices[side]
-        shares = _shares(piece, cap)
-        part = _part(shares)
-        place = dict(zip(cap.tolist(), shares.tolist(), strict=True))
-        share = np.array([place[vertex] for vertex in row.tolist()])
-        factors.append(_factors(share, factor, part))
-        upper = row[(share >= part[0]) & (share <= part[1])]
-        edges.append(FullEdge(vertices=upper, factor=_upper_factor(factor, part), gathered=False))
-    return factors, edges
-
-
-def _seam_name(
-    wish: SeamWish, by_name: Mapping[str, Seam], form_names: Mapping[str, str], done: Mapping[str, float]
-) -> str:
-    """Return the pattern's name of the seam that a wish is about; the form's names are accepted too."""
-    name = wish.name if wish.name in by_name else form_names.get(wish.name, "")
-    if not name:
-        raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
-    if name in done:
-        raise InputError(f"seam {name!r} is named twice; give its fullness or gather once")
-    if not 1.0 <= wish.factor <= 5.0:
-        raise InputError(f"seam {name!r}: one side is {wish.factor:g} times as long as the other; must be 1 to 5")
-    return name
 
 
 def _longer_side(seam: Seam, longer: str | None) -> int:

@@ -215,7 +215,15 @@ def facing_edges(piece: Piece, chain: Sequence[str], width: float, *, around: Fl
     inner = inner[(near > 0.25 * width) & shapely.contains(body, shapely.points(inner))]
     inner = np.vstack([last[-1:], inner, first[:1]])
     if around is not None:
-        inner = _reaching_around(np.concatenate([line[:-1], last[:-1], inner[:-1], first[:-1]]), inner, around, width)
+        # The inner edge of a facing that is made larger around a line.
+        outline = np.concatenate([line[:-1], last[:-1], inner[:-1], first[:-1]])
+        tongue = shapely.LineString(around).buffer(0.6 * width)
+        # Rounded where the tongue leaves the strip.
+        whole = shapely.union_all([shapely.Polygon(outline), tongue]).buffer(_ROUND).buffer(-_ROUND)
+        ring = np.asarray(shapely.orient_polygons(whole).exterior.coords)[:-1]
+        start, end = (int(np.linalg.norm(ring - point, axis=1).argmin()) for point in (inner[0], inner[-1]))
+        count = (end - start) % len(ring)
+        inner = np.vstack([inner[:1], np.roll(ring, -start, axis=0)[1:count], inner[-1:]])
     return [
         *(replace(edge, vertices=None) for edge in edges),
         replace(after, points=last, vertices=None),
@@ -229,19 +237,6 @@ def _prolonged(edge: Edge, width: float, *, forward: bool) -> Edge:
     outer, inner = (edge.points[0], edge.points[-1]) if forward else (edge.points[-1], edge.points[0])
     far = outer + (inner - outer) / np.linalg.norm(inner - outer) * (width + 1e-3)
     return replace(edge, points=np.array([outer, far] if forward else [far, outer]))
-
-
-def _reaching_around(outline: FloatArray, inner: FloatArray, around: FloatArray, width: float) -> FloatArray:
-    """Return the inner edge of a facing that is made larger around a line."""
-    import shapely
-
-    tongue = shapely.LineString(around).buffer(0.6 * width)
-    # Rounded where the tongue leaves the strip.
-    whole = shapely.union_all([shapely.Polygon(outline), tongue]).buffer(_ROUND).buffer(-_ROUND)
-    ring = np.asarray(shapely.orient_polygons(whole).exterior.coords)[:-1]
-    start, end = (int(np.linalg.norm(ring - point, axis=1).argmin()) for point in (inner[0], inner[-1]))
-    count = (end - start) % len(ring)
-    return np.vstack([inner[:1], np.roll(ring, -start, axis=0)[1:count], inner[-1:]])
 
 
 def _start(points: FloatArray, length: float, beside: Edge) -> FloatArray:
@@ -260,9 +255,14 @@ def _start(points: FloatArray, length: float, beside: Edge) -> FloatArray:
 def _facing_piece(piece: Piece, edges: Sequence[Edge], title: str) -> Piece:
     """Return a facing as a piece of its own."""
     try:
+        # A grain line of the piece's direction in the middle of a facing's outline.
+        grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
+        along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+        inner = next(edge for edge in edges if edge.name == INNER)
+        middle = np.concatenate([edges[0].points, inner.points]).mean(axis=0)
         return Piece(
             name=title, size=piece.size, fabric=piece.fabric, quantity=piece.quantity, edges=edges, paired=piece.paired,
-            grain=_grain(edges, piece),
+            grain=middle + np.outer([-0.02, 0.02], along),
             role="facing", internal_lines={key: line for key, line in piece.internal_lines.items() if key.startswith("keyhole")},
         )  # fmt: skip
     except InputError:
@@ -290,12 +290,3 @@ def _folded_over(piece: Piece, fold: str, edges: Sequence[Edge], *, sewn: bool =
         own += mirrored if edge.name == fold else [edge]
     name = find_unused_name("fold line", piece.internal_lines)
     return replace(piece, edges=own, internal_lines={**piece.internal_lines, name: line})
-
-
-def _grain(edges: Sequence[Edge], piece: Piece) -> FloatArray:
-    """Return a grain line of the piece's direction in the middle of a facing's outline."""
-    grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
-    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
-    inner = next(edge for edge in edges if edge.name == INNER)
-    middle = np.concatenate([edges[0].points, inner.points]).mean(axis=0)
-    return middle + np.outer([-0.02, 0.02], along)

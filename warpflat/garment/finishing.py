@@ -72,38 +72,39 @@ def finish_edges(
             elif wish.shaped:
                 pattern = with_shaped_waistband(pattern, found, wish.width, gaps=gaps)
             else:
-                pattern = _with_strip(pattern, wish, free_chain(pattern, found, gaps))
+                chain = free_chain(pattern, found, gaps)
+                name = find_unused_name(wish.name, {piece.name for piece in pattern.pieces[pattern.sample]})
+                sided = any(without_side(side.edge) != side.edge for side in chain.sides)
+                ring = chain.closed and not wish.overlap
+                pieces = {}
+                for size, row in pattern.pieces.items():
+                    length = wish.share * sum(
+                        pattern.piece(side.piece, size).edge(side.edge).length for side in chain.sides
+                    )
+                    strip = _strip(wish, name, length, row[0], quantity=2 if sided else 1, ring=ring)
+                    pieces[size] = (*row, strip)
+                taken = {seam.name for seam in pattern.seams}
+                words = name.replace("_", " ")
+                seams = [
+                    *pattern.seams,
+                    Seam(
+                        name=find_unused_name(words, taken), sides=((SeamSide(piece=name, edge="lower"),), chain.sides),
+                        ease=1.0 / wish.share - 1.0, notches=None if sided else _centres(pattern, chain),
+                    ),
+                ]  # fmt: skip
+                if ring:
+                    ends = (
+                        (SeamSide(piece=name, edge="right end"),),
+                        (SeamSide(piece=name, edge="left end", reversed=True),),
+                    )
+                    seams.append(Seam(name=find_unused_name(f"{words} ends", taken), sides=ends))
+                pattern = replace(pattern, pieces=pieces, seams=seams)
         except InputError as error:
             raise InputError(f"finishing[{number}]: {error}") from None
     sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
     edges = {piece.name: {edge.name for edge in piece.edges} for piece in pattern.pieces[pattern.sample]}
     left = [each for each in stands if each.edge in edges[each.piece] and (each.piece, each.edge) not in sewn]
     return with_stand_facings(pattern, left)
-
-
-def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain) -> Pattern:
-    """Return a pattern with a straight strip along a chain of free edges."""
-    name = find_unused_name(wish.name, {piece.name for piece in pattern.pieces[pattern.sample]})
-    sided = any(without_side(side.edge) != side.edge for side in chain.sides)
-    ring = chain.closed and not wish.overlap
-    pieces = {}
-    for size, row in pattern.pieces.items():
-        length = wish.share * sum(pattern.piece(side.piece, size).edge(side.edge).length for side in chain.sides)
-        strip = _strip(wish, name, length, row[0], quantity=2 if sided else 1, ring=ring)
-        pieces[size] = (*row, strip)
-    taken = {seam.name for seam in pattern.seams}
-    words = name.replace("_", " ")
-    seams = [
-        *pattern.seams,
-        Seam(
-            name=find_unused_name(words, taken), sides=((SeamSide(piece=name, edge="lower"),), chain.sides),
-            ease=1.0 / wish.share - 1.0, notches=None if sided else _centres(pattern, chain),
-        ),
-    ]  # fmt: skip
-    if ring:
-        ends = (SeamSide(piece=name, edge="right end"),), (SeamSide(piece=name, edge="left end", reversed=True),)
-        seams.append(Seam(name=find_unused_name(f"{words} ends", taken), sides=ends))
-    return replace(pattern, pieces=pieces, seams=seams)
 
 
 def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:

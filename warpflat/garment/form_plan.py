@@ -252,7 +252,15 @@ def _plan_seams(
             for s in stretches
         )
 
-    of_hubs = _hub_names(form, sewing)
+    # The names of seams that are several of the form's: that of the whole edge, "armhole left".
+    parts: dict[Place, set[str]] = {}
+    for number, both in enumerate(sewing.sides):
+        for around_hub in [side[0].place for side in both if side[0].place in sewing.hubs][:1]:
+            parts.setdefault(around_hub, set()).add(form.seams[number].name)
+    of_hubs: dict[Place, str] = {}
+    for around_hub, joined in parts.items():
+        others = {seam.name for seam in form.seams} - joined
+        of_hubs[around_hub] = find_unused_name(around_hub[1], others | set(of_hubs.values()))
     seams: dict[Place | int, Seam] = {}
     of_form: list[tuple[Place | int, int]] = []
     for number, both in enumerate(sewing.sides):
@@ -278,19 +286,6 @@ def _plan_seams(
         if name not in known:
             raise InputError(f"ease: there is no seam {name!r}; {nearest(name, known)}")
     return tuple(seams.values()), tuple((seams[key], side) for key, side in of_form)
-
-
-def _hub_names(form: FormResult, sewing: _FormSeams) -> dict[Place, str]:
-    """Return the names of seams that are several of the form's: that of the whole edge, "armhole left"."""
-    parts: dict[Place, set[str]] = {}
-    for number, both in enumerate(sewing.sides):
-        for hub in [side[0].place for side in both if side[0].place in sewing.hubs][:1]:
-            parts.setdefault(hub, set()).add(form.seams[number].name)
-    names: dict[Place, str] = {}
-    for place, own in parts.items():
-        others = {seam.name for seam in form.seams} - own
-        names[place] = find_unused_name(place[1], others | set(names.values()))
-    return names
 
 
 def _lowest_edge(form: FormResult, name: str, sewing: _FormSeams) -> str | None:

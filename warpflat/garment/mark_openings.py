@@ -50,7 +50,11 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
             if end <= begin:
                 continue
             if opening.kind == "keyhole":
-                pattern = _with_keyhole(pattern, opening, part.piece)
+                pieces = {
+                    size: [_keyhole(piece, opening) if piece.name == part.piece else piece for piece in row]
+                    for size, row in pattern.pieces.items()
+                }
+                pattern = replace(pattern, pieces=pieces)
                 continue
             seam = next((each for each in pattern.seams if each.name == part.seam), None)
             if seam is None:
@@ -60,7 +64,25 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
             elif opening.kind == "buttons":
                 pattern = _with_buttons(pattern, seam, opening, number, placed)
             else:
-                pattern = _with_slit(pattern, seam, opening, number, placed)
+                sides = [side for row in seam.sides for side in row]
+                if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
+                    raise InputError(
+                        f"openings[{number}]: a {opening.kind} begins at the lower end of a seam between two edges"
+                    )
+                pieces = {size: list(row) for size, row in pattern.pieces.items()}
+                for size in pieces:
+                    part = _part_of(placed, size, number, seam.name)
+                    if part.whole - opening.length < _LEAST_SEWN:
+                        raise InputError(
+                            f"openings[{number}]: a {opening.kind} of {1e3 * opening.length:.0f} mm leaves nothing of the "
+                            f"seam {seam.name!r}, {1e3 * part.whole:.0f} mm long; make it shorter, or leave the seam out of the form"
+                        )
+                    for side in (side for side in sides if not side.mirrored):
+                        pieces[size] = [
+                            _with_free_end(piece, side.edge, opening) if piece.name == side.piece else piece
+                            for piece in pieces[size]
+                        ]
+                pattern = replace(pattern, pieces=pieces)
     return pattern
 
 
@@ -91,8 +113,12 @@ def _with_zip(
     for size in pieces:
         part = _part_of(placed, size, number, seam.name)
         share = _reach(opening, part)[1] / part.whole
+        side = seam.sides[0][0]
+        piece = pattern.piece(side.piece, pattern.sample)
         by_size[size] = with_notches(
-            seam.of_size(size), [share if _starts_on_top(pattern, seam) else 1.0 - share], part.whole
+            seam.of_size(size),
+            [share if (_runs_down(piece, piece.edge(side.edge).points) != side.reversed) else 1.0 - share],
+            part.whole,
         )
     own = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
     return replace(pattern, pieces=pieces, seams=[own if each.name == seam.name else each for each in pattern.seams])
@@ -110,13 +136,6 @@ def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[flo
     own = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
     kept = [each for each in own if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
     return tuple(sorted([*shares, *kept]))
-
-
-def _starts_on_top(pattern: Pattern, seam: Seam) -> bool:
-    """Return whether a seam's first side begins at its upper end."""
-    side = seam.sides[0][0]
-    piece = pattern.piece(side.piece, pattern.sample)
-    return _runs_down(piece, piece.edge(side.edge).points) != side.reversed
 
 
 def _runs_down(piece: Piece, points: FloatArray) -> bool:
@@ -174,15 +193,6 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, p
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def _with_keyhole(pattern: Pattern, opening: Opening, name: str) -> Pattern:
-    """Return a pattern with a keyhole drawn on one piece: its slit, its round end, its button and loop."""
-    pieces = {
-        size: [_keyhole(piece, opening) if piece.name == name else piece for piece in row]
-        for size, row in pattern.pieces.items()
-    }
-    return replace(pattern, pieces=pieces)
-
-
 def _keyhole(piece: Piece, opening: Opening) -> Piece:
     import shapely
 
@@ -212,26 +222,6 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     button = slit[0] + 0.010 * along + (half + 0.008) * across
     marks = {**piece.marks, "button": button} if body.contains(shapely.Point(button)) else dict(piece.marks)
     return replace(piece, internal_lines=lines, marks=marks)
-
-
-def _with_slit(pattern: Pattern, seam: Seam, opening: Opening, number: int, placed: Placed) -> Pattern:
-    sides = [side for row in seam.sides for side in row]
-    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
-        raise InputError(f"openings[{number}]: a {opening.kind} begins at the lower end of a seam between two edges")
-    pieces = dict(pattern.pieces)
-    for size in pieces:
-        part = _part_of(placed, size, number, seam.name)
-        if part.whole - opening.length < _LEAST_SEWN:
-            raise InputError(
-                f"openings[{number}]: a {opening.kind} of {1e3 * opening.length:.0f} mm leaves nothing of the seam {seam.name!r}, "
-                f"{1e3 * part.whole:.0f} mm long; make it shorter, or leave the seam out of the form"
-            )
-        for side in (side for side in sides if not side.mirrored):
-            pieces[size] = [
-                _with_free_end(piece, side.edge, opening) if piece.name == side.piece else piece
-                for piece in pieces[size]
-            ]
-    return replace(pattern, pieces=pieces)
 
 
 def _with_free_end(piece: Piece, name: str, opening: Opening) -> Piece:

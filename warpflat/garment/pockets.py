@@ -93,7 +93,23 @@ def _with_patch(pattern: Pattern, pocket: Pocket) -> Pattern:
                 )
             made.append(replace(piece, internal_lines=lines, marks=marks))
             count *= piece.quantity * (2 if piece.on_fold else 1)
-        made.append(_patch(pocket, title, next(p for p in row if p.name == pocket.where), count))
+        # The piece of a patch pocket.
+        like = next(p for p in row if p.name == pocket.where)
+        half, low = 0.5 * pocket.width, -pocket.height
+        corners = np.array([(half, 0.0), (-half, 0.0), (-half, low), (0.0, low - _POINT), (half, low)])
+        names = ["upper", "left side", "lower left", "lower right", "right side"]
+        edges = [
+            Edge(
+                name=name, points=corners[[k, (k + 1) % 5]], kind="hem" if k == 0 else "cut",
+                allowance=_HEM if k == 0 else 0.010,
+            )
+            for k, name in enumerate(names)
+        ]  # fmt: skip
+        made.append(
+            Piece(
+                name=title, size=like.size, fabric=like.fabric, quantity=count, edges=edges, role="pocket", paired=False
+            )
+        )
         pieces[size] = made
     return replace(pattern, pieces=pieces)
 
@@ -125,23 +141,6 @@ def _places(piece: Piece, pocket: Pocket) -> list[FloatArray]:
     return found
 
 
-def _patch(pocket: Pocket, title: str, like: Piece, count: int) -> Piece:
-    """Return the piece of a patch pocket."""
-    half, low = 0.5 * pocket.width, -pocket.height
-    corners = np.array([(half, 0.0), (-half, 0.0), (-half, low), (0.0, low - _POINT), (half, low)])
-    names = ["upper", "left side", "lower left", "lower right", "right side"]
-    edges = [
-        Edge(
-            name=name, points=corners[[k, (k + 1) % 5]], kind="hem" if k == 0 else "cut",
-            allowance=_HEM if k == 0 else 0.010,
-        )
-        for k, name in enumerate(names)
-    ]  # fmt: skip
-    return Piece(
-        name=title, size=like.size, fabric=like.fabric, quantity=count, edges=edges, role="pocket", paired=False
-    )
-
-
 def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
     """Return a pattern with the bags of a pocket in a seam, and on the other side's too, and notches where they open."""
     names = {pocket.where, other_side(pocket.where)}
@@ -159,7 +158,37 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
     for size, row in pattern.pieces.items():
         side = own[0].sides[0][0]
         piece = next(each for each in row if each.name == side.piece)
-        pieces[size] = (*row, _bag(piece, side, pocket, title, both))
+        # A bag: its straight edge along the seam, its rim deeper below the opening than above.
+        points, _ = _downwards(piece, side)
+        start = max(0.0, pocket.below - _PAST)
+        edge = points_at_lengths(points, np.array([start, pocket.below + pocket.height + _PAST]))
+        length = float(np.linalg.norm(edge[1] - edge[0]))
+        deep = pocket.width
+        # In the bag's own frame the seam runs upwards along x = 0, the cloth lies to its left.
+        turn = np.linspace(0.0, np.pi / 2, 9)
+        low = -0.35 * length
+        radius = min(0.4 * deep, 0.4 * length)
+        upper = np.array([-deep + radius, length - radius]) + radius * np.column_stack([-np.sin(turn), np.cos(turn)])
+        lower = np.array([-deep + radius, low + radius]) + radius * np.column_stack([-np.cos(turn), -np.sin(turn)])
+        around = np.vstack([[0.0, length], upper, lower, [-0.02, low], [0.0, 0.0]])
+        past = pocket.below - start
+        ends = {"pocket opening": length - past, "pocket opening end": length - past - pocket.height}
+        pieces[size] = (
+            *row,
+            Piece(
+                name=title,
+                size=piece.size,
+                fabric=piece.fabric,
+                quantity=both,
+                role="pocket",
+                edges=[
+                    Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=0.010),
+                    Edge(name="rim", points=around),
+                ],
+                internal_lines={name: np.array([[-0.012, y], [0.0, y]]) for name, y in ends.items()},
+                grain=np.array([[-0.5 * deep, 0.1 * length], [-0.5 * deep, 0.7 * length]]),
+            ),
+        )
     rim = SeamSide(piece=title, edge="rim")
     words = find_unused_name("pocket bag", {seam.name for seam in seams})
     seams.append(Seam(name=words, sides=((rim,), (replace(rim, mirrored=True),))))
@@ -192,30 +221,3 @@ def _with_opening(pattern: Pattern, seam: Seam, pocket: Pocket) -> Seam:
         shares = ends / whole if with_seam else 1.0 - ends / whole
         by_size[size] = with_notches(seam.of_size(size), shares.tolist(), whole)
     return replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
-
-
-def _bag(piece: Piece, side: SeamSide, pocket: Pocket, title: str, quantity: int) -> Piece:
-    """Return a bag: its straight edge along the seam, its rim deeper below the opening than above."""
-    points, _ = _downwards(piece, side)
-    start = max(0.0, pocket.below - _PAST)
-    edge = points_at_lengths(points, np.array([start, pocket.below + pocket.height + _PAST]))
-    length = float(np.linalg.norm(edge[1] - edge[0]))
-    deep = pocket.width
-    # In the bag's own frame the seam runs upwards along x = 0, the cloth lies to its left.
-    turn = np.linspace(0.0, np.pi / 2, 9)
-    low = -0.35 * length
-    radius = min(0.4 * deep, 0.4 * length)
-    upper = np.array([-deep + radius, length - radius]) + radius * np.column_stack([-np.sin(turn), np.cos(turn)])
-    lower = np.array([-deep + radius, low + radius]) + radius * np.column_stack([-np.cos(turn), -np.sin(turn)])
-    rim = np.vstack([[0.0, length], upper, lower, [-0.02, low], [0.0, 0.0]])
-    past = pocket.below - start
-    ends = {"pocket opening": length - past, "pocket opening end": length - past - pocket.height}
-    return Piece(
-        name=title, size=piece.size, fabric=piece.fabric, quantity=quantity, role="pocket",
-        edges=[
-            Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=0.010),
-            Edge(name="rim", points=rim),
-        ],
-        internal_lines={name: np.array([[-0.012, y], [0.0, y]]) for name, y in ends.items()},
-        grain=np.array([[-0.5 * deep, 0.1 * length], [-0.5 * deep, 0.7 * length]]),
-    )  # fmt: skip

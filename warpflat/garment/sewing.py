@@ -171,7 +171,14 @@ def sew(
             target=equations.target,
             lever=equations.lever,
         )
-        _set_offsets(network, equations, kinds, offsets or {})
+        # Begin with the offsets that are known of the same equations.
+        known = offsets or {}
+        assert network.seams is not None
+        offset = network.seams.offset.numpy().copy()
+        for key, own in _held(equations, kinds):
+            if len(known.get(key, ())) == len(own):
+                offset[own] = known[key]
+        network.seams.offset.assign(offset)
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
     alignments = [
         part
@@ -223,21 +230,6 @@ def _held(
     lasting = (equations.soft == 0) | (equations.share > 0)
     for number, (name, kind) in enumerate(kinds):
         yield (kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32)
-
-
-def _set_offsets(
-    network: SpringNetwork,
-    equations: ConstraintEquations,
-    kinds: Sequence[tuple[str, str]],
-    known: Mapping[tuple[str, str], FloatArray],
-) -> None:
-    """Begin with the offsets that are known of the same equations."""
-    assert network.seams is not None
-    offset = network.seams.offset.numpy().copy()
-    for key, own in _held(equations, kinds):
-        if len(known.get(key, ())) == len(own):
-            offset[own] = known[key]
-    network.seams.offset.assign(offset)
 
 
 def _offsets(

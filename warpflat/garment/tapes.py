@@ -131,7 +131,9 @@ def stretch_tape(points: FloatArray, axis: FloatArray = UPRIGHT) -> Tape:
     """
     from scipy.spatial import ConvexHull
 
-    flat = points @ _plane(axis)
+    across = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    flat = points @ np.column_stack([across, np.cross(axis, across)])
     # In a hull's own order around, the vertices of a simple row come as they come in the row.
     held = np.sort(ConvexHull(flat).vertices)
     along = np.concatenate([[0.0], np.cumsum(segment_lengths(flat, closed=True))])
@@ -155,10 +157,3 @@ def stretch_tape(points: FloatArray, axis: FloatArray = UPRIGHT) -> Tape:
     low, high = (np.maximum(0.5 * side, SKIN_LENGTH) for side in (np.roll(edges, 1), edges))
     change = np.interp(places + high, where, angle) - np.interp(places - low, where, angle)
     return Tape(edges=edges, curvature=np.maximum(np.sign(turn) * change / (low + high), 0.0))
-
-
-def _plane(axis: FloatArray) -> FloatArray:
-    """Return two unit vectors across an axis, 3 by 2."""
-    across = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 0.0, 1.0])
-    across /= np.linalg.norm(across)
-    return np.column_stack([across, np.cross(axis, across)])

@@ -31,9 +31,9 @@ from warpflat.garment.openings import one_sided, place_opening
 from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import MeshFeatures, inner_stretches, line_labels, piece_from_mesh
-from warpflat.pattern.label import default_grain
 from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.placement import default_grain
 from warpflat.surface.border_seams import SAME_PLACE
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.cut.dart import fish_eye_measure

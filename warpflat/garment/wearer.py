@@ -212,7 +212,13 @@ def _rows(mannequin: Mannequin) -> Iterator[tuple[tuple[str, str], IntArray, dic
             centres = mannequin.vertices[grid].mean(axis=1)
             away = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))])
             for row in range(first, len(grid)):
-                yield _row_name(levels, row, -away), grid[row], sides, _axis(mannequin.vertices[grid[row]])
+                points = mannequin.vertices[grid[row]]
+                yield (
+                    _row_name(levels, row, -away),
+                    grid[row],
+                    sides,
+                    np.asarray(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2]),
+                )
 
 
 def _row_name(levels: Mapping[str, int], row: int, heights: FloatArray) -> tuple[str, str]:
@@ -223,11 +229,6 @@ def _row_name(levels: Mapping[str, int], row: int, heights: FloatArray) -> tuple
         nearest if abs(away) < _AT_LEVEL else f"{1e3 * abs(away):.0f} mm {'above' if away > 0.0 else 'below'} {nearest}"
     )
     return nearest if levels[nearest] == row else "", place
-
-
-def _axis(points: FloatArray) -> FloatArray:
-    """Return the unit normal of the plane nearest to some points (#P by 3)."""
-    return np.asarray(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][2])
 
 
 def _by_face(layout: Layout, form: FormResult, rows: list[_Row]) -> dict[str, BodyFit]:

@@ -124,7 +124,31 @@ def place_darts(
         where = f"dart {dart.name!r}"
         if dart.piece not in cloths:
             raise InputError(f"{where}: no piece {dart.piece!r}; {nearest(dart.piece, cloths)}")
-        placed = _place(layout, vertices, cloths[dart.piece], dart)
+        cloth = cloths[dart.piece]
+        run = _longest_run(_grid_line(layout, dart), cloth)
+        if not run or not {run[0], run[-1]} & cloth.border:
+            raise InputError(f"{where}: line {dart.line!r} does not run from the border into piece {dart.piece!r}")
+        point: int | None = None
+        if dart.part is not None:
+            row = _part_of(vertices, run, dart)
+        elif dart.at is None and (waist := _waist_of_fisheye(layout, run)) is not None:
+            row = _default_fisheye(layout, vertices, run, waist, dart)
+        else:
+            run, point, length = _default_run(layout, vertices, cloth, run, dart)
+            arc = arc_lengths(vertices[run])
+            # One mesh edge short of the point at least: tips that meet there part the cloth.
+            last = int(np.abs(arc - length).argmin())
+            row = run[: max(1, last if point is None else min(last, run.index(point) - 1)) + 1]
+        row_ids = np.array(row, np.int32)
+        if not _holds(cloth, row_ids):
+            raise InputError(
+                f"{where}: it must begin at the border of piece {dart.piece!r}, or inside, and end two mesh edges away inside it"
+            )
+        to_point = None
+        if point is not None:
+            whole = vertices[run[: run.index(point) + 1]]
+            to_point = float(arc_lengths(whole)[-1] - arc_lengths(vertices[row_ids])[-1])
+        placed = PlacedDart(name=dart.name, piece=dart.piece, asked=dart, row=row_ids, to_point=to_point)
         image = layout.mirror[placed.row]
         partner = next((name for name, cloth in cloths.items() if _holds(cloth, image)), None)
         if dart.mirrored and partner is not None and not np.array_equal(image, placed.row):
@@ -227,34 +251,6 @@ def _longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
     if len(runs) > 1 and line[0] == line[-1] and runs[-1][-1] == runs[0][0]:
         runs[0] = [*runs.pop(), *runs[0][1:]]
     return max(runs, key=len, default=[])
-
-
-def _place(layout: Layout, vertices: FloatArray, cloth: _Cloth, dart: FormDart) -> PlacedDart:
-    where = f"dart {dart.name!r}"
-    run = _longest_run(_grid_line(layout, dart), cloth)
-    if not run or not {run[0], run[-1]} & cloth.border:
-        raise InputError(f"{where}: line {dart.line!r} does not run from the border into piece {dart.piece!r}")
-    point: int | None = None
-    if dart.part is not None:
-        row = _part_of(vertices, run, dart)
-    elif dart.at is None and (waist := _waist_of_fisheye(layout, run)) is not None:
-        row = _default_fisheye(layout, vertices, run, waist, dart)
-    else:
-        run, point, length = _default_run(layout, vertices, cloth, run, dart)
-        arc = arc_lengths(vertices[run])
-        # One mesh edge short of the point at least: tips that meet there part the cloth.
-        last = int(np.abs(arc - length).argmin())
-        row = run[: max(1, last if point is None else min(last, run.index(point) - 1)) + 1]
-    row_ids = np.array(row, np.int32)
-    if not _holds(cloth, row_ids):
-        raise InputError(
-            f"{where}: it must begin at the border of piece {dart.piece!r}, or inside, and end two mesh edges away inside it"
-        )
-    to_point = None
-    if point is not None:
-        whole = vertices[run[: run.index(point) + 1]]
-        to_point = float(arc_lengths(whole)[-1] - arc_lengths(vertices[row_ids])[-1])
-    return PlacedDart(name=dart.name, piece=dart.piece, asked=dart, row=row_ids, to_point=to_point)
 
 
 def _part_of(vertices: FloatArray, run: list[int], dart: FormDart) -> list[int]:

@@ -9,11 +9,11 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.export.figure import INK, Pen, new_figure, write_figure
-from warpflat.export.labels import space_out
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_views import DrawnView, make_facets, view_from_side
 from warpflat.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.mannequin.normals import vertex_normals
+from warpflat.pattern.placement import space_out
 
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin

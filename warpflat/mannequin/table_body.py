@@ -41,6 +41,10 @@ def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
     """
     profile = _profiles(measurements)
     quarters = _quarters(measurements, profile)
+    # The upper end of the neck, a shorter and flatter curve above the neck base.
+    base = _neckline(measurements)
+    middle = base.mean(axis=0)
+    top = middle + (base - middle) * np.array([0.90, 0.55, 0.98])
     return Blueprint(
         profile=profile,
         heights={level: measurements.heights[level] for level in RING_LEVELS},
@@ -48,7 +52,7 @@ def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
         arms=_arms(measurements, quarters),
         legs=legs_from_measurements(measurements, profile),
         neck=measurements.lengths["neck"],
-        collar=_collar(measurements),
+        collar=top + np.array([0.0, 0.115, 0.035]) * (measurements.lengths["neck"] / 0.37) * 0.62,
     )
 
 
@@ -166,7 +170,16 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
             chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
-        curves[f"{face}-right"] = _mirrored(left)
+        flip = np.array([-1.0, 1.0, 1.0])
+        curves[f"{face}-right"] = QuarterCurves(
+            neckline=left.neckline * flip,
+            bend=left.bend,
+            shoulder=left.shoulder * flip,
+            armhole=left.armhole * flip,
+            notch=left.notch,
+            chest=left.chest * flip,
+            centre=left.centre * flip,
+        )
     return {name: curves[name] for name in QUARTERS}
 
 
@@ -199,14 +212,6 @@ def _armhole(notch: FloatArray, other: FloatArray, under: FloatArray, tip: Float
     spline = CubicSpline(t, points, bc_type="periodic")
     half = spline(np.linspace(0.0, t[4], 400))
     return half, polyline_length(spline(np.linspace(0.0, t[2], 400))) / polyline_length(half)
-
-
-def _mirrored(curves: QuarterCurves) -> QuarterCurves:
-    flip = np.array([-1.0, 1.0, 1.0])
-    return QuarterCurves(
-        neckline=curves.neckline * flip, bend=curves.bend, shoulder=curves.shoulder * flip,
-        armhole=curves.armhole * flip, notch=curves.notch, chest=curves.chest * flip, centre=curves.centre * flip,
-    )  # fmt: skip
 
 
 def _chest_row(start: FloatArray, end_z: float, length: float, swell: float) -> FloatArray:
@@ -244,14 +249,6 @@ def _neckline(m: Measurements) -> FloatArray:
 
     width = brentq(lambda w: polyline_length(loop(w), closed=True) - neck, 0.15 * neck, 0.6 * neck)
     return loop(float(width))
-
-
-def _collar(m: Measurements) -> FloatArray:
-    """Return the upper end of the neck, a shorter and flatter curve above the neck base."""
-    base = _neckline(m)
-    middle = base.mean(axis=0)
-    top = middle + (base - middle) * np.array([0.90, 0.55, 0.98])
-    return top + np.array([0.0, 0.115, 0.035]) * (m.lengths["neck"] / 0.37) * 0.62
 
 
 def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, ArmCurves]:

@@ -38,7 +38,7 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
     Raises:
         InputError: if the file cannot be written.
     """
-    from pxr import Kind, Usd
+    from pxr import Gf, Kind, Usd, UsdGeom, Vt
 
     require_writable(path)
     with usd_errors(path):
@@ -48,7 +48,21 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
         group.SetDocumentation(mannequin.source)
         _mesh(stage, mannequin, "body", on_body=True)
         _mesh(stage, mannequin, "tube", on_body=False)
-        _lines(stage, mannequin)
+        UsdGeom.Scope.Define(stage, "/World/mannequin/lines")
+        taken: set[str] = set()
+        for name, points in mannequin.lines().items():
+            closed = bool(np.array_equal(points[0], points[-1]))
+            curve = UsdGeom.BasisCurves.Define(stage, f"/World/mannequin/lines/{valid_name(name, taken)}")
+            curve.GetPrim().SetDisplayName(name)
+            places = (points[:-1] if closed else points).astype(np.float32)
+            curve.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(places))
+            curve.CreateCurveVertexCountsAttr(Vt.IntArray([len(places)]))
+            curve.CreateTypeAttr(UsdGeom.Tokens.linear)
+            curve.CreateWrapAttr(UsdGeom.Tokens.periodic if closed else UsdGeom.Tokens.nonperiodic)
+            curve.CreateWidthsAttr(Vt.FloatArray([_WIDTH]))
+            curve.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+            curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(bounding_box(places, 0.5 * _WIDTH)))
+            curve.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_LINE)]))
     export_stage(stage, path)
 
 
@@ -77,23 +91,3 @@ def _mesh(stage: Any, mannequin: Mannequin, part: str, *, on_body: bool) -> None
             UsdGeom.Tokens.partition,
         )  # fmt: skip
         subset.GetPrim().SetDisplayName(name)
-
-
-def _lines(stage: Any, mannequin: Mannequin) -> None:
-    from pxr import Gf, UsdGeom, Vt
-
-    UsdGeom.Scope.Define(stage, "/World/mannequin/lines")
-    taken: set[str] = set()
-    for name, points in mannequin.lines().items():
-        closed = bool(np.array_equal(points[0], points[-1]))
-        curve = UsdGeom.BasisCurves.Define(stage, f"/World/mannequin/lines/{valid_name(name, taken)}")
-        curve.GetPrim().SetDisplayName(name)
-        places = (points[:-1] if closed else points).astype(np.float32)
-        curve.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(places))
-        curve.CreateCurveVertexCountsAttr(Vt.IntArray([len(places)]))
-        curve.CreateTypeAttr(UsdGeom.Tokens.linear)
-        curve.CreateWrapAttr(UsdGeom.Tokens.periodic if closed else UsdGeom.Tokens.nonperiodic)
-        curve.CreateWidthsAttr(Vt.FloatArray([_WIDTH]))
-        curve.SetWidthsInterpolation(UsdGeom.Tokens.constant)
-        curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(bounding_box(places, 0.5 * _WIDTH)))
-        curve.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_LINE)]))

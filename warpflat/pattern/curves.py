@@ -1,4 +1,4 @@
-"""Clean curves from the many points of a mesh border: few cubic Béziers within a tolerance, corners kept."""
+"""Cubic Béziers, and clean curves of them from the many points of a mesh border: few, within a tolerance, corners kept."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length, segment_lengths, turning_angles
 
-__all__ = ["Curve", "adjust_lengths", "chords", "fit_curve"]
+__all__ = ["Curve", "adjust_lengths", "as_cubic", "chords", "cubic_weights", "fit_curve", "split_bezier"]
 
 
 #: A vertex inside an edge that turns by more than this [rad] is a corner, not a sample of a curve.
@@ -31,6 +31,30 @@ OTHER_LENGTHS = 3.0
 INSIDE, NEAR = (0.8, 0.5, 0.2, 0.0), 4.0
 #: The chords by which a curve is drawn or cut stay this close [m] to it.
 CHORD = 2e-5
+
+
+def cubic_weights(t: FloatArray) -> FloatArray:
+    """Return the weights of a cubic Bézier's control points at parameters (#T by 4): Bernstein's polynomials."""
+    s = 1 - t
+    return np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=1)
+
+
+def as_cubic(control: FloatArray) -> FloatArray:
+    """Return the cubic (4 by 2) of a Bézier of degree two (3 by 2); a cubic as it is."""
+    if len(control) == 4:
+        return control
+    a, b, c = control
+    return np.stack([a, (a + 2 * b) / 3, (2 * b + c) / 3, c])
+
+
+def split_bezier(control: FloatArray, t: float) -> tuple[FloatArray, FloatArray]:
+    """Return the two parts of a Bézier (#C by 2) before and after a parameter, by de Casteljau's scheme."""
+    before, points, after = [control[0]], control, [control[-1]]
+    while len(points) > 1:
+        points = (1 - t) * points[:-1] + t * points[1:]
+        before.append(points[0])
+        after.append(points[-1])
+    return np.array(before), np.array(after[::-1])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,10 +79,7 @@ class Curve:
             # A chord over a parameter step h strays at most h^2/8 max|B''|, and |B''| <= 6 max|second difference|.
             bend = float(np.linalg.norm(np.diff(control, n=2, axis=0), axis=1).max())
             count = max(1, int(np.ceil(np.sqrt(0.75 * bend / tolerance))))
-            t = np.arange(count) / count
-            s = 1 - t
-            weights = np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=1)
-            parts.append(weights @ control)
+            parts.append(cubic_weights(np.arange(count) / count) @ control)
         return np.concatenate([*parts, self.bezier[-1:, 3]])
 
     @property
@@ -268,8 +289,7 @@ def _length_keeping_spline(
         return None
     control = np.array(coefficients).T
     if degree == 2:
-        a, b, c = control
-        knots, control = np.repeat([0.0, 1.0], 4), np.stack([a, (a + 2 * b) / 3, (2 * b + c) / 3, c])
+        knots, control = np.repeat([0.0, 1.0], 4), as_cubic(control)
     control[[0, -1]] = points[[0, -1]]
     if not np.isfinite(control).all():
         return None

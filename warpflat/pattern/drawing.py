@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, resample
+from warpflat.core.polyline import polyline_length, resample
 from warpflat.core.text import name_without_number
 from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import Label, Words, text_width
+from warpflat.pattern.placement import LabelRoom, Spot, spots_along
 from warpflat.pattern.words import translate, translate_name
-
-if TYPE_CHECKING:
-    from shapely import Geometry, Polygon
 
 __all__ = ["Drawing", "OnPaper", "Stroke", "draw_nest", "draw_piece", "grain_strokes"]
 
@@ -31,8 +29,12 @@ ARROW, BARB = 0.006, 0.002
 BRACKET = 0.014
 #: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
 NAME, NAME_GAP = 0.0024, 0.0028
-#: Least distance [m] of such a name from all else; height of letters with tails below, over that of capitals.
-CLEAR, CAPITALS_AND_TAILS = 0.0004, 1.6
+#: Where along its line a name stands, in order of preference.
+NAME_SHARES = (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5)
+#: Least distance [m] of words from all else; that at which no better place is sought, for names and for letters.
+CLEAR, WELL_CLEAR, LETTER_CLEAR = 0.0004, 0.006, 0.001
+#: Height of letters with tails below, over that of capitals.
+CAPITALS_AND_TAILS = 1.6
 #: Height [m] of a seam's letter beside a notch, and its distance from it.
 LETTER, LETTER_GAP = 0.0026, 0.0012
 #: What lies closer [m] to a fold lies on it.
@@ -87,22 +89,14 @@ class Drawing:
 
 def draw_piece(piece: DraftedPiece, paper: OnPaper | None = None) -> Drawing:
     """Draw one piece in one size; `paper` where it is printed."""
-    joints = () if paper is None else paper.joints
     strokes = [
         *_cut_strokes(piece, open_folds=paper is not None),
         *(_edge_stroke(piece, edge) for edge in piece.edges if paper is None or edge.kind != "fold"),
         *_cutout_sew_strokes(piece),
         *_detail_strokes(piece),
-        *grain_strokes(piece.grain),
-        *_internal_strokes(piece),
-        *_leader_strokes(piece.label),
     ]
-    words = [*piece.label.words(), *_line_names(piece, joints=joints), *_notch_letters(piece, paper)]
-    for edge in piece.fold_edges:
-        fold_strokes, fold_words = _fold_bracket(edge, joints)
-        strokes += fold_strokes
-        words += fold_words
-    return Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words))
+    more, words = _annotations(piece, piece.label, piece.label.words(), paper)
+    return Drawing(piece=piece, strokes=(*strokes, *more), words=tuple(words))
 
 
 def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) -> tuple[Drawing, ...]:
@@ -114,7 +108,6 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
         return (draw_piece(pieces[0], paper),)
     import shapely
 
-    joints = () if paper is None else paper.joints
     drawings = []
     middle = len(pieces) // 2
 
@@ -143,7 +136,6 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
         words: list[Words] = []
         if index == middle:
             label = nest_label(pieces)
-            strokes += [*grain_strokes(piece.grain), *_internal_strokes(piece), *_leader_strokes(label)]
             sizes = ", ".join(p.size for p in pieces)
             # The label names all sizes in place of its own, no wider than it is.
             rows = label.words()
@@ -153,12 +145,8 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
                     text = all_sizes[0].upper() + all_sizes[1:]
                     height = row.height * min(1.0, label.width / text_width(text, row.height))
                     rows[number] = replace(row, text=text, height=height)
-            words += [*rows, *_line_names(piece, borders=False, joints=joints)]
-            words += _notch_letters(piece, paper)
-            for fold in piece.fold_edges:
-                fold_strokes, fold_words = _fold_bracket(fold, joints)
-                strokes += fold_strokes
-                words += fold_words
+            more, words = _annotations(piece, label, rows, paper, borders=False)
+            strokes += more
         if edge:
             # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
             ring = shapely.LinearRing(piece.cut_line)
@@ -249,122 +237,110 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
     return strokes
 
 
-def _internal_strokes(piece: DraftedPiece) -> list[Stroke]:
-    return [
-        Stroke(role="internal", name=name, points=line, curve=_fit_internal_line(line.tobytes()))
-        for name, line in piece.internal_lines.items()
+def _annotations(
+    piece: DraftedPiece, label: Label, rows: Sequence[Words], paper: OnPaper | None, *, borders: bool = True
+) -> tuple[list[Stroke], list[Words]]:
+    """Draw grain, internal lines, leader and brackets of folds, and place all words of a piece so that they keep clear of each other.
+
+    An edge's name stands inside the sewing line, a dart's beside its first leg, a seam's letter beside its notch, in the
+    allowance. Nothing is written across a joint.
+
+    Args:
+        piece: whose words they are.
+        label: of the piece, or of its nest.
+        rows: what the label says, at its place.
+        paper: where it is printed; None writes no letters.
+        borders: whether edges have names.
+    """
+    import shapely
+
+    strokes = [
+        *grain_strokes(piece.grain),
+        *(
+            Stroke(role="internal", name=name, points=line, curve=_fit_internal_line(line.tobytes()))
+            for name, line in piece.internal_lines.items()
+        ),
     ]
+    words, room = list(rows), LabelRoom()
+    if label.leader is None:
+        room.take(shapely.Polygon(label.box))
+    else:
+        strokes.append(Stroke(role="leader", name="", points=label.leader))
+    for joint in () if paper is None else paper.joints:
+        room.take(shapely.LineString(joint))
+    for hole in piece.drill_holes:
+        room.take(shapely.Point(hole.at).buffer(2 * DRILL))
+    for cutout in piece.cutouts.values():
+        room.take(shapely.LinearRing(cutout.sew_line))
+    for stroke in grain_strokes(piece.grain):
+        room.take(shapely.LineString(stroke.points))
+
+    def write(text: str, height: float, spots: Iterable[Spot], *, bold: bool = False, **clear: Any) -> None:
+        width = text_width(text, height, bold=bold)
+        spot = room.place_clear(spots, width, CAPITALS_AND_TAILS * height, **clear)
+        if spot is not None:
+            at = np.array([spot.x, spot.y])
+            words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
+
+    # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
+    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
+    second_legs = {dart.dart.right for dart in piece.darts}
+    named = [(name, line, "above") for name, line in piece.internal_lines.items()]
+    for edge in piece.edges:
+        if edge.name in first_legs:
+            named.append((first_legs[edge.name], piece.drawn_line(edge), "left"))
+        elif borders and edge.kind != "fold" and edge.name not in second_legs:
+            named.append((edge.name, edge.line, "left"))
+    named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
+    called = {name for name, _, _ in named}
+    drawn = [shapely.LineString(line) for _, line, _ in named]
+    for index, (name, line, side) in enumerate(named):
+        text = translate_name(name_without_number(name, called))
+        width = text_width(text, NAME)
+        if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
+            spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=side)
+            write(text, NAME, spots, avoid=[*drawn[:index], *drawn[index + 1 :]], least=CLEAR, enough=WELL_CLEAR)
+    letters = {} if paper is None else paper.letters
+    for notch in piece.notches:
+        letter = letters.get(notch.seam)
+        if letter is not None:
+            along = np.array([notch.direction[1], -notch.direction[0]])
+            middle = (notch.depth / 2 + 0.0004) * notch.direction
+            # Beside the outer slit of a double notch.
+            aside = [max(float((base - notch.base[0]) @ along * sign) for base in notch.base) for sign in (1.0, -1.0)]
+            half = text_width(letter, LETTER, bold=True) / 2 + LETTER_GAP
+            places = [
+                notch.base[0] + middle + sign * (out + half) * along
+                for sign, out in zip((1.0, -1.0), aside, strict=True)
+            ]
+            beside = [Spot(x=float(x), y=float(y)) for x, y in places]
+            write(letter, LETTER, beside, bold=True, enough=LETTER_CLEAR)
+    for fold in piece.fold_edges:
+        # A line beside the fold whose two arms point to it, with words along it.
+        start, span = fold.line[0], fold.line[-1] - fold.line[0]
+        length = float(np.linalg.norm(span))
+        inwards = np.array([-span[1], span[0]]) / length
+        depth = min(BRACKET, length / 4)
+        a, b = start + 0.15 * span, start + 0.85 * span
+        points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
+        strokes += [
+            Stroke(role="grain", name="", points=points),
+            _arrow(a, -inwards, "grain"),
+            _arrow(b, -inwards, "grain"),
+        ]
+        angle = float(np.arctan2(span[1], span[0]))
+        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
+            angle += np.pi
+        places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
+        inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
+        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
+    return strokes, words
 
 
 @lru_cache(maxsize=1024)
 def _fit_internal_line(line: bytes) -> Curve:
     """Fit a curve to an internal line; cached, since every file asks for it."""
     return fit_curve(np.frombuffer(line).reshape(-1, 2))
-
-
-def _notch_letters(piece: DraftedPiece, paper: OnPaper | None) -> list[Words]:
-    """Write the letter of its seam beside each notch, in the allowance; not across a joint."""
-    import shapely
-
-    if paper is None:
-        return []
-    joints = paper.joints
-    lines = shapely.union_all([shapely.LineString(joint) for joint in joints])
-    words = []
-    for notch in piece.notches:
-        letter = paper.letters.get(notch.seam)
-        if letter is None:
-            continue
-        along = np.array([notch.direction[1], -notch.direction[0]])
-        half = text_width(letter, LETTER, bold=True) / 2
-        sides = []
-        for base, sign in ((notch.base[-1], 1.0), (notch.base[0], -1.0)):
-            aside = sign * along
-            if len(notch.base) == 2 and (notch.base[-1] - notch.base[0]) @ along * sign < 0:
-                base = notch.base[0] if sign > 0 else notch.base[-1]
-            at = base + (notch.depth / 2 + 0.0004) * notch.direction + (half + LETTER_GAP) * aside
-            sides.append(Words(text=letter, at=at, height=LETTER, bold=True))
-        words.append(max(sides, key=lambda w: min(0.001, float(lines.distance(_text_box(w)))) if joints else 0.0))
-    return words
-
-
-def _line_names(piece: DraftedPiece, *, borders: bool = True, joints: Sequence[FloatArray] = ()) -> list[Words]:
-    """Place the names of edges, darts and internal lines along them, where they have room and keep clear of all else.
-
-    An edge's name stands inside the sewing line, a dart's beside its first leg. Without `borders` edges have none.
-    """
-    import shapely
-
-    # The lines that get a name: the name, its line, and whether it stands to the left of the line.
-    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
-    second_legs = {dart.dart.right for dart in piece.darts}
-    named = [(name, line, False) for name, line in piece.internal_lines.items()]
-    for edge in piece.edges:
-        if edge.name in first_legs:
-            named.append((first_legs[edge.name], piece.drawn_line(edge), True))
-        elif borders and edge.kind != "fold" and edge.name not in second_legs:
-            named.append((edge.name, edge.line, True))
-    named += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
-    called = {name for name, _, _ in named}
-    lines = [(translate_name(name_without_number(name, called)), line, inwards) for name, line, inwards in named]
-    drawn = [shapely.LineString(line) for _, line, _ in lines]
-    obstacles = [
-        *[
-            *([shapely.Polygon(piece.label.box)] if piece.label.leader is None else []),
-            *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
-            *(shapely.LinearRing(cutout.sew_line) for cutout in piece.cutouts.values()),
-            *(shapely.LineString(stroke.points) for stroke in grain_strokes(piece.grain)),
-        ],
-        *(shapely.LineString(joint) for joint in joints),
-    ]
-    words = []
-    for index, (name, line, inwards) in enumerate(lines):
-        others = shapely.union_all([*obstacles, *(other for key, other in enumerate(drawn) if key != index)])
-        placed = _place_name(name, line, others, inwards=inwards)
-        if placed is not None:
-            words.append(placed)
-            obstacles.append(_text_box(placed))
-    return words
-
-
-def _place_name(name: str, line: FloatArray, obstacles: Geometry, *, inwards: bool) -> Words | None:
-    """Return a name at the place along its line that is clearest of all obstacles; None where there is no room."""
-    length, half = arc_lengths(line)[-1], text_width(name, NAME) / 2
-    if length < 2 * half + (0.008 if inwards else 0.02):
-        return None
-    clear, chosen = CLEAR, None
-    for share in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
-        if not half <= share * length <= length - half:
-            continue
-        # The name stands above its line, or to the left of a border (`inwards`).
-        near, far = resample(line, share - half / length), resample(line, share + half / length)
-        along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
-        left = np.array([-along[1], along[0]])
-        # Upright, and steep ones read upwards.
-        if along[0] < -0.2 or (abs(along[0]) <= 0.2 and along[1] < 0):
-            along = -along
-        aside = left if inwards else np.array([-along[1], along[0]])
-        # Clear of the whole stretch, however it bends.
-        stretch = [resample(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
-        bulge = max(float((point - near) @ aside) for point in stretch)
-        at = (near + far) / 2 + (bulge + NAME_GAP) * aside
-        words = Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
-        distance = float(obstacles.distance(_text_box(words)))
-        if distance > clear:
-            clear, chosen = distance, words
-        if clear > 0.006:
-            break
-    return chosen
-
-
-def _text_box(words: Words) -> Polygon:
-    """Return the box that words cover."""
-    import shapely
-
-    half = np.array([text_width(words.text, words.height, bold=words.bold), words.height * CAPITALS_AND_TAILS]) / 2
-    cosine, sine = np.cos(words.angle), np.sin(words.angle)
-    turn = np.array([[cosine, -sine], [sine, cosine]])
-    return shapely.Polygon(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ turn.T)
 
 
 def grain_strokes(grain: FloatArray) -> list[Stroke]:
@@ -380,31 +356,3 @@ def _arrow(tip: FloatArray, direction: FloatArray, role: str) -> Stroke:
     across = np.array([-along[1], along[0]])
     points = np.stack([tip - ARROW * along + BARB * across, tip, tip - ARROW * along - BARB * across])
     return Stroke(role=role, name="", points=points)
-
-
-def _fold_bracket(edge: DraftedEdge, joints: Sequence[FloatArray] = ()) -> tuple[list[Stroke], list[Words]]:
-    """Draw a line beside the fold whose two arms point to it, with words along it that cross no joint."""
-    import shapely
-
-    start, end = edge.line[0], edge.line[-1]
-    span = end - start
-    length = float(np.linalg.norm(span))
-    along = span / length
-    inwards = np.array([-along[1], along[0]])
-    depth = min(BRACKET, length / 4)
-    a, b = start + 0.15 * span, start + 0.85 * span
-    points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
-    strokes = [Stroke(role="grain", name="", points=points), _arrow(a, -inwards, "grain"), _arrow(b, -inwards, "grain")]
-    angle = float(np.arctan2(along[1], along[0]))
-    if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
-        angle += np.pi
-    height = min(0.0035, length / 20)
-    places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
-    tries = [Words(text=translate("PLACE ON FOLD"), at=at, height=height, angle=angle) for at in places]
-    lines = shapely.union_all([shapely.LineString(joint) for joint in joints])
-    words = next((w for w in tries if not joints or lines.distance(_text_box(w)) > CLEAR), tries[0])
-    return strokes, [words]
-
-
-def _leader_strokes(label: Label) -> list[Stroke]:
-    return [] if label.leader is None else [Stroke(role="leader", name="", points=label.leader)]

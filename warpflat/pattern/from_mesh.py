@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.pattern.corners import find_corners, find_cracks
-from warpflat.pattern.label import default_grain
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Piece
+from warpflat.pattern.placement import default_grain
 from warpflat.surface.connectivity import border_loops
 
 __all__ = ["MeshFeatures", "inner_stretches", "line_labels", "piece_from_mesh"]
@@ -82,91 +82,43 @@ def piece_from_mesh(
     if flat.ndim != 2 or flat.shape[1] != 2 or not np.isfinite(flat).all():
         raise InputError(f"piece {name!r}: positions have shape {flat.shape}; they must be #V by 2, finite, in metres")
     lines = {key: np.asarray(value, dtype=np.int32) for key, value in features.lines.items()}
-    flat, outer, inner = _front_up(faces, flat, name)
-    labels = line_labels(outer, lines)
-    corners = find_corners(flat[outer], CORNER)
-    darts, corners = _find_darts(flat, outer, corners, features.darts, name)
-    grain = None if features.grain_line is None else _grain_along(flat, outer, lines, features.grain_line, name)
-    return Piece(
-        name=name,
-        size=size,
-        fabric=fabric,
-        edges=_edges(flat, outer, _split_places(corners, labels, darts), labels, darts, features, name),
-        darts=[Dart(name=key, left=f"{key}.left", right=f"{key}.right") for key in darts],
-        internal_lines=_internal_lines(flat, [outer, *inner], lines),
-        grain=grain,
-        holes=_holes(flat, inner, features.fisheyes),
-    )
-
-
-def _front_up(faces: IntArray, flat: FloatArray, name: str) -> tuple[FloatArray, IntArray, list[IntArray]]:
-    """Return the positions, turned over if they lie on their back, the outer border and the loops inside."""
     loops = border_loops(faces, np.column_stack([flat, np.zeros(len(flat))]))
     if not loops:
         raise InputError(f"piece {name!r}: the mesh is closed and has no border; cut it open first")
     areas = [_signed_area(flat[loop]) for loop in loops]
-    outer = int(np.argmax(np.abs(areas)))
-    if areas[outer] < 0:
+    largest = int(np.argmax(np.abs(areas)))
+    if areas[largest] < 0:  # it lies on its back
         flat = flat * [-1.0, 1.0]
-    return flat, loops[outer], [loop for i, loop in enumerate(loops) if i != outer]
-
-
-def _find_darts(
-    flat: FloatArray, loop: IntArray, corners: set[int], given: Mapping[str, DartPlaces], name: str
-) -> tuple[dict[str, DartPlaces], set[int]]:
-    """Return the places of all darts, given ones and cracks that are found, and the corners with theirs."""
-    darts = _dart_places(loop, given, name)
-    corners = corners | {place for places in darts.values() for place in places}
-    found = find_cracks(flat[loop], corners, {places[1] for places in darts.values()})
-    darts |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
-    return darts, corners
-
-
-def _split_places(corners: set[int], labels: Sequence[str], darts: Mapping[str, DartPlaces]) -> list[int]:
-    """Return the places at which the border is split into edges: corners, ends of lines, mouths and tips of darts."""
-    changes = {i for i in range(len(labels)) if labels[i] != labels[i - 1]}
-    inside_leg = {place for places in darts.values() for place in _between_mouths(places, len(labels))}
-    return sorted((corners | changes) - inside_leg | {places[1] for places in darts.values()}) or [0]
-
-
-def _dart_places(loop: IntArray, darts: Mapping[str, DartPlaces], name: str) -> dict[str, DartPlaces]:
-    """Return the places in the loop of each dart's left mouth, tip and right mouth."""
-    where = {vertex: place for place, vertex in enumerate(loop.tolist())}
-    places = {}
-    for key, dart in darts.items():
+    outer, inner = loops[largest], [loop for i, loop in enumerate(loops) if i != largest]
+    labels = line_labels(outer, lines)
+    corners = find_corners(flat[outer], CORNER)
+    # The places in the loop of each dart's left mouth, tip and right mouth; cracks that are found are darts, too.
+    where = {vertex: place for place, vertex in enumerate(outer.tolist())}
+    darts = {}
+    for key, dart in features.darts.items():
         for vertex in dart:
             if vertex not in where:
                 raise InputError(f"piece {name!r}: dart {key!r}: vertex {vertex} is not on the outer border")
         left, tip, right = (where[vertex] for vertex in dart)
-        if (tip - left) % len(loop) >= (right - left) % len(loop):
+        if (tip - left) % len(outer) >= (right - left) % len(outer):
             raise InputError(
                 f"piece {name!r}: dart {key!r}: give its vertices counter-clockwise: left mouth, tip, right mouth"
             )
-        places[key] = (left, tip, right)
-    return places
-
-
-def _between_mouths(places: DartPlaces, count: int) -> set[int]:
-    """Return the places strictly between the two mouths of a dart."""
-    return {(places[0] + k) % count for k in range(1, (places[2] - places[0]) % count)}
-
-
-def _edges(
-    flat: FloatArray,
-    loop: IntArray,
-    splits: Sequence[int],
-    labels: Sequence[str],
-    darts: Mapping[str, DartPlaces],
-    features: MeshFeatures,
-    name: str,
-) -> list[Edge]:
-    """Return the border as edges from one split to the next, named by lines, darts or numbers."""
+        darts[key] = (left, tip, right)
+    corners = corners | {place for places in darts.values() for place in places}
+    found = find_cracks(flat[outer], corners, {places[1] for places in darts.values()})
+    darts |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
+    grain = None if features.grain_line is None else _grain_along(flat, outer, lines, features.grain_line, name)
+    changes = {i for i in range(len(labels)) if labels[i] != labels[i - 1]}
+    inside_leg = {place for places in darts.values() for place in _between_mouths(places, len(labels))}
+    # The border as edges from one split to the next, named by lines, darts or numbers.
+    splits = sorted((corners | changes) - inside_leg | {places[1] for places in darts.values()}) or [0]
     legs = {places[0]: f"{key}.left" for key, places in darts.items()}
     legs |= {places[1]: f"{key}.right" for key, places in darts.items()}
-    count, used, plain = len(loop), dict[str, int](), 0
+    count, used, plain = len(outer), dict[str, int](), 0
     stretches: list[tuple[str, IntArray]] = []
     for start, end in zip(splits, [*splits[1:], splits[0] + count], strict=True):
-        vertices = loop[np.arange(start, end + 1) % count]
+        vertices = outer[np.arange(start, end + 1) % count]
         title = legs.get(start, labels[start])
         if not title:
             plain += 1
@@ -178,16 +130,30 @@ def _edges(
         for key in mapping:
             if key not in names:
                 raise InputError(f"piece {name!r}: {what} name an edge {key!r} that it has not; {nearest(key, names)}")
-    return [
-        Edge(
-            name=title,
-            points=flat[vertices],
-            kind="dart" if title in legs.values() else features.kinds.get(title, "seam"),
-            allowance=features.allowances.get(title),
-            vertices=vertices,
-        )
-        for title, vertices in stretches
-    ]
+    return Piece(
+        name=name,
+        size=size,
+        fabric=fabric,
+        edges=[
+            Edge(
+                name=title,
+                points=flat[vertices],
+                kind="dart" if title in legs.values() else features.kinds.get(title, "seam"),
+                allowance=features.allowances.get(title),
+                vertices=vertices,
+            )
+            for title, vertices in stretches
+        ],
+        darts=[Dart(name=key, left=f"{key}.left", right=f"{key}.right") for key in darts],
+        internal_lines=_internal_lines(flat, [outer, *inner], lines),
+        grain=grain,
+        holes=_holes(flat, inner, features.fisheyes),
+    )
+
+
+def _between_mouths(places: DartPlaces, count: int) -> set[int]:
+    """Return the places strictly between the two mouths of a dart."""
+    return {(places[0] + k) % count for k in range(1, (places[2] - places[0]) % count)}
 
 
 def line_labels(loop: IntArray, curves: Mapping[str, IntArray]) -> list[str]:

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import without_side
-from warpflat.pattern.curves import Curve
+from warpflat.pattern.curves import Curve, split_bezier
 from warpflat.pattern.draft import draft_half
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
 from warpflat.pattern.piece_parts import Edge, Hole
@@ -248,16 +249,13 @@ def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None
     a, b, c, d = away
     roots = np.roots([d - 3 * c + 3 * b - a, 3 * c - 6 * b + 3 * a, 3 * b - 3 * a, a])
     t = min((float(r.real) for r in roots if abs(r.imag) < 1e-9 and -1e-9 <= r.real <= 1 + 1e-9), default=0.5)
-    p01, p12, p23 = (control[k] + t * (control[k + 1] - control[k]) for k in range(3))
-    p012, p123 = p01 + t * (p12 - p01), p12 + t * (p23 - p12)
-    at = p012 + t * (p123 - p012)
-    at = np.array([axis, at[1]])
-    return np.stack([control[0], p01, p012, at]) if away[0] > 0 else np.stack([at, p123, p23, control[3]])
+    before, after = split_bezier(control, t)
+    before[-1, 0] = after[0, 0] = axis
+    return before if away[0] > 0 else after
 
 
 def _with_curve(edge: DraftedEdge, curve: Curve) -> DraftedEdge:
     """Return an edge along another curve, of the same name, kind and width."""
     line = curve.sample()
     shortened = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
-    places = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    return replace(edge, edge=shortened, curve=curve, line=line, places=places)
+    return replace(edge, edge=shortened, curve=curve, line=line, places=arc_lengths(line))

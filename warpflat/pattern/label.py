@@ -1,13 +1,12 @@
-"""The text on a pattern: its letters, DejaVu Sans, the label of a piece and where there is room for it, and a default grain line."""
+"""The text on a pattern: its letters, DejaVu Sans, and what the label of a piece says."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +18,24 @@ from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
     from reportlab.pdfbase.ttfonts import TTFont
-    from shapely import Geometry, Polygon
 
-__all__ = ["BOLD", "CAPITALS", "FONT", "Words", "embedded_font", "text_width", "wrap_text"]
+__all__ = [
+    "BOLD",
+    "CAPITALS",
+    "FONT",
+    "LEADING",
+    "TEXT",
+    "TITLE",
+    "Label",
+    "Words",
+    "cutting_words",
+    "embedded_font",
+    "label_lines",
+    "printed_size",
+    "rotation",
+    "text_width",
+    "wrap_text",
+]
 
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
@@ -29,6 +43,8 @@ FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 CAPITALS = 0.729
 #: Width over the font's size of letters that the font lacks: in other fonts they are no wider than their body.
 UNKNOWN = 1.0
+#: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
+TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,14 +82,8 @@ def embedded_font(name: str) -> TTFont:
 
 def text_width(text: str, height: float, *, bold: bool = False) -> float:
     """Return the width [m] of one line whose capitals are `height` [m] high."""
-    widths = _widths(BOLD if bold else FONT)
-    return sum(widths.get(ord(letter), UNKNOWN) for letter in text) * height / CAPITALS
-
-
-@cache
-def _widths(name: str) -> dict[int, float]:
-    """Return the width of each letter over the font's size, by code point."""
-    return {code: width / 1000 for code, width in embedded_font(name).face.charWidths.items()}
+    widths = embedded_font(BOLD if bold else FONT).face.charWidths  # in thousandths of the font's size
+    return sum(widths.get(ord(letter), 1000 * UNKNOWN) / 1000 for letter in text) * height / CAPITALS
 
 
 def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> str:
@@ -86,40 +96,6 @@ def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> 
         else:
             rows.append(word)
     return "\n".join(rows)
-
-
-Item = TypeVar("Item")
-
-__all__ = [
-    "LEADING",
-    "Label",
-    "cutting_words",
-    "default_grain",
-    "fit_label",
-    "label_lines",
-    "place_label",
-    "printed_size",
-]
-
-
-#: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
-TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
-#: Distances [m] of labels from the sewing line and holes, from other lines, and from a fold, whose bracket and arrows
-#: are 16 mm wide; the second row holds where there is little room.
-CLEARANCES = ((0.004, 0.006, 0.022), (0.0015, 0.0025, 0.0165))
-#: Smallest share of its full size at which a label stands on its piece, not beside it; below the second share it may
-#: come nearer to lines.
-LEAST, ENOUGH = 0.3, 0.6
-#: A label beside its piece: its size, its greatest width [m], its distance from the piece [m], and how far [m] its
-#: leader reaches into the cloth.
-BESIDE_SIZE, BESIDE_WIDTH, BESIDE_GAP, LEADER = 0.6, 0.075, 0.010, 0.005
-#: Room is sought by ellipses of these ratios of height to width: labels are wide, wrapped ones less so.
-ELLIPSES = (0.4, 0.15, 1.0)
-#: Factor by which a label must get larger to be turned, to have one more line break, to have a name as small as the
-#: rest.
-TURNED, BROKEN, SMALL_TITLE = 1.25, 1.06, 1.15
-#: Lines may be broken at these shares of the widest one.
-BREAKS = (0.75, 0.55, 0.4, 0.28)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -158,14 +134,14 @@ class Label:
     def box(self) -> FloatArray:
         """Corners of the block, 4 by 2 [m]."""
         half = np.array([self.width, self.height]) / 2
-        return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ _rotation(self.angle).T
+        return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ rotation(self.angle).T
 
     def words(self) -> list[Words]:
         """Return each row at its place."""
         words, y = [], self.height / 2
         for text, height, bold in self.rows:
             y -= height * LEADING
-            at = self.at + _rotation(self.angle) @ [0.0, y + height * LEADING / 2]
+            at = self.at + rotation(self.angle) @ [0.0, y + height * LEADING / 2]
             words.append(Words(text=text, at=at, height=height, angle=self.angle, bold=bold))
         return words
 
@@ -216,180 +192,7 @@ def printed_size(size: str) -> str:
     return translate("size {size}", size=size) if size_words(size) != size else translate(size)
 
 
-def place_label(
-    piece: Piece,
-    garment: str,
-    lines: tuple[FloatArray, FloatArray],
-    holes: Sequence[FloatArray],
-    obstacles: Sequence[FloatArray],
-    folds: Sequence[FloatArray],
-) -> Label:
-    """Place the label on the widest free place of a piece, smaller if need be, or beside the piece.
-
-    Args:
-        piece: whose label it is.
-        garment: its name.
-        lines: #P by 2 [m], the sewing line and the cutting line.
-        holes: #P by 2 [m], the sewing lines of holes and the borders of fish-eye darts, which the label avoids.
-        obstacles: #P by 2 [m], lines that it does not cross.
-        folds: #P by 2 [m], the edges on the fold, beside which a bracket stands.
-    """
-    import shapely
-
-    sew, cut = (shapely.Polygon(line) for line in lines)
-    away = [shapely.Polygon(hole).buffer(0) for hole in holes]
-    texts = tuple((text, TITLE if k == 0 else TEXT) for k, text in enumerate(label_lines(piece, garment)))
-    found: list[Label] = []
-    for border, line, fold in CLEARANCES:
-        keep_off = [hole.buffer(border) for hole in away]
-        keep_off += [shapely.LineString(obstacle).buffer(line) for obstacle in obstacles]
-        keep_off += [shapely.LineString(edge).buffer(fold) for edge in folds]
-        label = fit_label(sew.buffer(-border).difference(shapely.union_all(keep_off)), texts)
-        found += [] if label is None else [label]
-        if label is not None and _relative_size(label) >= ENOUGH:
-            break
-    if found:
-        return max(found, key=_relative_size)
-    # To the right of the cloth, with a leader to it at half its height.
-    cloth = cut.buffer(0).difference(shapely.union_all(away))
-    left, bottom, right, top = cloth.bounds
-    rows = tuple(
-        (wrap_text(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
-        for k, (text, height) in enumerate(texts)
-    )
-    beside = Label(at=np.zeros(2), lines=rows)
-    beside = beside.scaled(min(1.0, BESIDE_WIDTH / beside.width))
-    middle = (bottom + top) / 2
-    across = shapely.LineString([(left - 1, middle), (right + 1, middle)]).intersection(cloth)
-    near = max(shapely.get_parts(across), key=lambda part: part.bounds[2] if part.length > 0 else -np.inf)
-    target = near.bounds[2] - min(LEADER, near.length / 2)
-    start = right + BESIDE_GAP
-    return replace(
-        beside,
-        at=np.array([start + 0.001 + beside.width / 2, middle]),
-        leader=np.array([[start, middle], [target, middle]]),
-    )
-
-
-def _relative_size(label: Label) -> float:
-    """Return the size of a label's smallest line, as a share of its full size."""
-    return min(height for _, height in label.lines) / TEXT
-
-
-def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: float = LEAST) -> Label | None:
-    """Fit lines into an area [m] as large as they get, turned or wrapped if that helps; None if too small.
-
-    Args:
-        area: where there is room [m].
-        lines: (text, height of capitals [m]); they get no larger than that.
-        least: smallest share of that height.
-    """
-    import shapely
-
-    parts = sorted((p for p in shapely.get_parts(area) if p.geom_type == "Polygon"), key=lambda p: -p.area)[:6]
-    places = _Remembered(_roomy_places([part for part in parts if part.area > 1e-7]))
-    best, reached = None, 0.0
-    for label, penalty in _wrapped_labels(tuple(lines)):
-        corners = []
-        for row in label.words():
-            half = np.array([text_width(row.text, row.height, bold=row.bold), row.height * LEADING]) / 2
-            corners.append(row.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        shape = np.asarray(shapely.MultiPoint(np.concatenate(corners)).convex_hull.exterior.coords)
-        for part, at, angle in places:
-            if reached >= 1.0:  # most often at the first place
-                break
-            penalty_here = penalty * (TURNED if angle else 1.0)
-            factor = _largest_factor(part, shape @ _rotation(angle).T, at, max(least, reached * penalty_here * 1.001))
-            if factor > 0.0:
-                best, reached = replace(label.scaled(factor), at=at, angle=angle), factor / penalty_here
-        if reached >= 1.0:
-            break
-    return best
-
-
-class _Remembered(Generic[Item]):
-    """The items of an iterator, made when they are first asked for."""
-
-    def __init__(self, items: Iterator[Item]) -> None:
-        self._known, self._more = list[Item](), items
-
-    def __iter__(self) -> Iterator[Item]:
-        yield from self._known
-        for item in self._more:
-            self._known.append(item)
-            yield item
-
-
-def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]:
-    """Yield labels of full size around the origin, wrapped more and more, each with a penalty for reading it."""
-    seen = set()
-    smallest = min(height for _, height in lines)
-    for heights, penalty in (([h for _, h in lines], 1.0), ([smallest for _ in lines], SMALL_TITLE)):
-        plain = [(text, height) for (text, _), height in zip(lines, heights, strict=True)]
-        widest = Label(at=np.zeros(2), lines=tuple(plain)).width
-        for share in (1.0, *BREAKS):
-            rows = tuple(
-                # The size stays in one row: a nest replaces it by all sizes.
-                (text if text.startswith("Size ") else wrap_text(text, h, share * widest * 1.001, bold=k == 0), h)
-                for k, (text, h) in enumerate(plain)
-            )
-            if rows not in seen:
-                seen.add(rows)
-                breaks = sum(text.count("\n") for text, _ in rows)
-                yield Label(at=np.zeros(2), lines=rows), penalty * BROKEN**breaks
-
-
-def _roomy_places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, FloatArray, float]]:
-    """Yield the centres of widest ellipses, each with its polygon and the angle of lines along it.
-
-    Those that lie flat come before those that stand, the roomiest first.
-    """
-    import shapely
-    from shapely.affinity import scale
-
-    for angle, axis in ((0.0, 0), (np.pi / 2, 1)):
-        for ratio in ELLIPSES:
-            squeeze = np.where(np.arange(2) == axis, ratio, 1.0)
-            squeezed = [scale(part, *squeeze, origin=(0, 0)) for part in parts]
-            circles = [shapely.maximum_inscribed_circle(part, 5e-4 * min(1.0, part.length)) for part in squeezed]
-            for number in np.argsort([-circle.length for circle in circles], kind="stable"):
-                yield parts[number], np.asarray(circles[number].coords[0]) / squeeze, angle
-
-
-def _largest_factor(part: Polygon, shape: FloatArray, at: FloatArray, floor: float) -> float:
-    """Return by what factor, at most 1, a convex shape (#P by 2 [m]) fits in around a place; 0 if below `floor`."""
-    import shapely
-
-    def fits(factor: float) -> bool:
-        return bool(part.covers(shapely.Polygon(shape * factor + at)))
-
-    if floor > 1.0 or not fits(floor):
-        return 0.0
-    if fits(1.0):
-        return 1.0
-    low, high = floor, 1.0
-    while high - low > 0.01:
-        middle = (low + high) / 2
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low
-
-
-def _rotation(angle: float) -> FloatArray:
+def rotation(angle: float) -> FloatArray:
+    """Return the 2 by 2 matrix of a turn by an angle [rad], counter-clockwise."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine], [sine, cosine]])
-
-
-def default_grain(sew_line: FloatArray, holes: Sequence[FloatArray] = ()) -> FloatArray:
-    """Return a grain line (2 by 2 [m]), upwards through the widest place, over two thirds of the height there."""
-    import shapely
-
-    polygon = shapely.Polygon(sew_line)
-    if holes:
-        polygon = polygon.difference(shapely.union_all([shapely.Polygon(hole).buffer(0) for hole in holes]))
-    centre = np.asarray(shapely.maximum_inscribed_circle(polygon, 1e-3).coords[0])
-    low, high = polygon.bounds[1], polygon.bounds[3]
-    ray = shapely.LineString([(centre[0], low - 1), (centre[0], high + 1)]).intersection(polygon)
-    part = min(shapely.get_parts(ray), key=lambda p: p.distance(shapely.Point(centre)))
-    y = np.sort(shapely.get_coordinates(part)[:, 1])
-    bottom, top = float(y[0]), float(y[-1])
-    return np.array([[centre[0], bottom + (top - bottom) / 6], [centre[0], top - (top - bottom) / 6]])

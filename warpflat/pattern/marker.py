@@ -13,9 +13,10 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import size_words
 from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
-from warpflat.pattern.label import Label, fit_label, printed_size
+from warpflat.pattern.label import Label, printed_size
 from warpflat.pattern.matched_lay import Stripes
 from warpflat.pattern.pieces import unknown_size
+from warpflat.pattern.placement import fit_label
 from warpflat.pattern.tile_nesting import nest_on_strip
 from warpflat.pattern.words import printed_in, translate
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths
-from warpflat.pattern.curves import Curve
+from warpflat.pattern.curves import Curve, cubic_weights, split_bezier
 from warpflat.pattern.fitting import EdgeKey
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
@@ -79,6 +79,8 @@ def true_corners(
     Returns:
         All curves, and a report on each corner.
     """
+    import shapely
+
     start = dict(curves)
     found = {frozenset(corner.ends): corner for corner in [*_seam_corners(pieces, seams), *_fold_corners(pieces)]}
     corners = [corner for corner in found.values() if abs(corner.angle(start) - corner.wanted) < MEANT]
@@ -96,7 +98,18 @@ def true_corners(
             flipped = curve.reversed() if at_end else curve
             result, move = turned_end(flipped, turn if at_end else -turn, reach, keep_length=key in sewn)
             trued[key], moves[key, at_end] = (result.reversed() if at_end else result), move
-        trued, moves = _without_crossings(pieces, start, trued, moves)
+        # The curves, with those of a piece as they were where its border would cross itself.
+        for piece in pieces:
+            keys = [(piece.name, edge.name) for edge in piece.edges]
+            if all(trued[key] is start[key] for key in keys):
+                continue
+            outlines = [
+                shapely.Polygon(np.concatenate([curves[key].sample()[:-1] for key in keys]))
+                for curves in (start, trued)
+            ]
+            if outlines[0].is_valid and not outlines[1].is_valid:
+                trued = trued | {key: start[key] for key in keys}
+                moves = {end: move for end, move in moves.items() if end[0] not in keys}
     reports = [
         CornerReport(
             place=corner.place,
@@ -125,25 +138,6 @@ def _least_turns(corners: Sequence[_Corner], curves: Mapping[EdgeKey, Curve]) ->
     missing = np.array([corner.wanted - corner.angle(curves) for corner in corners])
     solved = np.linalg.lstsq(rates, missing, rcond=1e-9)[0]
     return {end: float(turn) for end, turn in zip(ends, solved, strict=True) if abs(turn) > LEAST_TURN}
-
-
-def _without_crossings(
-    pieces: Sequence[Piece], start: Mapping[EdgeKey, Curve], trued: dict[EdgeKey, Curve], moves: dict[End, float]
-) -> tuple[dict[EdgeKey, Curve], dict[End, float]]:
-    """Return the curves, with those of a piece as they were where its border would cross itself."""
-    import shapely
-
-    for piece in pieces:
-        keys = [(piece.name, edge.name) for edge in piece.edges]
-        if all(trued[key] is start[key] for key in keys):
-            continue
-        outlines = [
-            shapely.Polygon(np.concatenate([curves[key].sample()[:-1] for key in keys])) for curves in (start, trued)
-        ]
-        if outlines[0].is_valid and not outlines[1].is_valid:
-            trued = trued | {key: start[key] for key in keys}
-            moves = {end: move for end, move in moves.items() if end[0] not in keys}
-    return trued, moves
 
 
 def _inner_angle(arrive: Curve, leave: Curve) -> float:
@@ -289,14 +283,11 @@ class _Stretch:
     def __init__(self, curve: Curve, reach: float) -> None:
         t = np.linspace(0.0, 1.0, POINTS // 4 + 1)
         s = 1 - t
-        weights = np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=1)
         slopes = np.stack([-3 * s**2, 3 * s**2 - 6 * s * t, 6 * s * t - 3 * t**2, 3 * t**2], axis=1)
         places, tangents, reached, total, number, at = [], [], [], 0.0, 0, 1.0
         for number in range(len(curve.bezier)):
-            control = curve.bezier[number]
-            line = weights @ control
+            line, tangent = cubic_weights(t) @ curve.bezier[number], slopes @ curve.bezier[number]
             arc = total + arc_lengths(line)
-            tangent = slopes @ control
             places.append(line)
             tangents.append(tangent / np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None])
             reached.append(arc)
@@ -310,15 +301,8 @@ class _Stretch:
         self.reach = float(np.interp(at, t, reached[-1]))
         rest, straight = curve.bezier[number + 1 :], curve.straight[number + 1 :]
         if at < 1.0:
-            # The rest of the Bézier, by de Casteljau's scheme.
-            control = curve.bezier[number]
-            points, last = control, [control[-1]]
-            while len(points) > 1:
-                points = (1 - at) * points[:-1] + at * points[1:]
-                last.append(points[-1])
-            tail = np.array(last[::-1])
-            rest = np.concatenate([tail[None], rest])
-            straight = np.concatenate([curve.straight[number : number + 1], straight])
+            rest = np.concatenate([split_bezier(curve.bezier[number], at)[1][None], rest])
+            straight = curve.straight[number:]
         self.rest = rest, straight
 
     def moved(self, slope: float, back: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -121,10 +121,43 @@ def comparison_table(comparison: Comparison) -> str:
     """Return area, border lengths, energies, strains and distances as text: a block per piece, a column per fabric."""
     blocks = []
     for piece in comparison.pieces:
-        rows = [*_measure_rows(comparison, piece), *_distance_rows(comparison, piece)]
+        distances = list(comparison.distances(piece).values())
+        rows = [
+            *_measure_rows(comparison, piece),
+            *[(f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in distances)]) for point in distances[0]],
+        ]
         blocks.append(_columns(piece, comparison.fabrics, rows))
     if comparison.drapes:
-        blocks.append(_columns("worn", comparison.fabrics, _drape_rows(comparison)))
+        # Gap, strain and pressure of each drape.
+        found = [comparison.drapes[fabric].measures() for fabric in comparison.fabrics]
+
+        def millimetres(key: str, part: str) -> list[str]:
+            return [f"{1e3 * m[key][part]:.1f}" for m in found]
+
+        def strains(thread: str) -> list[str]:
+            return [
+                f"{100 * m[f'strain_{thread}']['p5']:+.1f} to {100 * m[f'strain_{thread}']['p95']:+.1f}" for m in found
+            ]
+
+        blocks.append(
+            _columns(
+                "worn",
+                comparison.fabrics,
+                [
+                    ("largest gap [mm]", [f"{1e3 * max(m['gap_m'].values(), default=0.0):.1f}" for m in found]),
+                    ("gap at", [max(m["gap_m"], key=m["gap_m"].__getitem__, default="-") for m in found]),
+                    ("distance, mean [mm]", millimetres("distance_m", "mean")),
+                    ("misfit, mean [mm]", millimetres("misfit_m", "mean")),
+                    ("misfit, most [mm]", millimetres("misfit_m", "max")),
+                    *((f"strain {thread} [%]", strains(thread)) for thread in ("warp", "weft", "bias")),
+                    ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
+                    ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
+                    ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
+                    ("fits", ["yes" if m["fits"] else "no" for m in found]),
+                    ("at rest", ["yes" if m["converged"] else "NO" for m in found]),
+                ],
+            )
+        )
     note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
     return "\n\n".join(blocks) + f"\n\n{note}"
 
@@ -155,36 +188,6 @@ def _measure_rows(comparison: Comparison, piece: str) -> list[tuple[str, list[st
         row("fits", lambda m: "yes" if m["wear"]["fits"] else "no"),
         row("converged", lambda m: "yes" if m["converged"] else "NO"),
     ]
-
-
-def _drape_rows(comparison: Comparison) -> list[tuple[str, list[str]]]:
-    """Return gap, strain and pressure of each drape."""
-    found = [comparison.drapes[fabric].measures() for fabric in comparison.fabrics]
-
-    def millimetres(key: str, part: str) -> list[str]:
-        return [f"{1e3 * m[key][part]:.1f}" for m in found]
-
-    def strains(thread: str) -> list[str]:
-        return [f"{100 * m[f'strain_{thread}']['p5']:+.1f} to {100 * m[f'strain_{thread}']['p95']:+.1f}" for m in found]
-
-    return [
-        ("largest gap [mm]", [f"{1e3 * max(m['gap_m'].values(), default=0.0):.1f}" for m in found]),
-        ("gap at", [max(m["gap_m"], key=m["gap_m"].__getitem__, default="-") for m in found]),
-        ("distance, mean [mm]", millimetres("distance_m", "mean")),
-        ("misfit, mean [mm]", millimetres("misfit_m", "mean")),
-        ("misfit, most [mm]", millimetres("misfit_m", "max")),
-        *((f"strain {thread} [%]", strains(thread)) for thread in ("warp", "weft", "bias")),
-        ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
-        ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
-        ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
-        ("fits", ["yes" if m["fits"] else "no" for m in found]),
-        ("at rest", ["yes" if m["converged"] else "NO" for m in found]),
-    ]
-
-
-def _distance_rows(comparison: Comparison, piece: str) -> list[tuple[str, list[str]]]:
-    distances = list(comparison.distances(piece).values())
-    return [(f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in distances)]) for point in distances[0]]
 
 
 def _columns(title: str, fabrics: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.output import atomic_path
 from warpflat.export.figure import new_figure
 from warpflat.export.letters import all_letters
@@ -97,7 +96,19 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
         places = _furthest_apart(comparison, piece)
         for number, (label, at, apart) in enumerate(places):
             close = figure.add_subplot(grid[row * _CLOSE_UPS + number, 1])
-            _draw_close_up(close, comparison, piece, label, at, apart)
+            _draw_outlines(close, comparison, piece, width=1.8)
+            reach = max(2.0 * apart, 0.004)
+            close.set_xlim(at[0] - 1.6 * reach, at[0] + 1.6 * reach)
+            close.set_ylim(at[1] - reach, at[1] + reach)
+            close.set_xticks([])
+            close.set_yticks([])
+            length = 10.0 ** np.floor(np.log10(1.6 * reach))
+            x, y = at[0] - 1.5 * reach, at[1] - 0.9 * reach
+            close.plot([x, x + length], [y, y], color="black", linewidth=2)
+            close.annotate(
+                f"{1e3 * length:g} mm", (x + length, y), xytext=(4, -3), textcoords="offset points", fontsize=9
+            )
+            close.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=10)
             whole.plot(*at, "o", mfc="none", mec="#555555", ms=11)
             whole.annotate(
                 str(number + 1),
@@ -108,9 +119,22 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
                 fontsize=10,
             )
             close.text(0.03, 0.9, str(number + 1), transform=close.transAxes, color="#555555", fontsize=11)
-        _finish_whole(whole, comparison, piece)
+        whole.set_axis_off()
+        most = {fabric: 1e3 * d["outline, most"] for fabric, d in comparison.distances(piece).items()}
+        words = ", ".join(f"{fabric} {mm:.1f} mm" for fabric, mm in most.items())
+        whole.set_title(f"{piece}: outline apart by at most {words}", fontsize=11, loc="left")
+        low, high = whole.get_xlim()[0], whole.get_ylim()[0]
+        length = 0.1 if whole.get_xlim()[1] - low > 0.25 else 0.02
+        whole.plot([low, low + length], [high, high], color="black", linewidth=2)
+        whole.annotate(
+            f"{100 * length:.0f} cm", (low + length / 2, high), xytext=(0, 4), textcoords="offset points", ha="center"
+        )
+    handles = []
+    for colour, dashes in map(_style, range(len(comparison.fabrics))):
+        handles.append(Line2D([], [], color=colour, linestyle=(0, dashes) if dashes else "-", linewidth=1.6))
     figure.legend(
-        *_legend_lines(comparison),
+        handles,
+        [f"{fabric} (compared with)" if k == 0 else fabric for k, fabric in enumerate(comparison.fabrics)],
         loc="upper center",
         ncols=min(len(comparison.fabrics), 6),
         frameon=False,
@@ -118,14 +142,6 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
     )
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png", bbox_inches="tight", metadata={"Software": "warpflat"})
-
-
-def _legend_lines(comparison: Comparison) -> tuple[list[Any], list[str]]:
-    handles = []
-    for number, _ in enumerate(comparison.fabrics):
-        colour, dashes = _style(number)
-        handles.append(Line2D([], [], color=colour, linestyle=(0, dashes) if dashes else "-", linewidth=1.6))
-    return handles, [f"{fabric} (compared with)" if k == 0 else fabric for k, fabric in enumerate(comparison.fabrics)]
 
 
 def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: float) -> None:
@@ -136,25 +152,14 @@ def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: flo
     axis.set_aspect("equal")
 
 
-def _finish_whole(axis: Axes, comparison: Comparison, piece: str) -> None:
-    axis.set_axis_off()
-    most = {fabric: 1e3 * d["outline, most"] for fabric, d in comparison.distances(piece).items()}
-    words = ", ".join(f"{fabric} {mm:.1f} mm" for fabric, mm in most.items())
-    axis.set_title(f"{piece}: outline apart by at most {words}", fontsize=11, loc="left")
-    low, high = axis.get_xlim()[0], axis.get_ylim()[0]
-    length = 0.1 if axis.get_xlim()[1] - low > 0.25 else 0.02
-    axis.plot([low, low + length], [high, high], color="black", linewidth=2)
-    axis.annotate(
-        f"{100 * length:.0f} cm", (low + length / 2, high), xytext=(0, 4), textcoords="offset points", ha="center"
-    )
-
-
 def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, FloatArray, float]]:
     """Return the named points that are furthest apart: label, place [m], distance [m]."""
     layouts = [comparison.layouts[fabric][piece] for fabric in comparison.fabrics]
     points = comparison.points(piece)
     if not points:
-        loops = np.concatenate([np.unique(loop) for loop in _loops(comparison, piece)])
+        loops = np.concatenate(
+            [np.unique(loop) for loop in border_loops(comparison.results[comparison.fabrics[0]][piece].faces)]
+        )
         apart = np.max([np.linalg.norm(other - layouts[0], axis=1) for other in layouts[1:]], axis=0)
         worst = int(loops[np.argmax(apart[loops])])
         points = {"furthest apart": worst}
@@ -163,21 +168,3 @@ def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, Float
         apart = max(float(np.linalg.norm(other[vertex] - layouts[0][vertex])) for other in layouts[1:])
         found.append((label, np.mean([layout[vertex] for layout in layouts], axis=0), apart))
     return sorted(found, key=lambda entry: -entry[2])[:_CLOSE_UPS]
-
-
-def _loops(comparison: Comparison, piece: str) -> list[IntArray]:
-    return border_loops(comparison.results[comparison.fabrics[0]][piece].faces)
-
-
-def _draw_close_up(axis: Axes, comparison: Comparison, piece: str, label: str, at: FloatArray, apart: float) -> None:
-    _draw_outlines(axis, comparison, piece, width=1.8)
-    reach = max(2.0 * apart, 0.004)
-    axis.set_xlim(at[0] - 1.6 * reach, at[0] + 1.6 * reach)
-    axis.set_ylim(at[1] - reach, at[1] + reach)
-    axis.set_xticks([])
-    axis.set_yticks([])
-    length = 10.0 ** np.floor(np.log10(1.6 * reach))
-    x, y = at[0] - 1.5 * reach, at[1] - 0.9 * reach
-    axis.plot([x, x + length], [y, y], color="black", linewidth=2)
-    axis.annotate(f"{1e3 * length:g} mm", (x + length, y), xytext=(4, -3), textcoords="offset points", fontsize=9)
-    axis.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=10)

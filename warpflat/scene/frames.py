@@ -27,7 +27,6 @@ from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.cutting.cut_plan import CutPlan
-    from warpflat.export.usd import FrameWriter
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
     from warpflat.mannequin.mannequin import Mannequin
@@ -332,10 +331,46 @@ class Film:
             report_activity("writing the film")
             with FrameWriter(path, scale=self._scale()) as writer:
                 if self._mannequin is not None:
-                    self._show_mannequin(writer, self._mannequin)
+                    from warpflat.mannequin.normals import vertex_normals
+                    from warpflat.mannequin.usd import write_mannequin_usd
+
+                    write_mannequin_usd(self._mannequin, self._folder / MANNEQUIN)
+                    layout = self._mannequin.layout
+                    normals = vertex_normals(self._mannequin.vertices, layout.faces[layout.on_body])
+                    writer.refer_to_body(MANNEQUIN, self._mannequin.vertices - _SHRUNK * normals)
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
-                self._write(writer)
+                pieces = {name: recorder.stages for name, recorder in self.recorders.items()}
+                for number in range(max(len(stages) for stages in pieces.values())):
+                    shots = {name: self._shot(stages, number) for name, stages in pieces.items()}
+                    count = max(wanted for _, _, wanted in shots.values())
+                    frames = {name: self._frames(stage, keys, count) for name, (stage, keys, _) in shots.items()}
+                    for frame in range(count):
+                        for name, shot in shots.items():
+                            stage = shot[0]
+                            begins = frame == 0 and number < len(pieces[name])
+                            shown = next(frames[name])
+                            measures = {
+                                "stage": _STEPS
+                                if 0 < shown.measures.get("step", 0) <= stage.last_first_step
+                                else stage.name,
+                                "stage_number": number,
+                                "interpolated": shown.face_energy_density is None,
+                                **{
+                                    key: round(value) if key in _COUNTS else value
+                                    for key, value in shown.measures.items()
+                                },
+                            }
+                            if shown.positions is None or shown.face_energy_density is None:
+                                writer.write_between(name, shown.positions, measures)
+                                continue
+                            writer.write(
+                                name,
+                                positions=shown.positions,
+                                face_energy_density=shown.face_energy_density,
+                                **(stage.topology if begins else {}),  # type: ignore[arg-type]
+                                measures=measures,
+                            )
 
     def _scale(self) -> float:
         """Return the upper end of the colours [J/m2]: by the last frames, or by the first ones if the pieces end without strain."""
@@ -349,42 +384,6 @@ class Film:
             if scale > SMALLEST_SCALE:
                 break
         return scale
-
-    def _show_mannequin(self, writer: FrameWriter, mannequin: Mannequin) -> None:
-        from warpflat.mannequin.normals import vertex_normals
-        from warpflat.mannequin.usd import write_mannequin_usd
-
-        write_mannequin_usd(mannequin, self._folder / MANNEQUIN)
-        layout = mannequin.layout
-        normals = vertex_normals(mannequin.vertices, layout.faces[layout.on_body])
-        writer.refer_to_body(MANNEQUIN, mannequin.vertices - _SHRUNK * normals)
-
-    def _write(self, writer: FrameWriter) -> None:
-        pieces = {name: recorder.stages for name, recorder in self.recorders.items()}
-        for number in range(max(len(stages) for stages in pieces.values())):
-            shots = {name: self._shot(stages, number) for name, stages in pieces.items()}
-            count = max(wanted for _, _, wanted in shots.values())
-            frames = {name: self._frames(stage, keys, count) for name, (stage, keys, _) in shots.items()}
-            for frame in range(count):
-                for name, (stage, _, _) in shots.items():
-                    begins = frame == 0 and number < len(pieces[name])
-                    shown = next(frames[name])
-                    measures = {
-                        "stage": _STEPS if 0 < shown.measures.get("step", 0) <= stage.last_first_step else stage.name,
-                        "stage_number": number,
-                        "interpolated": shown.face_energy_density is None,
-                        **{key: round(value) if key in _COUNTS else value for key, value in shown.measures.items()},
-                    }
-                    if shown.positions is None or shown.face_energy_density is None:
-                        writer.write_between(name, shown.positions, measures)
-                        continue
-                    writer.write(
-                        name,
-                        positions=shown.positions,
-                        face_energy_density=shown.face_energy_density,
-                        **(stage.topology if begins else {}),  # type: ignore[arg-type]
-                        measures=measures,
-                    )
 
     def _shot(self, stages: Sequence[FilmStage], number: int) -> tuple[FilmStage, list[Key], int]:
         """Return a stage of a piece, the keys that are shown and the number of frames that it needs.

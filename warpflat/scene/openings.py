@@ -33,20 +33,18 @@ def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
             start=1e-3 * table.start_mm,
             style=table.style,
             width=1e-3 * (_WIDTH_MM[table.kind] if table.width_mm is None else table.width_mm),
-            buttons=_buttons(table) if table.kind == "buttons" else None,
+            buttons=Buttons(
+                diameter=1e-3 * table.button_mm,
+                spacing=1e-3 * table.spacing_mm,
+                count=table.count,
+                facing=table.facing,
+                facing_width=1e-3 * table.facing_mm,
+            )
+            if table.kind == "buttons"
+            else None,
         )
         for table in tables
     ]
-
-
-def _buttons(table: OpeningTable) -> Buttons:
-    return Buttons(
-        diameter=1e-3 * table.button_mm,
-        spacing=1e-3 * table.spacing_mm,
-        count=table.count,
-        facing=table.facing,
-        facing_width=1e-3 * table.facing_mm,
-    )
 
 
 def straight_stands(form: FormResult, openings: Sequence[Opening]) -> list[Constraint]:

@@ -98,13 +98,33 @@ class OutsideJob:
             InputError: a file cannot be read, a name is unknown, or there is no seam or no body.
         """
         from warpflat.core.input_files import listening_to_reads
+        from warpflat.pattern.pieces import Seam
 
         sources: list[Path] = []
         with listening_to_reads(sources.append):
             table = SewingTable() if sewing is None else check_table(SewingTable, read_toml(sewing), str(sewing))
             pattern, lifts, run_body = _read(path, table)
             with errors_named(str(sewing)):
-                pattern = _sewn(pattern, table)
+                # The pattern with the folds, quantities and seams of the sewing file, whose seams replace the
+                # pattern's.
+                wanted = {entry.name: entry for entry in table.pieces}
+                for name in wanted:
+                    pattern.piece(name, pattern.sample)
+                pieces = {
+                    size: [_changed(piece, wanted.get(piece.name)) for piece in row]
+                    for size, row in pattern.pieces.items()
+                }
+                seams: list[Seam] = list(pattern.seams)
+                if table.seams:
+                    seams = []
+                    for number, entry in enumerate(table.seams, start=1):
+                        name = entry.name or f"seam {number}"
+                        first, second = (
+                            tuple(_side(text.strip(), reversed=k == 1) for text in side.split(" + "))
+                            for k, side in enumerate(entry.sides)
+                        )
+                        seams.append(Seam(name=name, sides=(first, second)))
+                pattern = replace(pattern, pieces=pieces, seams=seams)
             if not pattern.seams:
                 raise InputError(
                     f"{path}: names no seams; give --seams FILE with [[seams]] sides = "
@@ -165,31 +185,6 @@ def _read(path: Path, table: SewingTable) -> tuple[Pattern, dict[str, Lift], dic
     body = metrics.get("mannequin") if isinstance(metrics, dict) else None
     found = body.get("table") if isinstance(body, dict) else None
     return pattern, lifts, found if isinstance(found, dict) else None
-
-
-def _sewn(pattern: Pattern, table: SewingTable) -> Pattern:
-    """Return the pattern with the folds, quantities and seams of the sewing file, whose seams replace the pattern's.
-
-    Raises:
-        InputError: an unknown piece or edge.
-    """
-    from warpflat.pattern.pieces import Seam
-
-    wanted = {entry.name: entry for entry in table.pieces}
-    for name in wanted:
-        pattern.piece(name, pattern.sample)
-    pieces = {size: [_changed(piece, wanted.get(piece.name)) for piece in row] for size, row in pattern.pieces.items()}
-    seams: list[Seam] = list(pattern.seams)
-    if table.seams:
-        seams = []
-        for number, entry in enumerate(table.seams, start=1):
-            name = entry.name or f"seam {number}"
-            first, second = (
-                tuple(_side(text.strip(), reversed=k == 1) for text in side.split(" + "))
-                for k, side in enumerate(entry.sides)
-            )
-            seams.append(Seam(name=name, sides=(first, second)))
-    return replace(pattern, pieces=pieces, seams=seams)
 
 
 def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:

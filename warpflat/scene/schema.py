@@ -606,9 +606,52 @@ class SceneTable(Table):
         if (self.mannequin is None) != (self.form is None):
             raise ValueError('a mannequin and a form go together: [mannequin] size = "EU 38" and form = "basic_block"')
         if self.mannequin is None:
-            self._check_surface()
+            # Refuse what belongs to the form on a mannequin.
+            if self.shape != "none":
+                raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
+            for key in ("openings", "finishing", "pockets"):
+                if getattr(self, key):
+                    raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
+            if self.curves_mm is not None:
+                raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
+            if self.ease is not None:
+                raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
+            found = self.find_seams is not None and self.find_seams.find == "auto"
+            if found and not isinstance(self.surface, FileSurface):
+                raise ValueError('[seams] find = "auto" takes a garment from a file')
+            if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or found):
+                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "constraints", "drape"):
+                    if getattr(self, key):
+                        why = '[seams] find = "auto"' if found else 'component = "all"'
+                        raise ValueError(f"{key} belongs to one piece; with {why} leave it out")
+            for number, cut in enumerate(self.cuts):
+                cut.check_for_surface(f"cuts[{number}]")
+            if self.half:
+                raise ValueError(
+                    "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
+                    'kinds = { left = "fold" }'
+                )
+            for number, seam in enumerate(self.seams):
+                if seam.sides is None:
+                    raise ValueError(
+                        f"seams[{number}]: on a [surface] give the two lines that are sewn, "
+                        'sides = ["left", "right"]; both sides of its cuts are equally long anyway'
+                    )
         else:
-            self._check_garment()
+            # Refuse what belongs to a surface.
+            if self.find_seams is not None:
+                raise ValueError("[seams] is for a garment from a file; a form has its own, and [[seams]] change them")
+            if self.lines or self.datum:
+                raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
+            if self.auto_cut and self.shape == "auto":
+                raise ValueError('give [auto_cut] or shape = "auto"')
+            for number, cut in enumerate(self.cuts):
+                cut.check_for_form(f"cuts[{number}]")
+            for number, seam in enumerate(self.seams):
+                if seam.sides is not None:
+                    raise ValueError(
+                        f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
+                    )
         self._check_sizes()
         return self
 
@@ -617,55 +660,6 @@ class SceneTable(Table):
         if self.drape is not None and self.half:
             raise ValueError("a drape needs the whole garment: leave out half, or [drape]")
         return self
-
-    def _check_surface(self) -> None:
-        """Refuse what belongs to the form on a mannequin."""
-        if self.shape != "none":
-            raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
-        for key in ("openings", "finishing", "pockets"):
-            if getattr(self, key):
-                raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
-        if self.curves_mm is not None:
-            raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
-        if self.ease is not None:
-            raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
-        found = self.find_seams is not None and self.find_seams.find == "auto"
-        if found and not isinstance(self.surface, FileSurface):
-            raise ValueError('[seams] find = "auto" takes a garment from a file')
-        if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or found):
-            for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "constraints", "drape"):
-                if getattr(self, key):
-                    why = '[seams] find = "auto"' if found else 'component = "all"'
-                    raise ValueError(f"{key} belongs to one piece; with {why} leave it out")
-        for number, cut in enumerate(self.cuts):
-            cut.check_for_surface(f"cuts[{number}]")
-        if self.half:
-            raise ValueError(
-                "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
-                'kinds = { left = "fold" }'
-            )
-        for number, seam in enumerate(self.seams):
-            if seam.sides is None:
-                raise ValueError(
-                    f"seams[{number}]: on a [surface] give the two lines that are sewn, "
-                    'sides = ["left", "right"]; both sides of its cuts are equally long anyway'
-                )
-
-    def _check_garment(self) -> None:
-        """Refuse what belongs to a surface."""
-        if self.find_seams is not None:
-            raise ValueError("[seams] is for a garment from a file; a form has its own, and [[seams]] change them")
-        if self.lines or self.datum:
-            raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
-        if self.auto_cut and self.shape == "auto":
-            raise ValueError('give [auto_cut] or shape = "auto"')
-        for number, cut in enumerate(self.cuts):
-            cut.check_for_form(f"cuts[{number}]")
-        for number, seam in enumerate(self.seams):
-            if seam.sides is not None:
-                raise ValueError(
-                    f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
-                )
 
     def _check_sizes(self) -> None:
         """Refuse sizes of a pattern that no size table can give."""

@@ -399,7 +399,11 @@ class Refinement:
         one, two = self._half.get(edge), self._half.get(edge[::-1])
         if one is None or two is None or self._base[one] != base or self._base[two] != base or edge in self._drawn:
             return False
-        parts = self._other_diagonal(edge, one, two)
+        # The two triangles on both sides of an edge as they are once the edge is flipped.
+        u, v = edge
+        left = next(c for c in self._corner[one] if c not in edge)
+        right = next(c for c in self._corner[two] if c not in edge)
+        parts = (left, u, right), (right, v, left)
         if any(_twice_area(*(self._flat(self.place(v), base) for v in part)) <= 1e-9 for part in parts):
             return False
         before = min(self._smallest_angle(self._corner[one]), self._smallest_angle(self._corner[two]))
@@ -412,13 +416,6 @@ class Refinement:
             self._corner[t] = part
             self._half.update(dict.fromkeys(_rim(part), t))
         return True
-
-    def _other_diagonal(self, edge: tuple[int, int], one: int, two: int) -> tuple[_Triangle, _Triangle]:
-        """Return the two triangles on both sides of an edge as they are once the edge is flipped."""
-        u, v = edge
-        left = next(c for c in self._corner[one] if c not in edge)
-        right = next(c for c in self._corner[two] if c not in edge)
-        return (left, u, right), (right, v, left)
 
     def _smallest_angle(self, corner: _Triangle) -> float:
         sides = sorted(math.dist(self._position(a), self._position(b)) for a, b in _rim(corner))

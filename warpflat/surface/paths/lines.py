@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_label
 from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
@@ -118,7 +118,37 @@ def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntA
             f"the plane does not cut the piece {surface.name!r}: along its normal the piece spans {min(reach):.4g} to "
             f"{max(reach):.4g} m and the plane lies at {float(base @ direction) / size:.4g} m"
         )
-    crossing, station, closed = _longest_section(surface, height, above)
+    # The edges that the longest section crosses, in order; the arc length at each [m]; and whether it is closed.
+    he = half_edges_of(surface)
+    up = above[he.tail] & ~above[he.head]
+    down = ~above[he.tail] & above[he.head]
+    a, b = surface.vertices[he.edges[:, 0]], surface.vertices[he.edges[:, 1]]
+    ha, hb = height[he.edges[:, 0]], height[he.edges[:, 1]]
+    share = ha / np.where(ha == hb, 1.0, ha - hb)
+    place = a + np.clip(share, 0, 1)[:, None] * (b - a)
+    # Going around a face, the section enters where the side drops below the plane and leaves where it rises next:
+    # the side above lies to the left.
+    follow: dict[int, int] = {}
+    entries = np.flatnonzero(up)
+    for h in entries.tolist():
+        at = int(he.next[h])
+        while not down[at]:
+            at = int(he.next[at])
+        follow[int(he.edge[h])] = int(he.edge[at])
+    starts = set(follow) - set(follow.values())
+    best: tuple[float, list[int], bool] = (-1.0, [], False)
+    for seed in [*sorted(starts), *sorted(follow)]:
+        if seed not in follow:
+            continue
+        chain = [seed]
+        while chain[-1] in follow:
+            chain.append(follow.pop(chain[-1]))
+        closed = chain[0] == chain[-1] and seed not in starts
+        length = polyline_length(place[chain])
+        if length > best[0]:
+            best = (length, chain, closed)
+    _, chain, closed = best
+    crossing, station = np.array(chain, dtype=np.int64), arc_lengths(place[chain])
     graph = EdgeGraph(surface)
     band = np.zeros(graph.size, dtype=bool)
     band[graph.edges[crossing]] = True
@@ -152,43 +182,6 @@ def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntA
         weight = np.where(inside, weight, weight * 1e6)
         line = graph.path(int(ends[0]), int(ends[1]), weight)
     return line[::-1].copy()
-
-
-def _longest_section(
-    surface: Surface, height: FloatArray, above: BoolArray
-) -> tuple[NDArray[np.int64], FloatArray, bool]:
-    """Return the edges that the longest section crosses, in order; the arc length at each [m]; and whether it is closed."""
-    he = half_edges_of(surface)
-    up = above[he.tail] & ~above[he.head]
-    down = ~above[he.tail] & above[he.head]
-    a, b = surface.vertices[he.edges[:, 0]], surface.vertices[he.edges[:, 1]]
-    ha, hb = height[he.edges[:, 0]], height[he.edges[:, 1]]
-    share = ha / np.where(ha == hb, 1.0, ha - hb)
-    place = a + np.clip(share, 0, 1)[:, None] * (b - a)
-    # Going around a face, the section enters where the side drops below the plane and leaves where it rises next:
-    # the side above lies to the left.
-    follow: dict[int, int] = {}
-    entries = np.flatnonzero(up)
-    for h in entries.tolist():
-        at = int(he.next[h])
-        while not down[at]:
-            at = int(he.next[at])
-        follow[int(he.edge[h])] = int(he.edge[at])
-    starts = set(follow) - set(follow.values())
-    best: tuple[float, list[int], bool] = (-1.0, [], False)
-    for seed in [*sorted(starts), *sorted(follow)]:
-        if seed not in follow:
-            continue
-        chain = [seed]
-        while chain[-1] in follow:
-            chain.append(follow.pop(chain[-1]))
-        closed = chain[0] == chain[-1] and seed not in starts
-        length = polyline_length(place[chain])
-        if length > best[0]:
-            best = (length, chain, closed)
-    chain = best[1]
-    station = arc_lengths(place[chain])
-    return np.array(chain, dtype=np.int64), station, best[2]
 
 
 def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") -> IntArray:

@@ -133,18 +133,13 @@ def split_polygons(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[I
     return np.concatenate(parts)[order], index[order]
 
 
-def _newell(points: FloatArray) -> FloatArray:
-    """Return twice the vector area of a closed polygon."""
-    return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
-
-
 def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
     """Return triangles (#T by 3 local corner numbers), wound as the polygon is, of one simple polygon."""
     import shapely
 
     centred = points - points.mean(axis=0)
     # The polygon's plane, by two vectors that make a right-handed orthogonal frame with its normal.
-    normal = _newell(centred)
+    normal = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
     axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
     first = np.cross(axis, normal)
     second = np.cross(normal, first)

@@ -141,7 +141,18 @@ def make_surface(
         )
         mesh.notes += off
         if not closed:
-            _check_border(mesh.half_edges)
+            loops = border_loops(mesh.half_edges)
+            if not loops:
+                raise ClosedSurfaceError(
+                    "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled "
+                    "there, or give the part that becomes one piece of cloth; [[cuts]] cut what is flat already"
+                )
+            handles = (2 - len(loops) - euler_characteristic(mesh.half_edges)) // 2
+            if handles:
+                raise InputError(
+                    f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
+                    "through there, or give a part without"
+                )
         mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, sliver_tolerance)
         for what, which in cut.items():
             mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")
@@ -428,21 +439,6 @@ def _drop_unused(mesh: _Mesh) -> None:
 def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
     """Return the vertices that faces (filled up with -1) have, sorted."""
     return np.flatnonzero(np.bincount(faces.ravel() + 1)[1:])
-
-
-def _check_border(he: HalfEdges) -> None:
-    loops = border_loops(he)
-    if not loops:
-        raise ClosedSurfaceError(
-            "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled there, or give the part that "
-            "becomes one piece of cloth; [[cuts]] cut what is flat already"
-        )
-    handles = (2 - len(loops) - euler_characteristic(he)) // 2
-    if handles:
-        raise InputError(
-            f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
-            "through there, or give a part without"
-        )
 
 
 def checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
