@@ -137,6 +137,14 @@ def test_quads_beside_the_path_stay_quads():
     assert (kept[:, 3] >= 0).all()
 
 
+def test_a_detour_back_to_a_vertex_is_left_out():
+    mesh = surface(flat(4, 4), grid(4, 4, kinds=np.ones(9, dtype=int)))
+    corners = [[0.0, 0.1, 0.0], [0.1, 0.1, 0.0], [0.13, 0.14, 0.0], [0.1, 0.1, 0.0], [0.3, 0.1, 0.0]]
+    result = split_faces_along(mesh, polyline_path(mesh, corners))
+    assert result.path.tolist() == [4, 5, 6, 7]
+    np.testing.assert_array_equal(result.surface.faces, mesh.faces)
+
+
 def test_feature_lines_take_in_the_vertices_on_their_edges():
     base = dome(9, kinds=np.full(64, 2))
     mesh = surface(base.vertices, base.faces, {"level": list(range(36, 45)), "down": list(range(76, 3, -9))})
