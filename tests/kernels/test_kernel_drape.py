@@ -13,6 +13,7 @@ from warpflat.kernels.drape import (
     evaluate_cloth,
     evaluate_curvature,
 )
+from warpflat.kernels.drape_contact import anchor_friction
 from warpflat.kernels.drape_steps import advance_drape, watch_power
 
 from warpflat.core.launch import launch_each
@@ -138,6 +139,24 @@ def test_no_vertex_is_left_inside_the_body_and_a_fixed_one_stays():
     assert advance(np.array([1.0, -50.0, 0.0]), STILL, height=0.1)["x"][1] == 0.0
     assert advance(STILL, STILL, height=-0.3)["x"][1] == 0.0
     np.testing.assert_array_equal(advance(np.ones(3), np.ones(3), height=0.2, fixed=1)["x"], [0.0, 0.2, 0.0])
+
+
+def test_friction_holds_up_to_its_share_of_what_presses():
+    """Two vertices on the plane y = 0, rubbed by less and by more than Coulomb's bound, and one without a plane."""
+    motion, contact = Motion(), Contact()
+    places = [[1.0, 0.0, 2.0], [3.0, 0.0, 4.0], [5.0, 6.0, 7.0]]
+    motion.position = on(places, wp.vec3d)
+    contact.normal = on([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]], wp.vec3d)
+    contact.friction = 0.25
+    contact.pressed, contact.rubbed = on([40.0, 8.0, 5.0], wp.float64), on([[3.0, 9.0, -4.0]] * 3, wp.vec3d)
+    contact.grip, contact.most = on([50.0, 50.0, 50.0], wp.float64), on(np.zeros(3), wp.float64)
+    contact.anchor = on(np.zeros((3, 3)), wp.vec3d)
+    launch_each(anchor_friction, 3, [motion, contact], [], device=DEVICE)
+    np.testing.assert_allclose(contact.most.numpy(), [10.0, 2.0, 0.0])
+    np.testing.assert_array_equal(contact.pressed.numpy(), [40.0, 8.0, 0.0])
+    # In the plane 5 N were rubbed: all of it is held, or 2 N of it.
+    force = np.array([[3.0, 0.0, -4.0], [1.2, 0.0, -1.6], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(contact.anchor.numpy(), places + force / 50.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("sums", "halts"), [([1.0, -0.5], 0), ([1.0, -1.5], 1), ([0.0, 0.0], 0)])

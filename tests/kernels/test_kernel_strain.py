@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, shaken, small_network, vec2
 from warpflat.kernels.strain import compute_worn_strain
 
-from warpflat.fabric.fabric import grain_axes
+from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.model.membrane import make_cloth
 from warpflat.model.network import SpringNetwork
 
@@ -55,6 +55,33 @@ def test_strain_of_a_shaken_layout(grain_angle: float):
         flat_area = 0.5 * np.linalg.det((flat[1:] - flat[0]).T) * weight
         assert area[c] == pytest.approx(flat_area, rel=1e-12)
         assert energy[c] == pytest.approx(0.5 * stress[c] @ strain[c] * flat_area, rel=1e-12)
+
+
+SHEET = Fabric(
+    name="sheet",
+    stiffness_warp=800.0,
+    stiffness_weft=800.0,
+    shear_stiffness=800.0 / 2.6,
+    areal_density=0.15,
+    poisson_ratio=0.3,
+)
+
+
+@pytest.mark.parametrize("grain_angle", [0.0, 30.0])
+def test_stress_of_an_isotropic_sheet_lies_along_its_principal_strains(grain_angle: float):
+    assert SHEET.is_isotropic
+    network = small_network(fabric=SHEET, grain_angle=grain_angle)
+    positions = shaken(network, scale=0.95)
+    _, stress, energy, area = worn(network, positions)
+    axes = np.stack(grain_axes(grain_angle))
+    for c, corner in enumerate(network.cell_arrays.corner):
+        body, flat = network.surface.vertices[corner], positions[corner]
+        to_body = (body[1:] - body[0]).T @ np.linalg.inv((flat[1:] - flat[0]).T)
+        _, stretch, directions = np.linalg.svd(to_body, full_matrices=False)
+        principal = 800.0 / (1.0 - 0.3**2) * np.array([[1.0, 0.3], [0.3, 1.0]]) @ (stretch - 1.0)
+        tensor = axes @ directions.T @ np.diag(principal) @ directions @ axes.T
+        np.testing.assert_allclose(stress[c], [tensor[0, 0], tensor[1, 1], tensor[0, 1]], atol=1e-9)
+        assert energy[c] == pytest.approx(0.5 * principal @ (stretch - 1.0) * area[c], rel=1e-9)
 
 
 def test_cloth_shorter_than_the_body_is_in_tension_when_worn():

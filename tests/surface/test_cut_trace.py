@@ -11,6 +11,7 @@ import pytest
 from cut_meshes import cylinder, dome, edge_set, flat, glue, grid, surface
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from warpflat.core.errors import InputError
 from warpflat.surface.connectivity import euler_characteristic, non_manifold_vertices
@@ -137,6 +138,14 @@ def test_quads_beside_the_path_stay_quads():
     assert (kept[:, 3] >= 0).all()
 
 
+def test_a_detour_back_to_a_vertex_is_left_out():
+    mesh = surface(flat(4, 4), grid(4, 4, kinds=np.ones(9, dtype=int)))
+    corners = [[0.0, 0.1, 0.0], [0.1, 0.1, 0.0], [0.13, 0.14, 0.0], [0.1, 0.1, 0.0], [0.3, 0.1, 0.0]]
+    result = split_faces_along(mesh, polyline_path(mesh, corners))
+    assert result.path.tolist() == [4, 5, 6, 7]
+    np.testing.assert_array_equal(result.surface.faces, mesh.faces)
+
+
 def test_feature_lines_take_in_the_vertices_on_their_edges():
     base = dome(9, kinds=np.full(64, 2))
     mesh = surface(base.vertices, base.faces, {"level": list(range(36, 45)), "down": list(range(76, 3, -9))})
@@ -233,6 +242,15 @@ def test_a_plane_all_through_is_as_it_was_given():
         plane_section(tube, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     with pytest.raises(InputError, match="a plane's point is three finite numbers"):
         plane_section(tube, [0.0, 0.1], [0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_plane_through_a_row_of_vertices_meets_them_whatever_rounding_does_to_their_heights(seed):
+    turn = Rotation.random(random_state=seed).as_matrix()
+    mesh = surface(flat(5, 5) @ turn.T + [0.3, -0.2, 0.7], grid(5, 5, kinds=np.ones(16, dtype=int)))
+    path = plane_path(mesh, mesh.vertices[12], turn @ [0.0, 1.0, 0.0])
+    assert sorted(path.support[:, 0].tolist()) == [10, 11, 12, 13, 14]
+    assert (path.support[:, 1:] == -1).all()
 
 
 def test_plane_around_a_tube_is_closed_and_straight_along_vertices():

@@ -35,6 +35,13 @@ def refusal(vertices, polygons, **options):
     return message
 
 
+@pytest.mark.parametrize(("tolerance", "found"), [(0.38, []), (0.40, [0])])
+def test_the_width_of_a_quad_is_twice_its_area_over_its_longer_diagonal(tolerance, found):
+    """A trapezoid: its area is 0.08 m2, its diagonals are 0.806 m long, its edges meet at corners by 0.512 m in the mean."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.8, 0.1, 0.0], [0.2, 0.1, 0.0]])
+    assert degenerate_faces(corners, np.array([[0, 1, 2, 3]], np.int32), tolerance).tolist() == found
+
+
 def test_clean_mesh_comes_through_untouched():
     vertices, quads = grid(4, 3)
     surface = make_surface(vertices, quads, lines={"left": [0, 4, 8]})

@@ -58,7 +58,8 @@ def _width(points: FloatArray) -> FloatArray:
 def degenerate_faces(vertices: FloatArray, faces: IntArray | HalfEdges, tolerance: float = 1e-3) -> IntArray:
     """Return the faces whose least width is at most `tolerance` times the mean length of the edges at their corners.
 
-    The width of a triangle is its smallest altitude; of a quad, its shortest edge or its area over its longer diagonal.
+    The width of a triangle is its smallest altitude; of a quad, its shortest edge or twice its area over its longer
+    diagonal.
     """
     scale = _vertex_scale(vertices, faces)
     faces = faces.faces if isinstance(faces, HalfEdges) else faces
