@@ -45,7 +45,7 @@ _BODY_MAPS = {
 }
 _ALL_MAPS = {**MAPS, **_BODY_MAPS}
 _NOT_AROUND = "#c8c8c8"
-# A map whose values fill less of its scale is told in words.
+# A map whose values fill less of its scale is described in words.
 _EVEN = 0.1
 # Maps that are compared at a glance share a scale.
 _ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))

@@ -29,7 +29,7 @@ from warpflat.surface.repair.layers import Layer, lies_within
 
 __all__ = ["meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
 
-#: Borders that run along each other within this distance [m] are meant to be sewn, or told.
+#: Borders that run along each other within this distance [m] are meant to be sewn, or reported.
 BESIDE = 1e-3
 # Of one border only places further apart along it than this [m] can be beside each other; shorter stretches than the second are corners.
 _APART, _SHORTEST = 1e-2, 3e-3
@@ -220,7 +220,7 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
     order = order[np.append(True, np.diff(here[order]) > 0)]
     here, there, gap = here[order], there[order], gap[order]
     ends = (np.diff(here) > 1) | (np.diff(loop[here]) != 0) | (np.diff(loop[there]) != 0)
-    told = list[tuple[float, str]]()
+    notes = list[tuple[float, str]]()
     for run in np.split(np.arange(len(here)), np.flatnonzero(ends) + 1):
         long = float((length[of[here[run]]] / count[of[here[run]]]).sum())
         if long >= _SHORTEST:
@@ -235,8 +235,8 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
                 f"{whose} run {1e3 * float(np.median(gap[run])):.2f} mm apart for {1e3 * long:.0f} mm about ({place}) cm and are not "
                 "sewn: only borders that agree vertex by vertex are, and no lining to its outer layer all around"
             )
-            told.append((long, words))
-    return [words for _, words in sorted(told, key=lambda entry: -entry[0])]
+            notes.append((long, words))
+    return [words for _, words in sorted(notes, key=lambda entry: -entry[0])]
 
 
 class _BorderEdges:
