@@ -10,7 +10,7 @@ from devices import DEVICE
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.sewing import sew
-from warpflat.garment.sewn import SeamPair
+from warpflat.garment.sewn import Stitching
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.injective import is_injective
 from warpflat.surface.repair.validate import make_surface
@@ -34,7 +34,7 @@ def pieces() -> dict[str, Flattening]:
     return {"ring": band(ring, "ring"), "belt": band(np.stack([x, y, 0 * x], axis=-1), "belt")}
 
 
-SEAM = SeamPair(name="waist", pieces=("ring", "belt"), vertices=(4 * np.arange(ALONG), 4 * np.arange(ALONG)))
+SEAM = Stitching(name="waist", pieces=("ring", "belt"), vertices=(4 * np.arange(ALONG), 4 * np.arange(ALONG)))
 
 
 def test_a_sewn_piece_is_parted_and_its_seam_holds(pieces: dict[str, Flattening]):

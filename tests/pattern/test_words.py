@@ -6,11 +6,13 @@ import re
 from dataclasses import replace
 
 import pytest
+import shapely
 from sample_dress import sample_dress
 
 from warpflat.export.pattern_json import pattern_from_json, pattern_json
 from warpflat.export.pdf import write_pdf
 from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.placement import fit_label
 from warpflat.pattern.words import language_words, printed_in, translate, translate_name
 
 
@@ -31,6 +33,18 @@ def test_every_phrase_has_the_places_of_the_english_one():
 def test_wrong_places_leave_the_english_phrase():
     with printed_in({"Cut {count}": "{number}x"}):
         assert translate("Cut {count}", count=2) == "Cut 2"
+
+
+@pytest.mark.parametrize(("language", "size"), [("en", "Size EU 38"), ("de", "Größe EU 38")])
+def test_the_size_stays_in_one_row_of_a_narrow_label(language, size):
+    """A nest replaces the row by all sizes: it finds it as a whole only."""
+    with printed_in(language_words(language)):
+        label = fit_label(shapely.box(0.0, 0.0, 0.025, 0.025), [("FRONT", 0.007), (size, 0.0045)])
+        other = fit_label(shapely.box(0.0, 0.0, 0.025, 0.025), [("FRONT", 0.007), ("Cut EU 38", 0.0045)])
+    assert label is not None
+    assert other is not None
+    assert size in [row for row, _, _ in label.rows]
+    assert "Cut EU 38" not in [row for row, _, _ in other.rows]
 
 
 def test_pages_and_labels_are_german_and_so_are_those_of_a_file_read_back(tmp_path):

@@ -19,14 +19,14 @@ from warpflat.pattern.draft import draft_garment
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 from warpflat.solver.options import RelaxOptions
-from warpflat.surface.border_seams import NamedSeam, surface_seams
+from warpflat.surface.border_seams import BorderSeam, surface_seams
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import with_lines
 from warpflat.surface.shapes import make_shape
 
 QUIET = {"output": {"frames": 0, "picture": False}, "pattern": {"formats": ["json"]}}
-UNDERARM = NamedSeam(name="underarm", sides=("front", "back"))
-CENTRE_BACK = NamedSeam(name="centre back", sides=("left", "right"))
+UNDERARM = BorderSeam(name="underarm", sides=("front", "back"))
+CENTRE_BACK = BorderSeam(name="centre back", sides=("left", "right"))
 
 
 def sleeve(turn: float = 2 * np.pi, counts: tuple[int, int] = (13, 20)) -> Surface:
@@ -119,11 +119,11 @@ def test_sides_that_do_not_fit_are_refused():
     with pytest.raises(
         InputError, match=r"seam 's': 'front' is \d+\.\d mm long and 'hem' \d+\.\d mm, and they are not one"
     ):
-        surface_seams(tube, [NamedSeam(name="s", sides=("front", "hem"))])
+        surface_seams(tube, [BorderSeam(name="s", sides=("front", "hem"))])
     with pytest.raises(InputError, match=r"seam 's': unknown line 'bakc'; did you mean 'back'"):
-        surface_seams(tube, [NamedSeam(name="s", sides=("front", "bakc"))])
+        surface_seams(tube, [BorderSeam(name="s", sides=("front", "bakc"))])
     with pytest.raises(InputError, match=r"line 'middle' leaves the border between vertices \d+ and \d+"):
-        surface_seams(tube, [NamedSeam(name="s", sides=("front", "middle"))])
+        surface_seams(tube, [BorderSeam(name="s", sides=("front", "middle"))])
 
 
 CONE = {"surface": {"shape": "cone", "angle": 340.0, "resolution": 13}, "datum": "centre", "fabric": "woven"}

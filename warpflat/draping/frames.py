@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.output import atomic_path, latest_file
+from warpflat.core.output import latest_file
 from warpflat.core.sums import weighted_percentile
 from warpflat.draping.result import Drape
 from warpflat.export.colours import energy_colours, linear_rgb
+from warpflat.export.figure import write_moving_picture
 from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.export.raster import Lighting, rasterise, shade
 from warpflat.export.usd_prims import (
@@ -138,10 +139,7 @@ def write_drape_film(path: Path, drape: Drape) -> None:
         views = [_view(*joined, colours, (low, high), degrees) for degrees in (0.0, 90.0, 180.0)]
         pictures.append(Image.fromarray(np.concatenate(views, axis=1)))
     durations = [1000 // _RATE] * (len(pictures) - 1) + [2000]
-    with atomic_path(path) as temporary:
-        pictures[0].save(
-            temporary, format="WEBP", save_all=True, append_images=pictures[1:], duration=durations, loop=0, quality=80
-        )
+    write_moving_picture(path, pictures, durations)
 
 
 def _view(

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
-from warpflat.draping.hollows import hollow_depths
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.places import Place, find_places
 from warpflat.draping.relax_drape import DrapedCloth
@@ -26,6 +26,8 @@ __all__ = ["Drape"]
 
 # Distances up to this are not looked into [m].
 _NEGLIGIBLE = 1e-3
+# Cloth bridges a hollow that has the surface on all sides within this distance [m].
+_HOLLOW_REACH = 0.12
 # A cut within this distance of a place may take it up [m].
 _NEAR_CUT = 0.15
 
@@ -35,7 +37,7 @@ class Drape:
     """A sewn garment at rest on a body.
 
     Distances are of the worn cloth's vertices from the designed surface. Of each the *bridged* part is what taut cloth over
-    that surface's hollows may stand off (see `warpflat.draping.hollows`), and *misfit* is the rest.
+    that surface's hollows may stand off, and *misfit* is the rest.
 
     Attributes:
         cloth: the sewn cloth.
@@ -100,7 +102,7 @@ class Drape:
         triangles, _ = triangulate(self.cloth.faces)
         designed = self.cloth.designed
         normals = vertex_normals(area_vectors(designed, triangles), triangles, len(designed))
-        bridged[at] = np.minimum(self._off[at], hollow_depths(designed, normals, at.astype(np.int32)))
+        bridged[at] = np.minimum(self._off[at], _hollow_depths(designed, normals, at.astype(np.int32)))
         return bridged
 
     @property
@@ -205,3 +207,36 @@ def _spread(values: FloatArray, weights: FloatArray) -> dict[str, float]:
     """Return mean, 95th percentile by area and maximum."""
     mean = float((values * weights).sum() / weights.sum())
     return {"mean": mean, "p95": weighted_percentiles(values, weights, [0.95])[0], "max": float(values.max())}
+
+
+def _hollow_depths(points: FloatArray, normals: FloatArray, at: IntArray) -> FloatArray:
+    """Measure how far the convex hull of a surface's neighbourhood lies above its vertices, along their normals.
+
+    The neighbourhood is the surface within `_HOLLOW_REACH` whose normal points to the same side. Cloth that is drawn taut
+    over it lies within that hull, so that it may stand off by this much without being too large.
+
+    Args:
+        points: #V by 3, the surface's vertices [m].
+        normals: #V by 3, unit normals.
+        at: #A, the vertices to measure at.
+
+    Returns:
+        #A, depths [m]; 0 where the surface bulges.
+    """
+    depths, tree = np.zeros(len(at)), cKDTree(points)
+    for number, (vertex, near) in enumerate(
+        zip(at.tolist(), tree.query_ball_point(points[at], _HOLLOW_REACH), strict=True)
+    ):
+        near = np.asarray(near)
+        near = near[normals[near] @ normals[vertex] > 0.0]
+        if len(near) <= 4:
+            continue
+        try:
+            equations = ConvexHull(points[near] - points[vertex], qhull_options="QJ").equations
+        except QhullError:  # all in one plane
+            continue
+        slope = equations[:, :3] @ normals[vertex]
+        up = slope > 1e-9
+        if up.any():
+            depths[number] = max(float((-equations[up, 3] / slope[up]).min()), 0.0)
+    return depths

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,7 @@ __all__ = [
     "keep_words_on_page",
     "new_figure",
     "write_figure",
+    "write_moving_picture",
 ]
 
 DPI = 150
@@ -77,6 +79,24 @@ def write_figure(path: str | os.PathLike[str], figure: Figure) -> None:
     resolution = float(figure.dpi)
     with atomic_path(path) as temporary:
         image.save(temporary, format="PNG", dpi=(resolution, resolution), pnginfo=metadata, compress_level=_LEVEL)
+
+
+def write_moving_picture(
+    path: str | os.PathLike[str], pictures: Sequence[Image.Image], durations: Sequence[int]
+) -> None:
+    """Write pictures of one size as a moving WebP that begins anew after its end; atomically.
+
+    Args:
+        path: the file, ``*.webp``.
+        pictures: RGB.
+        durations: of each [ms].
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    more = {"save_all": True, "append_images": pictures[1:]} if len(pictures) > 1 else {}
+    with atomic_path(path) as temporary:
+        pictures[0].save(temporary, format="WEBP", duration=list(durations), loop=0, quality=80, **more)
 
 
 def keep_words_on_page(figure: Any) -> None:

@@ -89,8 +89,8 @@ def write_pdf(
         whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
         printed = halved(whole)
         kind = PAPERS[paper]
-        if told := too_many_sheets(printed, paper):
-            raise InputError(f"{path}: {told}")
+        if fault := too_many_sheets(printed, paper):
+            raise InputError(f"{path}: {fault}")
         sheet, tiling = _arranged(nests(printed), kind)
         # Labels move to where no joint of two sheets crosses them, where there is room for that.
         placed = []

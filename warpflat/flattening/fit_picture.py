@@ -45,7 +45,7 @@ _BODY_MAPS = {
 }
 _ALL_MAPS = {**MAPS, **_BODY_MAPS}
 _NOT_AROUND = "#c8c8c8"
-# A map whose values fill less of its scale is told in words.
+# A map whose values fill less of its scale is described in words.
 _EVEN = 0.1
 # Maps that are compared at a glance share a scale.
 _ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))
@@ -143,15 +143,18 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
             # A scale would show one flat colour.
             axis.set_title(f"{label}, even: {_shown(low)} to {_shown(high)} {unit}", fontsize=10)
             continue
-        axis.set_title(f"{label}, median {_shown(_median(fit, name) * factor)} {unit}", fontsize=10)
+        median = factor * weighted_percentile(getattr(fit, name), fit.area, 0.5)
+        axis.set_title(f"{label}, median {_shown(median)} {unit}", fontsize=10)
         bar = figure.colorbar(
             drawn, ax=axis, shrink=0.75, extend=scales[name].extend, pad=0.02, fraction=0.06, aspect=25
         )
         bar.set_label(unit, fontsize=9)
         bar.ax.tick_params(labelsize=8)
         _mark_limit(bar, name, fit.limit, scales[name])
+    beyond = f"does not fit: {100 * fit.outside:.1f} % of the cloth beyond the limit (outlined)"
+    verdict = "fits" if fit.fits else beyond
     figure.suptitle(
-        f"{result.surface.name} in {result.fabric.name}, as worn: {_verdict(fit)}; limit {100 * fit.limit:.3g} %",
+        f"{result.surface.name} in {result.fabric.name}, as worn: {verdict}; limit {100 * fit.limit:.3g} %",
         fontsize=12,
     )
     figure.tight_layout(pad=0.5, h_pad=0.8, w_pad=0.8, rect=(0.0, 0.0, 1.0, 0.985))
@@ -301,14 +304,6 @@ def _to_mmhg(pascals: Any) -> Any:
 
 def _from_mmhg(mmhg: Any) -> Any:
     return mmhg * _MMHG
-
-
-def _verdict(fit: WornFit) -> str:
-    return "fits" if fit.fits else f"does not fit: {100 * fit.outside:.1f} % of the cloth beyond the limit (outlined)"
-
-
-def _median(fit: WornFit, name: str) -> float:
-    return weighted_percentile(getattr(fit, name), fit.area, 0.5)
 
 
 def _shown(value: float) -> str:

@@ -57,8 +57,8 @@ def keep_apart(
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
         if outcome is not None and outcome.converged:
             before = relaxed.model_energy_j
-            dear = outcome.energies.potential > (1.0 + task.options.contact_share) * before
-            if dear and len(surface.vertices) <= _MOST_SWIRLED:
+            costly = outcome.energies.potential > (1.0 + task.options.contact_share) * before
+            if costly and len(surface.vertices) <= _MOST_SWIRLED:
                 # Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be
                 # wound up or unwound.
                 layout = state.positions()

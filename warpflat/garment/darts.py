@@ -11,7 +11,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.garment.closed_cuts import CLOSED
 from warpflat.garment.constraints import DartMouth
-from warpflat.garment.sewn import SeamPair
+from warpflat.garment.sewn import Stitching
 from warpflat.surface.cut.dart_legs import open_length
 from warpflat.surface.overlap import OVERLAP
 
@@ -26,7 +26,7 @@ __all__ = ["closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "p
 _NARROW = 3e-3
 
 
-def dart_pairs(form: FormResult) -> list[SeamPair]:
+def dart_pairs(form: FormResult) -> list[Stitching]:
     """Return the legs of every dart, to be sewn to each other; those of a pleat as far as it is sewn."""
     pleats = pleat_depths(form)
     found = []
@@ -36,7 +36,7 @@ def dart_pairs(form: FormResult) -> list[SeamPair]:
             # One edge of the mesh at least.
             count = max(2, int(np.searchsorted(along, pleats.get((name, dart), along[-1]) + 1e-9, "right")))
             found.append(
-                SeamPair(name=f"{name}.{dart}", pieces=(name, name), vertices=(legs[0][:count], legs[1][:count]))
+                Stitching(name=f"{name}.{dart}", pieces=(name, name), vertices=(legs[0][:count], legs[1][:count]))
             )
     return found
 

@@ -30,12 +30,12 @@ from warpflat.garment.openings import Opening, opened_rings
 from warpflat.garment.pockets import Pocket
 from warpflat.garment.rings import GarmentRing, measure_rings
 from warpflat.garment.sewing import sew
-from warpflat.garment.sewn import SeamLengths, SeamPair, Sewn
+from warpflat.garment.sewn import MeasuredSeam, Sewn, Stitching
 from warpflat.garment.wearer import WearerFit, assess_wearer
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.solver.options import RelaxOptions
-from warpflat.surface.border_seams import NamedSeam
+from warpflat.surface.border_seams import BorderSeam
 
 __all__ = ["Garment", "flatten_form"]
 
@@ -50,9 +50,9 @@ class Garment:
     Attributes:
         name: the garment's.
         pieces: the flat pieces by name, in order; each whole, even where cuts have parted it.
-        seam_pairs: what is sewn to each other.
+        stitching: what is sewn to each other.
         sewn: outcome of relaxing them together under their seams and constraints; None if they were not sewn.
-        named_seams: seams of a mesh that were named by lines along its border.
+        border_seams: seams of a mesh that were named by lines along its border.
         mannequin, form: the body and the form on it, of a garment that comes from one: pieces in space with their edges and seams.
         wished: the ease of a form's seams; None if it was not sewn.
         openings: along its seams.
@@ -64,9 +64,9 @@ class Garment:
 
     name: str
     pieces: Mapping[str, Flattening]
-    seam_pairs: Sequence[SeamPair] = ()
+    stitching: Sequence[Stitching] = ()
     sewn: Sewn | None = None
-    named_seams: Sequence[NamedSeam] = ()
+    border_seams: Sequence[BorderSeam] = ()
     mannequin: Mannequin | None = None
     form: FormResult | None = None
     wished: SeamRatios | None = None
@@ -100,11 +100,11 @@ class Garment:
         return made
 
     @property
-    def seams(self) -> tuple[SeamLengths, ...]:
+    def seams(self) -> tuple[MeasuredSeam, ...]:
         """Every seam with the lengths of its two sides."""
         costs = {} if self.sewn is None else {made.name: made.cost for made in self.sewn.results if made.kind == "seam"}
-        runs: dict[str, list[SeamPair]] = {}
-        for pair in self.seam_pairs:
+        runs: dict[str, list[Stitching]] = {}
+        for pair in self.stitching:
             if pair.sides is not None:
                 runs.setdefault(pair.name, []).append(pair)
         found = []
@@ -116,7 +116,7 @@ class Garment:
             even = all(np.array_equal(pair.ratio, 1.0) for pair in pairs)
             assert pairs[0].sides is not None
             found.append(
-                SeamLengths(
+                MeasuredSeam(
                     name=name,
                     sides=pairs[0].sides,
                     length_3d=sum(polyline_length(first.network.surface.vertices[pair.vertices[0]]) for pair in pairs),
@@ -332,7 +332,7 @@ def flatten_form(
     )
     pieces |= dict(zip(names, flat, strict=True))
     pairs = [
-        SeamPair(
+        Stitching(
             name=seam.name, pieces=seam.pieces, vertices=run.vertices,
             ratio=wished.edge_ratios[number][i] if number in wished.edge_ratios else wished.ratios[number],
             sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
@@ -345,7 +345,7 @@ def flatten_form(
         mannequin=mannequin,
         form=form,
         pieces={name: pieces[name] for name in form.pieces},
-        seam_pairs=[*pairs, *dart_pairs(form)],
+        stitching=[*pairs, *dart_pairs(form)],
     )
     if not sewn:
         return garment
@@ -356,7 +356,7 @@ def flatten_form(
         full[name] = give_fullness(full[name], edges, plain, options=relax)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
     held = (*constraints, *straight_hems(form, constraints), *dart_constraints(form))
-    result = sew(full, garment.seam_pairs, constraints=held, folds=folds, options=relax)
+    result = sew(full, garment.stitching, constraints=held, folds=folds, options=relax)
     garment = replace(garment, pieces=result.pieces, sewn=result, wished=wished)
     again = _SewAgain(mannequin=mannequin, form=form, held=held, folds=folds, options=relax)
 
@@ -394,7 +394,7 @@ class _SewAgain:
         """Return the garment under more constraints, and the outcome of that; as it was, where they cannot be kept."""
         assert garment.sewn is not None
         outcome = sew(
-            garment.pieces, garment.seam_pairs, constraints=[*self.held, *more], folds=self.folds, options=self.options,
+            garment.pieces, garment.stitching, constraints=[*self.held, *more], folds=self.folds, options=self.options,
             offsets=garment.sewn.offsets,
         )  # fmt: skip
         if not outcome.converged:

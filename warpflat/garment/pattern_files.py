@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from warpflat.pattern.marker import Cloth
     from warpflat.pattern.pieces import Pattern
     from warpflat.pattern.walked import WalkedSeam
-    from warpflat.surface.border_seams import NamedSeam
+    from warpflat.surface.border_seams import BorderSeam
 
 __all__ = [
     "FORMATS",
@@ -130,7 +130,7 @@ def surface_files(
     *,
     name: str,
     options: PatternOptions | None = None,
-    seams: Sequence[NamedSeam] = (),
+    seams: Sequence[BorderSeam] = (),
 ) -> WrittenPattern:
     """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it.
 

@@ -20,16 +20,16 @@ from warpflat.garment.constraints import Constraint
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.garment import Garment
 from warpflat.garment.sewing import sew
-from warpflat.garment.sewn import SeamPair
+from warpflat.garment.sewn import Stitching
 from warpflat.solver.options import RelaxOptions
-from warpflat.surface.border_seams import SAME_PLACE, NamedSeam, surface_seams
+from warpflat.surface.border_seams import SAME_PLACE, BorderSeam, surface_seams
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, lies_within
 
 __all__ = ["meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
 
-#: Borders that run along each other within this distance [m] are meant to be sewn, or told.
+#: Borders that run along each other within this distance [m] are meant to be sewn, or reported.
 BESIDE = 1e-3
 # Of one border only places further apart along it than this [m] can be beside each other; shorter stretches than the second are corners.
 _APART, _SHORTEST = 1e-2, 3e-3
@@ -43,7 +43,7 @@ def sew_pieces(
     pieces: Sequence[Flattening],
     constraints: Sequence[Constraint] = (),
     *,
-    seams: Sequence[NamedSeam] = (),
+    seams: Sequence[BorderSeam] = (),
     options: RelaxOptions | None = None,
     name: str | None = None,
 ) -> Garment:
@@ -79,7 +79,7 @@ def sew_pieces(
         plain = [row for seam in found for row in seam.vertices if not any(row is edge.vertices for edge in full)]
         flat[first] = give_fullness(flat[first], full, plain, options=options)
     pairs = [
-        SeamPair(
+        Stitching(
             name=title, pieces=(own, own), vertices=(seam.left, seam.right),
             sides=(f"{own}.{title}.left", f"{own}.{title}.right"),
         )
@@ -87,7 +87,7 @@ def sew_pieces(
         for title, _, seam in seams_of_cuts(piece)
     ]  # fmt: skip
     pairs += [
-        SeamPair(
+        Stitching(
             name=seam.named.name, pieces=(first, first), vertices=seam.vertices, ratio=1.0 / (1.0 + seam.named.ease),
             joints=seam.joints, sides=(f"{first}.{seam.named.sides[0]}", f"{first}.{seam.named.sides[1]}"),
         )
@@ -113,7 +113,7 @@ def sew_pieces(
         title = find_unused_name(opening or pair.name, {other.name for other in pairs})
         along = f"{first}.{opening or title}"
         pairs.append(replace(pair, name=title, sides=(f"{along}.left", f"{along}.right")))
-    garment = Garment(name=name or first, pieces=flat, seam_pairs=pairs, named_seams=seams)
+    garment = Garment(name=name or first, pieces=flat, stitching=pairs, border_seams=seams)
     if not pairs and not constraints:
         return garment
     sewn = sew(flat, pairs, constraints=constraints, options=options)
@@ -138,7 +138,7 @@ def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:
 
 def meeting_borders(
     surfaces: Mapping[str, Surface], *, without: Collection[tuple[str, int, int]] = ()
-) -> list[SeamPair]:
+) -> list[Stitching]:
     """Return the stretches of border that lie at one place in space, edge by edge: seams between pieces, and darts.
 
     Three borders that meet along one edge are no seam there.
@@ -148,7 +148,7 @@ def meeting_borders(
         without: edges that are left out, by piece and vertices, the lower first.
     """
     edges = _BorderEdges(surfaces, without)
-    pairs: list[SeamPair] = []
+    pairs: list[Stitching] = []
     taken: set[str] = set()
     for first, second in edges.stretches():
         pieces = edges.names[first[0]], edges.names[second[0]]
@@ -159,7 +159,7 @@ def meeting_borders(
             plain = f"{'dart' if (vertices[0] == vertices[1]).any() else 'seam'} of {pieces[0]}"
         name = find_unused_name(plain, taken)
         taken.add(name)
-        pairs.append(SeamPair(name=name, pieces=pieces, vertices=vertices))
+        pairs.append(Stitching(name=name, pieces=pieces, vertices=vertices))
     return pairs
 
 
@@ -169,7 +169,7 @@ def unsewn_notes(garment: Garment) -> list[str]:
         return []
     sewn = {
         (name, min(edge), max(edge))
-        for pair in garment.seam_pairs
+        for pair in garment.stitching
         for name, row in zip(pair.pieces, pair.vertices, strict=True)
         for edge in pairwise(row.tolist())
     }
@@ -220,7 +220,7 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
     order = order[np.append(True, np.diff(here[order]) > 0)]
     here, there, gap = here[order], there[order], gap[order]
     ends = (np.diff(here) > 1) | (np.diff(loop[here]) != 0) | (np.diff(loop[there]) != 0)
-    told = list[tuple[float, str]]()
+    notes = list[tuple[float, str]]()
     for run in np.split(np.arange(len(here)), np.flatnonzero(ends) + 1):
         long = float((length[of[here[run]]] / count[of[here[run]]]).sum())
         if long >= _SHORTEST:
@@ -235,8 +235,8 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
                 f"{whose} run {1e3 * float(np.median(gap[run])):.2f} mm apart for {1e3 * long:.0f} mm about ({place}) cm and are not "
                 "sewn: only borders that agree vertex by vertex are, and no lining to its outer layer all around"
             )
-            told.append((long, words))
-    return [words for _, words in sorted(told, key=lambda entry: -entry[0])]
+            notes.append((long, words))
+    return [words for _, words in sorted(notes, key=lambda entry: -entry[0])]
 
 
 class _BorderEdges:

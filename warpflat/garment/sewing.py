@@ -27,7 +27,7 @@ from warpflat.flattening.applied_cut import cut_sides
 from warpflat.flattening.progress import CONTACT, STEPS, Stage
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, DrawnLine, KeptGirth, equations_of_constraint, find_piece
-from warpflat.garment.sewn import ConstraintResult, SeamPair, Sewn
+from warpflat.garment.sewn import ConstraintResult, Sewn, Stitching
 from warpflat.model.constraint_equations import (
     ConstraintEquations,
     Correction,
@@ -128,7 +128,7 @@ class SewingNetwork:
 
 def sew(
     pieces: Mapping[str, Flattening],
-    seams: Sequence[SeamPair] = (),
+    seams: Sequence[Stitching] = (),
     *,
     constraints: Sequence[Constraint] = (),
     folds: Mapping[str, IntArray] | None = None,
@@ -245,7 +245,7 @@ def _offsets(
 def _constraint_equations(
     joined: SewingNetwork,
     unsewn: FloatArray,
-    seams: Sequence[SeamPair],
+    seams: Sequence[Stitching],
     constraints: Sequence[Constraint],
     folds: Mapping[str, IntArray],
 ) -> tuple[ConstraintEquations, list[tuple[str, str]], set[str]]:

@@ -9,11 +9,11 @@ from typing import Any
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.flattening.result import Flattening
 
-__all__ = ["ConstraintResult", "SeamLengths", "SeamPair", "Sewn"]
+__all__ = ["ConstraintResult", "MeasuredSeam", "Sewn", "Stitching"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeamPair:
+class Stitching:
     """Two chains of vertices that are sewn together, edge by edge or from joint to joint.
 
     Attributes:
@@ -34,7 +34,7 @@ class SeamPair:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeamLengths:
+class MeasuredSeam:
     """A seam, measured.
 
     Attributes:

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
     from warpflat.garment.garment import Garment
     from warpflat.mannequin.pieces import FormPiece
-    from warpflat.surface.border_seams import NamedSeam
+    from warpflat.surface.border_seams import BorderSeam
     from warpflat.surface.cut.cut_mesh import Crack
     from warpflat.surface.mesh import Surface
 
@@ -80,7 +80,7 @@ def pattern_of_garment(
     """
     rules, sample = rules or EdgeRules(), next(iter(garments.values()))
     if sample.form is None:
-        return pattern_of_surface(list(sample.parts.values()), name=name, rules=rules, seams=sample.named_seams)
+        return pattern_of_surface(list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams)
     forms = {size: garment.form for size, garment in garments.items() if garment.form is not None}
     form = sample.form
     if sample.wished is not None:
@@ -315,7 +315,7 @@ def pattern_of_surface(
     name: str,
     rules: EdgeRules | None = None,
     size: str = "",
-    seams: Sequence[NamedSeam] = (),
+    seams: Sequence[BorderSeam] = (),
 ) -> tuple[Pattern, tuple[str, ...]]:
     """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
 

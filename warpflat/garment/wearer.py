@@ -16,6 +16,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import weighted_percentiles
+from warpflat.export.geometry import face_areas
 from warpflat.garment.tapes import UPRIGHT, PieceEdges, stretch_tape
 from warpflat.mannequin.layout import QUARTERS
 
@@ -167,7 +168,7 @@ def assess_wearer(
     if not rows:
         return None
     pieces = _by_face(mannequin.layout, form, rows)
-    areas = {name: _face_areas(positions[name], np.asarray(piece.surface.faces)) for name, piece in form.pieces.items()}
+    areas = {name: face_areas(positions[name], np.asarray(piece.surface.faces)) for name, piece in form.pieces.items()}
     return WearerFit(rows=tuple(rows), limit=fabric.strain_limit, pieces=pieces, areas=areas)
 
 
@@ -245,11 +246,3 @@ def _by_face(layout: Layout, form: FormResult, rows: list[_Row]) -> dict[str, Bo
         own = [np.where(known, values[corners], 0.0).sum(axis=1) / count for values in (strain, pressure)]
         found[name] = BodyFit(strain=own[0], pressure=own[1])
     return found
-
-
-def _face_areas(flat: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the areas of flat quads, #F [m2]."""
-    corners = flat[faces]
-    first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-    across = np.sum(first * second, axis=1)
-    return np.asarray(0.5 * np.sqrt(np.maximum(np.sum(first**2, axis=1) * np.sum(second**2, axis=1) - across**2, 0.0)))

@@ -188,7 +188,7 @@ class _FitGoal:
         room: largest distance [m] of a point from a curve along a straight stretch.
         bend: largest product of turning angle and step along the points [m]. A curve of equal length strays from a coarse
             border by a share of it, to one side at corners and to the other side at chords.
-        slack: by how much less an error of length counts.
+        leeway: by how much less an error of length counts.
         strict: the room holds everywhere, whatever the bend.
     """
 

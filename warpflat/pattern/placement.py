@@ -18,6 +18,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import points_at_lengths, polyline_length
 from warpflat.pattern.label import LEADING, TEXT, TITLE, Label, label_lines, rotation, text_width, wrap_text
 from warpflat.pattern.pieces import Piece
+from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -398,14 +399,16 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
 def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]:
     """Yield labels of full size around the origin, wrapped more and more, each with a penalty for reading it."""
     seen = set()
+    # The size stays in one row: a nest replaces it by all sizes.
+    size = translate("size {size}", size="")
+    size = size[0].upper() + size[1:]
     smallest = min(height for _, height in lines)
     for heights, penalty in (([h for _, h in lines], 1.0), ([smallest for _ in lines], SMALL_TITLE)):
         plain = [(text, height) for (text, _), height in zip(lines, heights, strict=True)]
         widest = Label(at=np.zeros(2), lines=tuple(plain)).width
         for share in (1.0, *BREAKS):
             rows = tuple(
-                # The size stays in one row: a nest replaces it by all sizes.
-                (text if text.startswith("Size ") else wrap_text(text, h, share * widest * 1.001, bold=k == 0), h)
+                (text if text.startswith(size) else wrap_text(text, h, share * widest * 1.001, bold=k == 0), h)
                 for k, (text, h) in enumerate(plain)
             )
             if rows not in seen:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.input_files import reading
 from warpflat.core.output import atomic_path, output_folder, record_file
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours
+from warpflat.export.figure import write_moving_picture
 from warpflat.export.geometry import outline_edges
 from warpflat.export.raster import rasterise, shade
 from warpflat.review.film import FilmPiece, Shape, open_film
@@ -55,7 +56,7 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
             count = len(images)
             # The last frame stays for a moment.
             durations = [round(1000 * len(pieces[0].times) / _RATE / count)] * (count - 1) + [1500]
-            _save(folder / "film.webp", images, loop=0, duration=durations, quality=80)
+            write_moving_picture(folder / "film.webp", images, durations)
             written.append("film.webp")
         if sheet:
             columns, rows = _SHEET
@@ -64,7 +65,8 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
             page = Image.new("RGB", (columns * cell[0], rows * cell[1]), (_PAPER,) * 3)
             for number, image in enumerate(images):
                 page.paste(image, (number % columns * cell[0], number // columns * cell[1]))
-            _save(folder / "contact_sheet.png", [page])
+            with atomic_path(folder / "contact_sheet.png") as temporary:
+                page.save(temporary, format="PNG")
             written.append("contact_sheet.png")
         for file in written:
             record_file(folder, name, file)
@@ -163,9 +165,3 @@ def _with_foot(image: Image.Image, words: str, energy: float) -> Image.Image:
     for x, text in ((right - 76, "0"), (right, limit)):
         pen.text((x, middle), text, fill=_INK, anchor="lm")
     return page
-
-
-def _save(path: Path, pictures: Sequence[Image.Image], **settings: Any) -> None:
-    more = {"save_all": True, "append_images": pictures[1:]} if len(pictures) > 1 else {}
-    with atomic_path(path) as temporary:
-        pictures[0].save(temporary, format="WEBP" if path.suffix == ".webp" else "PNG", **more, **settings)

@@ -43,7 +43,7 @@ from warpflat.scene.seams import scene_constraints, scene_surface_seams, scene_w
 from warpflat.scene.surface import scene_pieces, scene_surface
 from warpflat.seams.find import GRAIN, FoundSeams, seam_words
 from warpflat.solver.options import RelaxOptions
-from warpflat.surface.border_seams import NamedSeam
+from warpflat.surface.border_seams import BorderSeam
 from warpflat.surface.mesh import Surface
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
@@ -65,7 +65,7 @@ class MeshPlan:
     scene: Scene
     drawing: PatternOptions
     sequences: Sequence[CutSequence]
-    seams: Sequence[NamedSeam] = ()
+    seams: Sequence[BorderSeam] = ()
     found: FoundSeams | None = None
     device: str | None = None
 

@@ -8,7 +8,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.garment.ease import SeamWish
 from warpflat.scene.schema import ConstraintTable, SeamTable
-from warpflat.surface.border_seams import NamedSeam
+from warpflat.surface.border_seams import BorderSeam
 
 __all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
 
@@ -27,7 +27,7 @@ def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
     ]
 
 
-def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[NamedSeam]:
+def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[BorderSeam]:
     """Return the seams that a scene names on its surface.
 
     Args:
@@ -37,7 +37,7 @@ def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[NamedSe
     Raises:
         InputError: a name occurs twice, both sides are one line, or `longer` is neither of them.
     """
-    seams: list[NamedSeam] = []
+    seams: list[BorderSeam] = []
     for number, table in enumerate(tables):
         where = f"seams[{number}]"
         first, second = (side.removeprefix(f"{piece}.") for side in table.sides or ["", ""])
@@ -49,7 +49,7 @@ def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[NamedSe
         if longer not in (first, second):
             raise InputError(f"{where}: longer is {longer!r}, not one of its sides; {nearest(longer, (first, second))}")
         seams.append(
-            NamedSeam(
+            BorderSeam(
                 name=table.name,
                 sides=(first, second),
                 factor=table.gather if table.gather is not None else 1.0 + (table.fullness or 0.0),

@@ -26,7 +26,7 @@ _SHAPES = ("none", "darts", "princess", "auto")
 #: Measurements that are asked for, with their names on the page.
 _MEASURES = {"bust": "bust [cm]", "waist": "waist [cm]", "hip": "hip [cm]", "stature": "stature [cm]"}
 _NO_LINE = "(click a line)"
-_LEAST_OVERLAP = 1e-6  # [m2], below which it is not told
+_LEAST_OVERLAP = 1e-6  # [m2], below which it is not reported
 
 
 @dataclass(frozen=True, kw_only=True)

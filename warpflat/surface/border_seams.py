@@ -19,7 +19,7 @@ from warpflat.core.polyline import arc_lengths, project_on_segments
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
 
-__all__ = ["SAME_PLACE", "NamedSeam", "SurfaceSeam", "surface_seams"]
+__all__ = ["SAME_PLACE", "BorderSeam", "SurfaceSeam", "surface_seams"]
 
 
 #: Points nearer to each other than this [m] are at one place in space.
@@ -33,7 +33,7 @@ _SAME_SHARE = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
-class NamedSeam:
+class BorderSeam:
     """A wish that two lines along the border of a surface be sewn together.
 
     Attributes:
@@ -66,12 +66,12 @@ class SurfaceSeam:
         joints: #J by 2, positions in the two rows that are sewn to each other; None if all are, one to one.
     """
 
-    named: NamedSeam
+    named: BorderSeam
     vertices: tuple[IntArray, IntArray]
     joints: IntArray | None
 
 
-def surface_seams(surface: Surface, named: Sequence[NamedSeam]) -> tuple[SurfaceSeam, ...]:
+def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> tuple[SurfaceSeam, ...]:
     """Find named seams on a surface.
 
     Args:
