@@ -1,15 +1,22 @@
-"""Whole garments: what is found in them, how they are cut, and how flat their pieces lie.
+"""Whole garments: what is found in them, how they are cut, how flat their pieces lie, and how near to the mesh they sew up.
 
-python benchmarks/garments.py [FILES or FOLDER ...] [--fabric woven] [--command]
+python benchmarks/garments.py [FILES or FOLDER ...] [--fabric woven] [--quick]
 
 Default: $WARPFLAT_DATA/garments. A file in another unit than metres is given as FILE:SCALE, as suit.obj:0.1; a file whose size is
 that of a person in decimetres, centimetres or millimetres is scaled by itself.
+
+Columns: strain energy [J] and share beyond the limit [%] before (in one piece, `--seams none`, at most a minute), parted where every
+garment of its kind is, and with darts and further seams, the last two sewn; stretches at 5 and 95 % of the cloth; left and right seams
+apart; both sides of seams apart; seconds of the whole command with its exit code; distance of the sewn cloth from the mesh, draped over
+it (mean, 95 %).
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
+import subprocess
 import sys
 import tempfile
 import time
@@ -18,10 +25,21 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
+from warpflat.draping.body import Body
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.relax_drape import relax_drape
+from warpflat.draping.sewn_cloth import sew_cloth
+from warpflat.garment.garment import Garment
 from warpflat.garment.sew_pieces import meeting_borders
 from warpflat.seams.find import FoundSeams
 from warpflat.surface.io.read import SUFFIXES
 from warpflat.surface.mesh import Surface
+from warpflat.surface.tubes import tube_borders
+
+# Seconds for a garment in one piece.
+_BEFORE = 60
+# The cloth is draped with little weight, so that what shows is its cut, and until little moves.
+_DRAPE = DrapeOptions(gravity=1.0, tolerance=0.02, max_steps=1000)
 
 
 def read(path: str) -> list[Surface]:
@@ -35,87 +53,146 @@ def read(path: str) -> list[Surface]:
     ]
 
 
+def write(layers: list[Surface], path: Path) -> None:
+    """Write layers as one OBJ [m]."""
+    lines, count = [], 0
+    for layer in layers:
+        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in layer.vertices.tolist()]
+        lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in layer.faces.tolist()]
+        count += len(layer.vertices)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def before(layers: list[Surface], fabric: str) -> list[str]:
+    """Return energy and share beyond the limit of the largest layer, laid flat in one piece."""
+    import json
+
+    with tempfile.TemporaryDirectory() as folder:
+        mesh = Path(folder) / "garment.obj"
+        write(layers[:1], mesh)
+        command = [sys.executable, "-m", "warpflat", "flatten", str(mesh), "--units", "m", "--fabric", fabric]
+        command += [
+            "--seams",
+            "none",
+            "--no-picture",
+            "--frames",
+            "0",
+            "--gap",
+            "0",
+            "--quiet",
+            "--out",
+            f"{folder}/out",
+        ]
+        try:
+            subprocess.run(command, capture_output=True, check=False, timeout=_BEFORE)
+            piece = next(iter(json.loads((Path(folder) / "out" / "metrics.json").read_text())["pieces"].values()))
+        except subprocess.TimeoutExpired:
+            return [f"> {_BEFORE} s", ""]
+        except OSError:
+            return ["refused", ""]
+    return [f"{piece['strain_energy_j']:.2f}", f"{100 * piece['wear']['outside']:.1f}"]
+
+
+def sewn(found: FoundSeams, fabric: str) -> Garment:
+    """Return the pieces, flattened and sewn as the command does it."""
+    surfaces = [warpflat.open_tube(piece) if tube_borders(piece) else piece for piece in found.pieces]
+    grain = ["grain" if "grain" in piece.lines else None for piece in surfaces]
+    pieces = [warpflat.flatten(piece, fabric=fabric, datum=datum) for piece, datum in zip(surfaces, grain, strict=True)]
+    return warpflat.sew_pieces(pieces)
+
+
+def strain(garment: Garment) -> list[str]:
+    """Return energy and share beyond the limit."""
+    pieces = list(garment.pieces.values())
+    area = np.array([float(piece.fit.area.sum()) for piece in pieces])
+    outside = np.array([piece.fit.outside for piece in pieces])
+    energy = sum(piece.layout_measures["strain_energy_j"] for piece in pieces)
+    return [f"{energy:.2f}", f"{100 * float((outside * area).sum() / area.sum()):.2f}"]
+
+
+def stretches(garment: Garment) -> str:
+    """Return the principal stretches, space over pattern, at 5 and 95 % of the cloth."""
+    values, weights = [], []
+    for piece in garment.pieces.values():
+        faces = piece.faces[:, :3]
+        p, q = piece.positions[faces], piece.network.surface.vertices[faces]
+        flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=2)
+        space = np.stack([q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]], axis=2)
+        gradient = space @ np.linalg.inv(flat)
+        values.append(np.sqrt(np.linalg.eigvalsh(gradient.transpose(0, 2, 1) @ gradient)).ravel())
+        weights.append(np.repeat(0.5 * np.abs(np.linalg.det(flat)), 2))
+    value, weight = np.concatenate(values), np.concatenate(weights)
+    order = np.argsort(value)
+    share = np.cumsum(weight[order]) / weight.sum()
+    low, high = (value[order][np.searchsorted(share, part)] for part in (0.05, 0.95))
+    return f"{low:.3f}-{high:.3f}"
+
+
 def left_and_right_apart(found: FoundSeams) -> float:
     """Return how much the lengths of left and right seams of one name differ, at most [mm]."""
     length = {seam.name: seam.length for seam in found.seams}
-    pairs = [(one, one.replace("left", "right")) for one in length if "left" in one]
-    return 1e3 * max((abs(length[one] - length[other]) for one, other in pairs if other in length), default=0.0)
+    pairs = [(one, re.sub(r"\bleft\b", "right", one)) for one in length if re.search(r"\bleft\b", one)]
+    return 1e3 * max((abs(length[one] - length.get(other, 0.0)) for one, other in pairs), default=0.0)
 
 
-def measure(path: str, fabric: str) -> list[str]:
-    """Return a row of the table."""
-    begun = time.perf_counter()
-    layers = read(path)
-    plain = warpflat.find_seams(layers)
-    found_at = time.perf_counter()
-    darted = warpflat.find_seams(layers, fabric=fabric)
-    cells = []
-    sewn_apart = 0.0
-    for found in (plain, darted):
-        surfaces = [warpflat.open_tube(p) if _is_tube(p) else p for p in found.pieces]
-        pieces = [
-            warpflat.flatten(piece, fabric=fabric, datum="grain" if "grain" in piece.lines else None)
-            for piece in surfaces
-        ]
-        sewn = warpflat.sew_pieces(pieces)
-        if sewn is not None:
-            sewn_apart = max(abs(1e3 * (seam.lengths[0] - seam.lengths[1])) for seam in sewn.seams)
-            pieces = list(sewn.pieces)
-        area = np.array([float(piece.fit.area.sum()) for piece in pieces])
-        outside = np.array([piece.fit.outside for piece in pieces])
-        energy = sum(piece.layout_measures["strain_energy_j"] for piece in pieces)
-        cells += [f"{energy:.2f}", f"{100 * float((outside * area).sum() / area.sum()):.1f}"]
-    pairs = meeting_borders({piece.name: piece for piece in darted.pieces})
-    by_name = {piece.name: piece for piece in darted.pieces}
-    length = sum(
-        float(np.linalg.norm(np.diff(by_name[pair.pieces[0]].vertices[pair.vertices[0]], axis=0), axis=1).sum())
-        for pair in pairs
+def draped(garment: Garment, layers: list[Surface]) -> str:
+    """Return the distance of the sewn cloth at rest over the mesh that was given, mean and 95 % [mm]."""
+    seams = [(pair.pieces, pair.vertices) for pair in garment.seam_pairs]
+    cloth = sew_cloth(list(garment.pieces.values()), seams=seams)
+    begin = np.cumsum([0, *(len(layer.vertices) for layer in layers)])
+    faces = [np.where(layer.faces >= 0, layer.faces + first, -1) for layer, first in zip(layers, begin, strict=False)]
+    body = Body(
+        np.concatenate([layer.vertices for layer in layers]), np.concatenate(faces).astype(np.int32), device="cpu"
     )
-    return [
-        Path(path.partition(":")[0]).stem[:22],
-        darted.what[:34],
-        str(len(darted.pieces)),
-        f"{length / np.sqrt(area.sum()):.1f}",
-        *cells,
-        f"{left_and_right_apart(darted):.1f}",
-        f"{sewn_apart:.2f}",
-        f"{found_at - begun:.1f}",
-        f"{time.perf_counter() - found_at:.1f}",
-    ]
+    worn = relax_drape(cloth, body, options=_DRAPE)
+    away = 1e3 * np.abs(body.gaps(worn.positions))
+    return "fell off" if worn.fell_off else f"{away.mean():.1f}, {np.quantile(away, 0.95):.1f}"
 
 
-def _is_tube(surface: Surface) -> bool:
-    from warpflat.surface.tubes import tube_borders
-
-    return bool(tube_borders(surface))
-
-
-def whole_command(path: str, fabric: str) -> str:
+def whole_command(layers: list[Surface], fabric: str) -> str:
     """Return the seconds of the whole command, with pictures and film, and its exit code."""
-    import subprocess
-
-    layers = read(path)
     with tempfile.TemporaryDirectory() as folder:
         mesh = Path(folder) / "garment.obj"
-        lines, count = [], 0
-        for layer in layers:
-            lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in layer.vertices.tolist()]
-            lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in layer.faces.tolist()]
-            count += len(layer.vertices)
-        mesh.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        begun = time.perf_counter()
+        write(layers, mesh)
         command = [sys.executable, "-m", "warpflat", "flatten", str(mesh), "--units", "m", "--fabric", fabric]
-        done = subprocess.run(
-            [*command, "--seams", "auto", "--quiet", "--out", f"{folder}/out"], capture_output=True, check=False
-        )
+        command += ["--seams", "auto", "--quiet", "--out", f"{folder}/out"]
+        begun = time.perf_counter()
+        done = subprocess.run(command, capture_output=True, check=False)
         return f"{time.perf_counter() - begun:.1f} ({done.returncode})"
+
+
+def measure(path: str, fabric: str, *, quick: bool) -> list[str]:
+    """Return a row of the table."""
+    layers = read(path)
+    plain = sewn(warpflat.find_seams(layers), fabric)
+    found = warpflat.find_seams(layers, fabric=fabric)
+    garment = sewn(found, fabric)
+    by_name = {piece.name: piece.vertices for piece in found.pieces}
+    pairs = meeting_borders({piece.name: piece for piece in found.pieces})
+    lines = [by_name[pair.pieces[0]][pair.vertices[0]] for pair in pairs]
+    length = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
+    area = sum(float(piece.fit.area.sum()) for piece in garment.pieces.values())
+    return [
+        Path(path.partition(":")[0]).stem[:22],
+        found.what[:34],
+        str(sum(len(layer.faces) for layer in layers)),
+        str(len(found.pieces)),
+        f"{length / np.sqrt(area):.1f}",
+        *(["", ""] if quick else before(layers, fabric)),
+        *strain(plain),
+        *strain(garment),
+        stretches(garment),
+        f"{left_and_right_apart(found):.1f}",
+        f"{max((1e3 * abs(seam.lengths[0] - seam.lengths[1]) for seam in garment.seams), default=0.0):.2f}",
+        *(["", ""] if quick else [whole_command(layers, fabric), draped(garment, layers)]),
+    ]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("paths", nargs="*", default=[f"{os.environ.get('WARPFLAT_DATA', '.')}/garments"])
     parser.add_argument("--fabric", default="woven")
-    parser.add_argument("--command", action="store_true", help="time the whole command, too")
+    parser.add_argument("--quick", action="store_true", help="no single piece, no whole command and no drape")
     options = parser.parse_args()
     files = [
         str(file)
@@ -124,16 +201,15 @@ def main() -> None:
         if Path(str(file).partition(":")[0]).suffix.lower() in SUFFIXES and "avatar" not in str(file)
     ]
     heads = (
-        "garment|what|pieces|seam/sqrt(A)|parted J|beyond %|with darts J|beyond %|left-right mm|sides mm|s found|s rest"
+        "garment|what|faces|pieces|seam/sqrt(A)|before J|%|parted J|%|with darts J|%|stretch|left-right mm|sides mm"
+        "|command s (rc)|draped mm"
     )
-    print(" | ".join(heads.split("|")) + (" | command s (rc)" if options.command else ""), flush=True)
+    print(" | ".join(heads.split("|")), flush=True)
     for file in files:
         try:
-            row = measure(file, options.fabric)
+            row = measure(file, options.fabric, quick=options.quick)
         except warpflat.InputError as error:
             row = [Path(file).stem, f"refused: {error}"]
-        if options.command:
-            row.append(whole_command(file, options.fabric))
         print(" | ".join(row), flush=True)
 
 

@@ -75,6 +75,18 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
             amiss = _within(max(held["amiss_mm"] for held in constraints))
             parts.append(f"{format_count(len(constraints), 'constraint')} within {amiss}")
         lines.append(_clipped(f"seams: {'; '.join(parts)}"))
+    if found := metrics.get("garment", {}).get("found_seams"):
+        # Left and right together, the one that releases most first.
+        groups: dict[str, list[Mapping[str, Any]]] = {}
+        for seam in found:
+            groups.setdefault(re.sub(r" (left|right)\b", "", seam["name"]), []).append(seam)
+        prices = {name: sum(seam["released_j"] or 0.0 for seam in own) for name, own in groups.items()}
+        words = []
+        for name in sorted(groups, key=lambda one: -prices[one]):
+            tried = any(seam["released_j"] is not None for seam in groups[name])
+            price = f" {energy_words(prices[name], 2)}" if tried else f" ({groups[name][0]['needed'] or 'not tried'})"
+            words.append(f"{name}{price}, {100 * sum(seam['length_m'] for seam in groups[name]):.0f} cm")
+        lines.append(_listed("seams release: ", words))
     if metrics.get("rings"):
         lines.append(_clipped(rings_line(metrics["rings"])))
     if len(metrics.get("cloths", ())) > 1:

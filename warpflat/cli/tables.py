@@ -84,6 +84,20 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             for seam in metrics["seams"]
         ]
         tables.append(_aligned(columns, seams, left=(0, 1)))
+    if found := metrics.get("garment", {}).get("found_seams"):
+        # What closing each seam would cost, per centimetre that is sewn.
+        prices = [
+            (
+                seam["name"],
+                f"{100 * seam['length_m']:.1f} cm",
+                _price(seam["released_j"]) or seam["needed"] or "not tried",
+                ""
+                if seam["released_j"] is None
+                else f"{10 * seam['released_j'] / max(seam['length_m'], 1e-9):.3g} mJ/cm",
+            )
+            for seam in found
+        ]
+        tables.append(_aligned(("found seam", "sewn", "releases", "per cm"), prices))
     if metrics.get("constraints"):
         held = [
             (each["name"], f"{each['amiss_mm']:.2f} mm", _price(each["price_j"])) for each in metrics["constraints"]

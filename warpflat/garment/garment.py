@@ -36,6 +36,7 @@ from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import BorderSeam
+from warpflat.surface.mirror_images import mirror_images
 
 __all__ = ["Garment", "flatten_form"]
 
@@ -129,7 +130,7 @@ class Garment:
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Pieces that are each other's mirror images, in the body's grid and, within 0.5 mm, in the pattern.
+        """Pieces that are each other's mirror images, in space and, within 0.5 mm, in the pattern.
 
         One of the two is enough for the table: cut it twice, the second time turned over.
         """
@@ -146,12 +147,13 @@ class Garment:
         return tuple(found)
 
     def mirror_vertices(self, first: str, second: str) -> IntArray | None:
-        """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if they are no pair.
+        """Return for each vertex of one piece its mirror image in the other, in space; None if they are no pair.
 
         Matched face by face: along a line at which a piece is cut open, a vertex of the mannequin is two of the piece.
         """
         if self.form is None or self.mannequin is None:
-            return None
+            mate, partners = self._images.get(first, (None, None))
+            return partners if mate == second else None
         one, two, image = self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror
         if len(one.grid_vertices) != len(two.grid_vertices) or len(one.face_brick) != len(two.face_brick):
             return None
@@ -167,6 +169,10 @@ class Garment:
                 return None
             partners[face] = [other[vertex] for vertex in row]
         return partners
+
+    @cached_property
+    def _images(self) -> dict[str, tuple[str, IntArray]]:
+        return mirror_images({name: piece.network.surface for name, piece in self.pieces.items()})
 
     @property
     def notes(self) -> tuple[str, ...]:

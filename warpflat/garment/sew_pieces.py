@@ -25,6 +25,7 @@ from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import SAME_PLACE, BorderSeam, surface_seams
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.mesh import Surface
+from warpflat.surface.mirror_images import even_sides, mirror_images
 from warpflat.surface.repair.layers import Layer, lies_within
 
 __all__ = ["meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
@@ -117,7 +118,11 @@ def sew_pieces(
     if not pairs and not constraints:
         return garment
     sewn = sew(flat, pairs, constraints=constraints, options=options)
-    return replace(garment, pieces={own: sewn.pieces[own] for own in flat}, sewn=sewn)
+    # One pattern serves for both pieces of a pair only where both are the same.
+    images = mirror_images({own: piece.network.surface for own, piece in flat.items()}) if len(flat) > 1 else {}
+    even = even_sides({own: sewn.pieces[own].positions for own in flat}, images)
+    sewn_pieces = {own: replace(sewn.pieces[own], positions=even[own]) for own in flat}
+    return replace(garment, pieces=sewn_pieces, sewn=replace(sewn, pieces=sewn_pieces))
 
 
 def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:

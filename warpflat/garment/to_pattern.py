@@ -26,7 +26,7 @@ from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges
 from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.mark_openings import mark_openings
-from warpflat.garment.mirror_pieces import find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
 from warpflat.garment.openings import one_sided, place_opening
 from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
@@ -80,7 +80,14 @@ def pattern_of_garment(
     """
     rules, sample = rules or EdgeRules(), next(iter(garments.values()))
     if sample.form is None:
-        return pattern_of_surface(list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams)
+        pattern, notes = pattern_of_surface(
+            list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams
+        )
+        if len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
+            return pattern, notes
+        pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
+        drawn, more = _drawn_once(pattern.pieces, pairs)
+        return replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs)), (*notes, *more)
     forms = {size: garment.form for size, garment in garments.items() if garment.form is not None}
     form = sample.form
     if sample.wished is not None:
@@ -140,16 +147,7 @@ def pattern_of_garment(
         seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
     # One pattern cannot serve for both sides where just one of them has an opening.
     pairs = () if one_sided(sample.openings) else find_mirror_pairs(garments, pieces, seams)
-    twice, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
-    drawn = {
-        size: tuple(
-            replace(piece, quantity=2 * piece.quantity) if piece.name in twice else piece
-            for piece in row
-            if piece.name not in left_out
-        )
-        for size, row in pieces.items()
-    }
-    notes = tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
+    drawn, notes = _drawn_once(pieces, pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
@@ -176,6 +174,22 @@ def pattern_of_garment(
     ]  # fmt: skip
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands)
     return add_pockets(pattern, sample.pockets), notes
+
+
+def _drawn_once(
+    pieces: Mapping[str, Sequence[Piece]], pairs: Sequence[MirrorPair]
+) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:
+    """Return the pieces that are drawn, in each size, of each pair one that is cut twice; and a note on each pair."""
+    twice, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
+    drawn = {
+        size: tuple(
+            replace(piece, quantity=2 * piece.quantity) if piece.name in twice else piece
+            for piece in row
+            if piece.name not in left_out
+        )
+        for size, row in pieces.items()
+    }
+    return drawn, tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
 
 
 def _form_piece(

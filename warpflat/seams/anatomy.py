@@ -17,7 +17,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.seams.cloth import Cloth
 from warpflat.seams.fields import MirrorMap, Operators, mirror_map
 
-__all__ = ["AXES", "HOLE", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
+__all__ = ["AXES", "HOLE", "ROLES", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
 
 Ids = NDArray[np.int64]
 Kind = Literal[
@@ -26,6 +26,9 @@ Kind = Literal[
 
 #: Directions by name.
 AXES = {sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[k] for k, letter in enumerate("xyz") for sign in "+-"}
+
+#: What borders are.
+ROLES = ("neck", "waist", "hem", "sleeve", "leg", "opening", "armhole", "hole", "border", "middle", "limb")
 
 # Lengths are shares of the square root of the area, unless they say otherwise.
 # A border shorter than this is a hole: a buttonhole, or a fault of the mesh.
@@ -40,6 +43,8 @@ _OPEN = 0.6
 _SHORTEST_SLEEVE = 0.05
 # The way along sleeve and side bends at the armpit by at least this [cosine of the angle between both].
 _STRAIGHT = np.cos(np.radians(160.0))
+# Two limbs are the same, mirrored, if their directions are within this angle [cosine].
+_SAME_WAY = np.cos(np.radians(20.0))
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
 
@@ -175,11 +180,8 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
             limbs = [replace(limb, side=-limb.side) for limb in limbs]
     mirror = None
     if holds:
+        limbs = _averaged_limbs(limbs, normal, offset, size)
         mirror = mirror_map(cloth.vertices, cloth.faces, normal, offset, reach=0.05 * size)
-        if asymmetry > 1e-3:
-            notes.append(
-                f"left and right differ by {1e3 * asymmetry:.0f} mm in the middle: lines are averaged over both sides"
-            )
     else:
         notes.append(
             f"it has no plane of symmetry (mirrored, it is {1e3 * asymmetry:.0f} mm off): each side has its own lines"
@@ -492,6 +494,23 @@ def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Ki
             )
         )
     return found
+
+
+def _averaged_limbs(limbs: Sequence[Limb], normal: FloatArray, offset: float, size: float) -> list[Limb]:
+    """Return the limbs, each the mean of itself and its mate's mirror image where both are nearly the same."""
+    made = []
+    for limb in limbs:
+        mates = [one for one in limbs if one.kind == limb.kind and one.side == -limb.side]
+        for mate in mates[:1]:
+            along = mate.along - 2.0 * float(mate.along @ normal) * normal
+            fork = mate.fork - 2.0 * (float(mate.fork @ normal) - offset) * normal
+            if along @ limb.along > _SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * size:
+                both = along + limb.along
+                both /= np.linalg.norm(both)
+                length = 0.5 * (limb.length + mate.length)
+                limb = replace(limb, along=both, fork=0.5 * (fork + limb.fork), length=length)
+        made.append(limb)
+    return made
 
 
 def _fork(points: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float, float]:

@@ -167,6 +167,8 @@ class Cloth:
     def _snapped(self, level: str, within: BoolArray) -> Cloth:
         """Return the cloth with vertices that the zero line passes closely moved onto it."""
         f = self.values[level].copy()
+        # A line that passes a vertex within rounding passes through it: a sliver beside it would have no area.
+        f[np.abs(f) <= 1e-9 * np.abs(f[self.faces[within]]).max(initial=0.0)] = 0.0
         he = self.half_edges
         edges, count = he.edges.astype(np.int64), he.count
         held = np.zeros(len(f), dtype=bool)
@@ -205,7 +207,7 @@ class Cloth:
         weight = share[row]
         values = {}
         for name, value in self.values.items():
-            moved = value.copy()
+            moved = f.copy() if name == level else value.copy()
             moved[taken] = (1.0 - weight) * value[taken] + weight * value[other[row]]
             values[name] = moved
         values[level][taken] = 0.0

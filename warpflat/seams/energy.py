@@ -1,4 +1,7 @@
-"""Further seams and darts, where the cloth of a piece stays strained beyond its limit: each is tried, and kept if it releases enough."""
+"""The price of every seam, by trial: what closing it would cost, and what further seams and darts bring where cloth stays strained.
+
+Seams that cost nothing are closed again; darts and seams that release enough are made.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,8 @@ from warpflat.flattening.result import Flattening
 from warpflat.seams.anatomy import Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
+from warpflat.seams.symmetric import other_side
+from warpflat.seams.tailor import FACING, LEFT, side_word
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 
@@ -49,6 +54,15 @@ _SHORTEST, _LONGEST, _BEHIND = 0.03, 0.32, 0.01
 _CLEAR = 0.6
 # Seams and darts at most, mirrored ones counted once; and how many are tried.
 _MOST_ROUNDS, _MOST_TRIALS = 6, 48
+# Pieces of as many faces are the same if the sums of their coordinates agree within this [m].
+_SAME = 1e-6
+# A seam costs nothing if closing it brings no more than this share of the garment's cloth beyond the limit, and no more strain energy than
+# this share of all, and this much [J/m2].
+_NOTHING, _NO_ENERGY, _NO_DENSITY = 1.5e-3, 0.02, 1e-2
+# Seams that a garment keeps even so: it is put together at them.
+_STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm")
+# Prices are known to this share.
+_PRICE_LEFT = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,13 +71,15 @@ class Trial:
 
     Attributes:
         name: of the seam.
-        released: strain energy released [J].
+        released: strain energy released [J]; None where the cloth could not be laid flat without the seam.
         outside: share of the garment's cloth that it brings back within the limit.
+        needed: why there is no such price: "opens a tube".
     """
 
     name: str
-    released: float
+    released: float | None
     outside: float
+    needed: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,19 +91,21 @@ class _Candidate:
         normal, point: of its plane.
         start, end: only what projects between them along the line is cut; all of the piece if start is None [m].
         parts: whether it parts the piece.
+        level: of a line that parts, the field and its value there, instead of a plane.
     """
 
     name: str
     normal: FloatArray
     point: FloatArray
-    start: FloatArray | None
-    end: FloatArray | None
-    parts: bool
+    start: FloatArray | None = None
+    end: FloatArray | None = None
+    parts: bool = False
+    level: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Measured:
-    """A piece, flattened coarsely."""
+    """A piece, flattened coarsely; `mirrored` if it was its mirror image that was flattened."""
 
     mesh: PieceMesh
     surface: Surface
@@ -95,6 +113,8 @@ class _Measured:
     outside: float
     energy: float
     area: float
+    place: FloatArray
+    mirrored: bool = False
 
 
 Prepare = Callable[[Cloth, PieceMesh], Surface]
@@ -112,9 +132,9 @@ def cut_by_energy(
         options: how many pieces there may be, and how much may be beyond the limit.
         prepare: makes the surface of a piece, with its grain.
     """
-    pieces = _measured(cloth, fabric, prepare, [])
+    pieces = _measured(cloth, anatomy, fabric, prepare, [])
     total = sum(piece.area for piece in pieces)
-    trials = list[Trial]()
+    cloth, pieces, trials = _priced(cloth, pieces, anatomy, fabric, options, prepare)
     exhausted = set[int]()
     tried = 0
     most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
@@ -127,7 +147,9 @@ def cut_by_energy(
             (
                 piece
                 for piece in sorted(pieces, key=lambda one: -one.outside)
-                if _key(cloth, piece.mesh, anatomy) not in exhausted and piece.outside > options.limit * piece.area
+                if not piece.mirrored
+                and _key(piece.mesh) not in exhausted
+                and piece.outside > options.limit * piece.area
             ),
             None,
         )
@@ -139,7 +161,7 @@ def cut_by_energy(
         if worst is None or tried >= _MOST_TRIALS:
             break
         twin = _twin(worst, pieces, anatomy)
-        best: tuple[float, _Candidate, float, float, Cloth] | None = None
+        best: tuple[float, _Candidate, Cloth, list[_Measured]] | None = None
         laid = _with_layout(cloth, worst)
         for candidate in _candidates(cloth, worst, anatomy, may_part=parting and len(pieces) < most):
             if options.forbids(candidate.name):
@@ -150,7 +172,7 @@ def cut_by_energy(
             if made is None:
                 continue
             try:
-                after = _measured(made, fabric, prepare, pieces)
+                after = _measured(made, anatomy, fabric, prepare, pieces)
             except InputError:
                 continue
             if not _can_be_sewn(
@@ -161,37 +183,110 @@ def cut_by_energy(
             ):
                 continue
             gain = beyond - sum(piece.outside for piece in after)
-            released = sum(piece.energy for piece in pieces) - sum(piece.energy for piece in after)
-            length = _length(made, f"trial of {candidate.name}")
-            value = gain - _PRICE * 100.0 * length
+            value = gain - _PRICE * 100.0 * _length(made, f"trial of {candidate.name}")
             least = max(_WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
             if gain >= least and (best is None or value > best[0]):
-                best = value, candidate, gain, released, made
-                if gain >= _ENOUGH * worst.outside:
+                best = value, candidate, made, after
+                if gain >= _ENOUGH * worst.outside and not candidate.parts:
                     break
         if best is None:
-            exhausted.add(_key(cloth, worst.mesh, anatomy))
+            exhausted.add(_key(worst.mesh))
             if twin is not None:
-                exhausted.add(_key(cloth, twin.mesh, anatomy))
+                exhausted.add(_key(twin.mesh))
             continue
-        _, candidate, gain, released, made = best
-        names = [_free_name(cloth, candidate, _side_of(worst.mesh, cloth, anatomy) if twin is not None else 0)]
+        _, candidate, made, after = best
+        lopsided = candidate.start is not None or candidate.level is not None
+        lopsided &= abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
+        both = anatomy.mirror is not None and (twin is not None or lopsided)
+        side = 0 if not both else _side_of(worst.mesh, anatomy) if twin is not None else _across(candidate, anatomy)
+        names = [_free_name(cloth, candidate, side)]
         made = replace(made, values={key: value for key, value in made.values.items() if not key.startswith("flat ")})
         cloth = _renamed(made, f"trial of {candidate.name}", names[0])
-        mirrored = _mirrored(candidate, anatomy)
-        lopsided = candidate.start is not None and abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
-        if anatomy.mirror is not None and (twin is not None or (lopsided and not candidate.parts)):
+        if both:
             # The other side is cut alike.
+            names.append(_free_name(cloth, candidate, -side))
             target = _mesh_at(cloth, twin.mesh if twin is not None else worst.mesh)
-            names.append(_free_name(cloth, candidate, -_side_of(worst.mesh, cloth, anatomy) if twin is not None else 0))
-            other = None if target is None else _cut(cloth, target, mirrored, names[1])
-            if other is not None:
-                cloth = other
-        before, pieces = pieces, _measured(cloth, fabric, prepare, pieces)
+            other = None if target is None else _cut(cloth, target, _mirrored(candidate, anatomy), names[1])
+            names = names if other is not None else names[:1]
+            cloth = other or cloth
+        before, pieces = pieces, _measured(cloth, anatomy, fabric, prepare, [*pieces, *after])
         gain = (sum(one.outside for one in before) - sum(one.outside for one in pieces)) / total
         released = sum(one.energy for one in before) - sum(one.energy for one in pieces)
         trials += [Trial(name=name, released=released / len(names), outside=gain / len(names)) for name in names]
     return cloth, trials, sum(piece.outside for piece in pieces) / total
+
+
+def _priced(
+    cloth: Cloth,
+    pieces: list[_Measured],
+    anatomy: Anatomy,
+    fabric: Fabric,
+    options: SeamOptions,
+    prepare: Prepare,
+) -> tuple[Cloth, list[_Measured], list[Trial]]:
+    """Return the cloth without seams whose price is nothing, its pieces, and what each of its seams does.
+
+    The price of a seam is what closing it would bring: strain energy, and cloth beyond the limit. Left and right go together.
+    """
+    area, energy = sum(one.area for one in pieces), sum(one.energy for one in pieces)
+    outside = sum(one.outside for one in pieces)
+    found: dict[str, Trial] = {}
+    for name in sorted(cloth.seams, key=lambda one: _length(cloth, one), reverse=True):
+        if name in found or name not in cloth.seams:
+            continue
+        report_activity(f"seams: what {name} is worth")
+        mate = other_side(name)
+        both = [name, mate] if mate != name and mate in cloth.seams else [name]
+        alike = anatomy.mirror is not None and len(both) == 2
+        trial, after = _without(cloth, both[:1], pieces, anatomy, fabric, prepare)
+        found[name] = trial
+        if alike:
+            found[mate] = replace(trial, name=mate)
+        most = _NO_ENERGY * energy + _NO_DENSITY * area
+        kept = name.startswith(_STRUCTURAL)
+        if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
+            continue
+        if len(both) == 2:
+            trial, after = _without(cloth, both, pieces, anatomy, fabric, prepare)
+        now = sum(one.outside for one in after)
+        if (
+            trial.released is None
+            or trial.released > len(both) * most
+            or now > max(outside + _NOTHING * area, options.limit * area)
+        ):
+            continue
+        for one in both:
+            cloth = cloth.without_seam(one)
+            found.pop(one, None)
+        pieces, outside, energy = after, now, energy + trial.released
+    return cloth, pieces, [found[name] for name in cloth.seams if name in found]
+
+
+def _without(
+    cloth: Cloth, names: Sequence[str], pieces: list[_Measured], anatomy: Anatomy, fabric: Fabric, prepare: Prepare
+) -> tuple[Trial, list[_Measured]]:
+    """Return what seams do, by the pieces that there were without them, and these pieces."""
+    closed = cloth
+    for name in names:
+        closed = closed.without_seam(name)
+    needed = Trial(name=names[0], released=None, outside=0.0, needed="opens a tube")
+    if any(not _is_disk(mesh.faces) for mesh in closed.pieces()):
+        return needed, pieces
+    try:
+        # What costs much need not be known well: joined pieces are large, and far from rest.
+        after = _measured(closed, anatomy, fabric, prepare, pieces, energy_left=_PRICE_LEFT)
+    except InputError:
+        return replace(needed, needed="cannot lie flat without it"), pieces
+    if sum(one.result.overlap for one in after) > sum(one.result.overlap for one in pieces) + _OVERLAP:
+        return replace(needed, needed="lies over itself without it"), pieces
+    released = sum(one.energy for one in after) - sum(one.energy for one in pieces)
+    total = sum(one.area for one in pieces)
+    gain = (sum(one.outside for one in after) - sum(one.outside for one in pieces)) / total
+    return Trial(name=names[0], released=released, outside=gain), after
+
+
+def _is_disk(faces: Ids) -> bool:
+    return euler_characteristic(faces.astype(np.int32)) == 1 and len(border_loops(faces.astype(np.int32))) == 1
 
 
 def _usual_pieces(anatomy: Anatomy, now: int) -> int:
@@ -199,23 +294,43 @@ def _usual_pieces(anatomy: Anatomy, now: int) -> int:
     return max(now, {"top": 6, "dress": 6, "skirt": 4, "trousers": 4, "jumpsuit": 12, "sleeve": 2}.get(anatomy.kind, 8))
 
 
-def _measured(cloth: Cloth, fabric: Fabric, prepare: Prepare, known: Sequence[_Measured]) -> list[_Measured]:
-    """Return the pieces, flattened coarsely; those that are as they were are taken over.
+def _measured(
+    cloth: Cloth,
+    anatomy: Anatomy,
+    fabric: Fabric,
+    prepare: Prepare,
+    known: Sequence[_Measured],
+    *,
+    energy_left: float = 0.02,
+) -> list[_Measured]:
+    """Return the pieces, flattened coarsely; those that are as they were are taken over, and mirror images are flattened once.
+
+    The energy is right to a share of `energy_left`, from above.
 
     Raises:
         InputError: a piece cannot be flattened.
     """
     # A trial need tell good from bad, no more.
-    trial_options = replace(coarse_options(), energy_left=0.02, outline_left_mm=2.0, check_every=5)
-    same = {(len(one.mesh.faces), one.mesh.vertices[:, :2].sum().round(9)): one for one in known}
-    found = []
+    trial_options = replace(
+        coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=5
+    )
+    axes = np.stack([anatomy.normal, anatomy.up, anatomy.front], axis=1)
+    found: list[_Measured] = []
     for mesh in cloth.pieces():
-        key = len(mesh.faces), mesh.vertices[:, :2].sum().round(9)
-        if key in same:
-            found.append(replace(same[key], mesh=mesh))
+        # By the sums of their coordinates in the garment's own axes: those of a mirror image differ in one sign.
+        place = (mesh.vertices @ axes - [anatomy.offset, 0.0, 0.0]).sum(axis=0)
+        alike = [one for one in (*known, *found) if len(one.mesh.faces) == len(mesh.faces)]
+        same = next((one for one in alike if np.abs(one.place - place).max() < _SAME), None)
+        if same is not None:
+            found.append(replace(same, mesh=mesh))
+            continue
+        image = place * [-1.0, 1.0, 1.0]
+        same = next((one for one in alike if not one.mirrored and np.abs(one.place - image).max() < _SAME), None)
+        if same is not None and anatomy.mirror is not None:
+            found.append(replace(same, mesh=mesh, place=place, mirrored=True))
             continue
         surface = prepare(cloth, mesh)
-        if euler_characteristic(surface.faces) != 1 or len(border_loops(surface.faces)) != 1:
+        if not _is_disk(mesh.faces):
             # A tube is opened when all seams are known.
             continue
         datum = "grain" if "grain" in surface.lines else None
@@ -235,6 +350,7 @@ def _measured(cloth: Cloth, fabric: Fabric, prepare: Prepare, known: Sequence[_M
                 outside=fit.outside * area,
                 energy=result.layout_measures["strain_energy_j"],
                 area=area,
+                place=place,
             )
         )
     return found
@@ -270,13 +386,13 @@ def _with_layout(cloth: Cloth, piece: _Measured) -> Cloth:
     return replace(cloth, values={**cloth.values, **flat})
 
 
-def _key(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> int:
+def _key(mesh: PieceMesh) -> int:
     """Return a number by which a piece is known while others are cut: its area and place, rounded."""
     middle = mesh.vertices[mesh.faces].mean(axis=1).mean(axis=0)
     return hash((len(mesh.faces), tuple(np.round(middle, 4).tolist())))
 
 
-def _side_of(mesh: PieceMesh, cloth: Cloth, anatomy: Anatomy) -> int:
+def _side_of(mesh: PieceMesh, anatomy: Anatomy) -> int:
     return 1 if float((mesh.vertices @ anatomy.normal).mean()) - anatomy.offset > 0.0 else -1
 
 
@@ -311,14 +427,7 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
     if may_part and not sleeve and misfits:
         if whole:
             name = "centre front" if ahead else "centre back"
-            yield _Candidate(
-                name=name,
-                normal=anatomy.normal,
-                point=anatomy.offset * anatomy.normal,
-                start=None,
-                end=None,
-                parts=True,
-            )
+            yield _Candidate(name=name, normal=anatomy.normal, point=anatomy.offset * anatomy.normal, parts=True)
         tall = float(np.ptp(heights))
         level = float(np.average(heights[[m.vertex for m in misfits]], weights=[m.area for m in misfits]))
         if 0.2 * tall < level - heights.min() < 0.8 * tall and tall > 0.5 * size:
@@ -326,10 +435,23 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
                 name="waist" if tall > 0.8 * size else "yoke",
                 normal=anatomy.up,
                 point=level * anatomy.up,
-                start=None,
-                end=None,
                 parts=True,
             )
+        # Further lines of the families to which centre and side belong, through the place that is strained the most.
+        place = max(misfits, key=lambda one: one.area).vertex
+        at = int(piece.mesh.vertex_of[place])
+        for field, name in ((LEFT, "princess"), (FACING, "panel")):
+            value = float(cloth.values[field][at]) if field in cloth.values else 0.0
+            own = cloth.values[field][piece.mesh.vertex_of] if field in cloth.values else np.zeros(1)
+            low, high = np.quantile(own, [0.15, 0.85])
+            if low < value < high and (field == FACING or not whole or abs(across[place]) > 0.04 * size):
+                yield _Candidate(
+                    name=name,
+                    normal=anatomy.normal,
+                    point=surface.vertices[place],
+                    parts=True,
+                    level=(field, value),
+                )
     loop = border_loops(surface.faces)[0]
     rim = surface.vertices[loop]
     normals = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
@@ -400,6 +522,9 @@ def _across(candidate: _Candidate, anatomy: Anatomy) -> float:
 def _mirrored(candidate: _Candidate, anatomy: Anatomy) -> _Candidate:
     """Return the mirror image of a line."""
     n, d = anatomy.normal, anatomy.offset
+    level = candidate.level
+    if level is not None and level[0] == LEFT:
+        level = LEFT, -level[1]
 
     def image(point: FloatArray | None) -> FloatArray | None:
         return None if point is None else point - 2.0 * (float(point @ n) - d) * n
@@ -407,7 +532,8 @@ def _mirrored(candidate: _Candidate, anatomy: Anatomy) -> _Candidate:
     point = image(candidate.point)
     assert point is not None
     normal = candidate.normal - 2.0 * float(candidate.normal @ n) * n
-    return replace(candidate, normal=normal, point=point, start=image(candidate.start), end=image(candidate.end))
+    start, end = image(candidate.start), image(candidate.end)
+    return replace(candidate, normal=normal, point=point, start=start, end=end, level=level)
 
 
 def _cut(cloth: Cloth, mesh: PieceMesh, candidate: _Candidate, name: str) -> Cloth | None:
@@ -417,7 +543,10 @@ def _cut(cloth: Cloth, mesh: PieceMesh, candidate: _Candidate, name: str) -> Clo
     """
     own = np.zeros(len(cloth.faces), dtype=bool)
     own[mesh.face_of] = True
-    field = (cloth.vertices - candidate.point) @ candidate.normal
+    if candidate.level is None:
+        field = (cloth.vertices - candidate.point) @ candidate.normal
+    else:
+        field = cloth.values[candidate.level[0]] - candidate.level[1]
     cloth = replace(cloth, values={**cloth.values, "trial": field})
     if candidate.start is not None and candidate.end is not None:
         way = candidate.end - candidate.start
@@ -494,9 +623,9 @@ def _renamed(cloth: Cloth, old: str, new: str) -> Cloth:
     return replace(cloth, seams={new if key == old else key: edges for key, edges in cloth.seams.items()})
 
 
-def _free_name(cloth: Cloth, candidate: _Candidate, side: int) -> str:
-    """Return an unused name of a seam or a dart, with its side."""
+def _free_name(cloth: Cloth, candidate: _Candidate, side: float) -> str:
+    """Return an unused name of a seam or a dart, with its side: positive left, negative right."""
     from warpflat.core.text import find_unused_name
 
-    word = {1: " left", -1: " right", 0: ""}[side]
+    word = "" if side == 0.0 else f" {side_word(side)}"
     return find_unused_name(f"{candidate.name}{word}", cloth.seams)

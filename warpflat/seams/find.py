@@ -14,12 +14,13 @@ from warpflat.core.errors import InputError, expect
 from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
-from warpflat.seams.anatomy import Anatomy, axis_name, describe, find_anatomy
+from warpflat.seams.anatomy import ROLES, Anatomy, axis_name, describe, find_anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.energy import Trial, cut_by_energy
 from warpflat.seams.fields import Operators
 from warpflat.seams.options import SeamOptions
 from warpflat.seams.solid import is_panel, part_solids
+from warpflat.seams.symmetric import averaged, mirrored
 from warpflat.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word
 from warpflat.seams.thickness import without_thickness
 from warpflat.surface.connectivity import border_loops
@@ -45,16 +46,18 @@ class FoundSeam:
     Attributes:
         name: as "side left".
         length: [m].
-        released: strain energy that it releases, by trial [J]; None for seams that every garment of the kind has.
+        released: strain energy that it releases, by trial [J]; None where nothing was tried.
+        needed: why the cloth cannot lie flat without it: "opens a tube"; "" where it can.
     """
 
     name: str
     length: float
     released: float | None = None
+    needed: str = ""
 
     def as_dict(self) -> dict[str, object]:
         """Return plain data."""
-        return {"name": self.name, "length_m": self.length, "released_j": self.released}
+        return {"name": self.name, "length_m": self.length, "released_j": self.released, "needed": self.needed}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,16 +136,24 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
         turned = [words, *turned]
         operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
+    cloth, moved, even = averaged(cloth, anatomy, operators)
+    turned = [*turned, *moved]
+    operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    role = np.zeros(len(cloth.vertices))
+    for border in anatomy.borders:
+        role[border.vertices] = 1.0 + ROLES.index(border.role)
+    cloth = replace(cloth, values={"role": role})
     notes = list[str]()
     if anatomy.kind in TAILORED:
         cloth, notes = cut_as_a_tailor(draw_fields(cloth, anatomy, operators), anatomy)
     shape = anatomy.kind not in TAILORED and not is_panel(cloth)
     cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
     notes += more
+    cloth = (mirrored(cloth, anatomy) if even else None) or cloth
     for name in list(cloth.seams):
         if options.forbids(name):
             cloth = cloth.without_seam(name)
-    trials = list[Trial]()
+    trials, basic = list[Trial](), set(cloth.seams)
     if fabric is not None:
         try:
             cloth, trials, _ = cut_by_energy(
@@ -150,6 +161,9 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
             )
         except InputError as reason:
             notes.append(f"no further seams were looked for: {reason}")
+        cloth = (mirrored(cloth, anatomy) if even else None) or cloth
+        if closed := sorted(basic - cloth.seams.keys()):
+            notes.append(f"{', '.join(closed)} closed again: the cloth lies flat without, within its limit")
     price = {trial.name: trial for trial in trials}
     pieces = _as_surfaces(cloth, anatomy, surface)
     return FoundSeams(
@@ -159,6 +173,7 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
                 name=name,
                 length=float(np.linalg.norm(np.diff(cloth.vertices[edges], axis=1), axis=2).sum()),
                 released=price[name].released if name in price else None,
+                needed=price[name].needed if name in price else "",
             )
             for name, edges in cloth.seams.items()
         ),
@@ -207,10 +222,11 @@ def _as_surfaces(cloth: Cloth, anatomy: Anatomy, whole: Surface) -> list[Surface
     meshes = list(cloth.pieces())
     names = _names(cloth, anatomy, meshes)
     label = {tuple(edge): name for name, edges in cloth.seams.items() for edge in edges.tolist()}
-    role = dict[int, str]()
-    old = {vertex: border for border in anatomy.borders for vertex in border.vertices.tolist()}
-    for vertex, border in old.items():
-        role[vertex] = border.role
+    role = {
+        vertex: ROLES[int(number) - 1]
+        for vertex, number in enumerate(np.round(cloth.values["role"]).tolist())
+        if number > 0.0
+    }
     of_face = np.empty(len(cloth.faces), dtype=np.int64)
     for number, mesh in enumerate(meshes):
         of_face[mesh.face_of] = number
@@ -313,13 +329,7 @@ def _alike(pieces: Sequence[Surface]) -> list[str]:
         same = [first, *(k for k in others if np.abs(np.subtract(measures[k], measures[first])).max() < _ALIKE * size)]
         left = [k for k in left if k not in same]
         names = [pieces[k].name for k in same]
-        if (
-            len(names) == 2
-            and names[0].split("_")[1:] == names[1].split("_")[1:]
-            and {names[0].split("_")[0], names[1].split("_")[0]} == {"left", "right"}
-        ):
-            notes.append(f"{names[0]} and {names[1]} mirror each other: cut 2, one mirrored")
-        elif len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
+        if len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
             notes.append(f"{', '.join(names)} are alike: cut {len(names)}, or some of them mirrored")
     return notes
 

@@ -79,7 +79,7 @@ def draw_fields(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> Fields:
     centre = centre[np.abs(facing[centre]) > _FACES]
     front = operators.solve(centre, np.sign(facing[centre]), data=facing, length=_SCREEN * size)
     front = front if mirror is None else mirror.symmetrised(front)
-    values = {FACING: front, LEFT: left}
+    values = {**cloth.values, FACING: front, LEFT: left}
     sleeves = {}
     for number, limb in enumerate(anatomy.limbs_of("sleeve")):
         if number in armholes:

@@ -1,0 +1,108 @@
+"""Both sides of a garment are cut alike, one of two mirrored pieces is drawn, and every seam has its price."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import seam_solids as solids
+
+import warpflat
+from warpflat.cli.main import main
+from warpflat.seams.find import FoundSeams
+from warpflat.surface.mesh import Surface
+from warpflat.surface.mirror_images import mirror_images
+
+
+@cache
+def lopsided(by: float) -> Surface:
+    """A shirt whose left side is wider and has the longer sleeve."""
+    plain = solids.shirt(arm=0.4, step=0.045)
+    vertices = plain.vertices.copy()
+    vertices[:, 0] *= np.where(vertices[:, 0] > 0.0, 1.0 + by, 1.0)
+    return warpflat.make_surface(vertices, plain.faces, name="shirt", closed=True)
+
+
+@cache
+def found_on(by: float) -> FoundSeams:
+    return warpflat.find_seams(lopsided(by))
+
+
+@pytest.mark.parametrize("by", [0.0, 0.03])
+def test_left_and_right_are_cut_alike_within_a_millimetre(by: float) -> None:
+    found = found_on(by)
+    length = {seam.name: seam.length for seam in found.seams}
+    for name in ("armhole", "side", "shoulder", "underarm"):
+        assert length[f"{name} left"] == pytest.approx(length[f"{name} right"], abs=1e-4)
+    told = [note for note in found.notes if note.startswith("both sides are averaged and cut alike")]
+    assert told
+    images = mirror_images({piece.name: piece for piece in found.pieces})
+    assert {name: mate for name, (mate, _) in images.items()} == {
+        "front": "front", "back": "back", "left_sleeve": "right_sleeve", "right_sleeve": "left_sleeve",
+    }  # fmt: skip
+
+
+def test_what_is_not_nearly_symmetric_keeps_its_sides() -> None:
+    found = found_on(0.12)
+    length = {seam.name: seam.length for seam in found.seams}
+    assert length["underarm left"] > 1.05 * length["underarm right"]
+    assert not any("averaged and cut alike" in note for note in found.notes)
+
+
+def test_underarm_and_side_meet_at_the_armhole() -> None:
+    pieces = {piece.name: piece for piece in found_on(0.0).pieces}
+    for side in ("left", "right"):
+        sleeve = pieces[f"{side}_sleeve"]
+        underarm = np.concatenate(
+            [sleeve.vertices[line[[0, -1]]] for name, line in sleeve.lines.items() if name.startswith("underarm")]
+        )
+        seams = [line for name, line in pieces["front"].lines.items() if name.startswith("side")]
+        ends = pieces["front"].vertices[np.concatenate([line[[0, -1]] for line in seams])]
+        assert np.linalg.norm(underarm[:, None] - ends, axis=2).min() < 1e-9
+
+
+def test_every_seam_has_a_price_or_a_reason() -> None:
+    found = warpflat.find_seams(lopsided(0.0), warpflat.SeamOptions(no=("dart",), limit=1.0), fabric="woven")
+    price = {seam.name: seam for seam in found.seams}
+    assert price["underarm left"].needed == "opens a tube"
+    assert price["underarm left"].released is None
+    for name in ("armhole left", "side left", "shoulder right"):
+        released = price[name].released
+        assert price[name].needed or (released is not None and released > 0.0)
+    assert any(seam.released is not None for seam in found.seams)
+    assert price["armhole left"].released == price["armhole right"].released
+
+
+def test_a_seam_that_costs_nothing_is_closed_again() -> None:
+    # Straight legs lie flat without the seams at their sides.
+    surface = solids.trousers()
+    plain = {seam.name for seam in warpflat.find_seams(surface).seams}
+    assert {"side left", "side right"} <= plain
+    easy = warpflat.find_seams(surface, fabric="jersey")
+    assert not {"side left", "side right"} & {seam.name for seam in easy.seams}
+    assert len(easy.pieces) == 2
+    assert any(note.startswith("side left, side right closed again") for note in easy.notes)
+
+
+def test_mirrored_pieces_are_drawn_once(tmp_path: Path) -> None:
+    surface = lopsided(0.0)
+    mesh = tmp_path / "shirt.obj"
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
+    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
+    mesh.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    arguments = ["flatten", str(mesh), "--units", "m", "--fabric", "woven", "--no-picture", "--frames", "0"]
+    assert main([*arguments, "--limit", "1", "--out", str(tmp_path / "out")]) == 0
+    pattern = warpflat.read_pattern_json(tmp_path / "out" / "pattern.json")
+    pieces = {piece.name: piece.piece for row in pattern.pieces.values() for piece in row}
+    assert set(pieces) == {"front", "back", "left_sleeve"}
+    assert pieces["left_sleeve"].quantity == 2
+    assert pieces["left_sleeve"].paired
+    # All of the right sleeve's seams are there, at the left one's edges.
+    sides = [side for seam in pattern.garment.seams for row in seam.sides for side in row]
+    assert sum(side.mirrored for side in sides) == sum(
+        side.piece == "left_sleeve" and not side.mirrored for side in sides
+    )
+    svg = (tmp_path / "out" / "shirt.svg").read_text(encoding="utf-8")
+    assert "Cut 2, 1 mirrored" in svg
