@@ -15,7 +15,7 @@ import warpflat
 from warpflat.cli.tables import warnings_of
 from warpflat.core.errors import InputError
 from warpflat.draping.frames import choose_frames, write_drape_frames
-from warpflat.draping.hollows import HOLLOW_REACH, hollow_depths
+from warpflat.draping.result import HOLLOW_REACH, hollow_depths
 from warpflat.draping.sewn_cloth import sew_cloth
 
 

@@ -21,10 +21,10 @@ from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.injective import border_edges_of
 from warpflat.surface.mesh import Surface
 
-__all__ = ["contact_note", "cut_between_contacts"]
+__all__ = ["TRIAL_TOLERANCE", "contact_note", "cut_between_contacts"]
 
-# Tolerances of a trial are looser by this factor.
-_TRIAL_TOLERANCE = 20.0
+#: Tolerances of a trial are looser by this factor: what it is asked for settles long before the energy.
+TRIAL_TOLERANCE = 20.0
 
 
 def contact_note(result: Flattening) -> str | None:
@@ -43,8 +43,8 @@ def contact_note(result: Flattening) -> str | None:
     options = piece.options
     quick = replace(
         options,
-        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
-        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
+        energy_tolerance=min(TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
+        residual_tolerance=TRIAL_TOLERANCE * options.residual_tolerance,
         gap_mm=0.0,
     )
     try:

@@ -17,6 +17,7 @@ from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.solver.options import RelaxOptions, given_options
+from warpflat.surface.cells import LEAST_AREA
 from warpflat.surface.cut.cut_mesh import Crack
 from warpflat.surface.cut.dart import dart_measure
 from warpflat.surface.half_edges import mesh_edges
@@ -24,10 +25,6 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 
 __all__ = ["DartMove", "move_dart"]
-
-
-# A face that closing the dart has made smaller than this share of its area on the body is untangled.
-_LEAST_AREA = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +80,7 @@ def move_dart(
     drawn = _close_cracks(both.network.surface, both.positions, closing)
     positions = carry_layout(drawn, both.faces, made.surface.faces, len(made.surface.vertices))
     # Faces that this has folded are untangled before the relaxation; if they cannot be, the piece is developed anew.
-    positions, folded = untangle(made.surface, positions, least_area=_LEAST_AREA)
+    positions, folded = untangle(made.surface, positions, least_area=LEAST_AREA)
     if folded:
         positions = develop(made.surface, both.datum).positions
     after = relax_cut(

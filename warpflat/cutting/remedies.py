@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.cutting.contact_remedy import contact_note
+from warpflat.cutting.contact_remedy import TRIAL_TOLERANCE, contact_note
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.fit_report import Remedy
@@ -25,10 +25,6 @@ __all__ = ["advise", "remedies"]
 
 # A line that passes within this distance of the worst place can take the dart for it [m].
 _NEARBY = 0.03
-
-
-# Tolerances of a trial are looser by this factor: the share beyond the limit settles long before the energy.
-_TRIAL_TOLERANCE = 20.0
 
 
 _MOST_TRIALS = 8
@@ -80,8 +76,8 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
     options = unsewn.options
     quick = replace(
         options,
-        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
-        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
+        energy_tolerance=min(TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
+        residual_tolerance=TRIAL_TOLERANCE * options.residual_tolerance,
         max_steps=min(options.max_steps, unsewn.stages[-1].steps + 2000),
         gap_mm=0.0,
     )

@@ -11,9 +11,13 @@ from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.kernels.drape_contact import find_planes
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["Body"]
+__all__ = ["SKIN", "Body"]
 
 _FAR = 1e3  # [m]
+#: Its colour in pictures and films, sRGB.
+SKIN = (0.80, 0.79, 0.77)
+# It is drawn this much smaller [m], so that cloth that lies on it is seen.
+_SHRUNK = 0.003
 
 
 class Body:
@@ -22,6 +26,7 @@ class Body:
     Attributes:
         vertices: #V by 3 [m].
         triangles: #T by 3.
+        shrunk: #V by 3 [m], as it is drawn: a little smaller, so that cloth on it is seen.
         mesh: Warp's mesh.
         normals: #V, unit normals on the device.
     """
@@ -31,6 +36,7 @@ class Body:
         self.vertices, self.device = vertices, device
         self.triangles, _ = triangulate(faces)
         normals = vertex_normals(area_vectors(vertices, self.triangles), self.triangles, len(vertices))
+        self.shrunk = vertices - _SHRUNK * normals
         self.normals = wp.array(normals.astype(np.float32), dtype=wp.vec3, device=device)
         self.mesh = wp.Mesh(
             points=wp.array(vertices.astype(np.float32), dtype=wp.vec3, device=device),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.output import latest_file
 from warpflat.core.sums import weighted_percentile
+from warpflat.draping.body import SKIN
 from warpflat.draping.result import Drape
 from warpflat.export.colours import energy_colours, linear_rgb
 from warpflat.export.figure import write_moving_picture
@@ -32,9 +33,6 @@ from warpflat.surface.triangles import triangulate
 __all__ = ["choose_frames", "write_drape_film", "write_drape_frames"]
 
 _COUNT = 30
-# The body is drawn this much smaller [m], so that cloth that lies on it is seen.
-_SHRUNK = 0.003
-_SKIN = (0.80, 0.79, 0.77)
 _RATE, _HEIGHT, _PAPER, _MARGIN = 12, 420, 249, 8
 # Room between the worn garment and the surfaces beside it [m].
 _BESIDE = 0.3
@@ -95,7 +93,7 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         tag.Set("drape", begin)
         body = define_mesh(stage, "/World/drape/body", drape.body.triangles)
         set_points(body, drape.body.vertices)
-        body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(_SKIN).tolist())])
+        body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(SKIN).tolist())])
         cloth = define_mesh(stage, "/World/drape/cloth", drape.cloth.faces)
         colours = cloth.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
         widest = _widest(drape)
@@ -123,8 +121,7 @@ def write_drape_film(path: Path, drape: Drape) -> None:
     from PIL import Image
 
     body, widest = drape.body, _widest(drape)
-    normals = vertex_normals(area_vectors(body.vertices, body.triangles), body.triangles, len(body.vertices))
-    inner = body.vertices - _SHRUNK * normals
+    inner = body.shrunk
     cloth, _ = triangulate(drape.cloth.faces)
     everything = np.concatenate(drape.frames)
     low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
@@ -134,7 +131,7 @@ def write_drape_film(path: Path, drape: Drape) -> None:
     for number in choose_frames(drape.frames):
         points = drape.frames[number].astype(np.float64)
         gap = drape.body.gaps(points)[cloth].mean(axis=1)
-        colours = np.concatenate([energy_colours(gap, widest), np.tile(_SKIN, (len(skin), 1))])
+        colours = np.concatenate([energy_colours(gap, widest), np.tile(SKIN, (len(skin), 1))])
         joined = np.concatenate([points, inner]), np.concatenate([cloth, skin + len(points)]).astype(np.int32)
         views = [_view(*joined, colours, (low, high), degrees) for degrees in (0.0, 90.0, 180.0)]
         pictures.append(Image.fromarray(np.concatenate(views, axis=1)))

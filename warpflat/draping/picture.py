@@ -14,19 +14,17 @@ from matplotlib.colors import Normalize
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
 from warpflat.core.sums import weighted_percentile
+from warpflat.draping.body import SKIN
 from warpflat.draping.result import Drape
 from warpflat.export.colours import on_cloth
 from warpflat.export.figure import GREY, PAGE_WIDTH, Pen, new_figure, write_figure
-from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
+from warpflat.export.geometry import outline_edges
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_garment import Body, crop_body
 from warpflat.export.picture_views import SIDES, DrawnView, Facets, make_facets, view_from_side
 
 __all__ = ["write_compared_drapes", "write_drape_picture"]
 
-_SKIN = (0.80, 0.79, 0.77)
-# The body is drawn this much smaller [m], so that cloth that lies on it is seen.
-_SHRUNK = 0.003
 _TALLEST, _TOP, _BOTTOM, _BAR = 8.0, 0.48, 0.05, 0.9
 
 
@@ -137,15 +135,13 @@ def _strain(drape: Drape) -> FloatArray:
 def _body_around(drape: Drape) -> tuple[FloatArray, Facets, FloatArray]:
     """Return the worn cloth and then the part of the body around it as vertices and facets, and the colours of the body's faces."""
     body, x = drape.body, drape.positions
-    normals = vertex_normals(area_vectors(body.vertices, body.triangles), body.triangles, len(body.vertices))
-    inner = body.vertices - _SHRUNK * normals
     # Arms and legs far from the cloth would only make the pictures small.
     corners = np.column_stack([body.triangles, np.full(len(body.triangles), -1)])
-    kept, inner = crop_body(Body(vertices=inner, faces=corners), x)
+    kept, inner = crop_body(Body(vertices=body.shrunk, faces=corners), x)
     triangles = np.column_stack([kept + len(x), np.full(len(kept), -1)])
     faces = np.concatenate([drape.cloth.faces, triangles]).astype(np.int32)
     facets = make_facets(faces, outline_edges(drape.cloth.faces))
-    return np.concatenate([x, inner]), facets, np.tile(_SKIN, (len(triangles), 1))
+    return np.concatenate([x, inner]), facets, np.tile(SKIN, (len(triangles), 1))
 
 
 def _draw_scale(

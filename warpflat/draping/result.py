@@ -22,12 +22,12 @@ from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["Drape"]
+__all__ = ["HOLLOW_REACH", "Drape", "hollow_depths"]
 
 # Distances up to this are not looked into [m].
 _NEGLIGIBLE = 1e-3
-# Cloth bridges a hollow that has the surface on all sides within this distance [m].
-_HOLLOW_REACH = 0.12
+#: Cloth bridges a hollow that has the surface on all sides within this distance [m].
+HOLLOW_REACH = 0.12
 # A cut within this distance of a place may take it up [m].
 _NEAR_CUT = 0.15
 
@@ -102,7 +102,7 @@ class Drape:
         triangles, _ = triangulate(self.cloth.faces)
         designed = self.cloth.designed
         normals = vertex_normals(area_vectors(designed, triangles), triangles, len(designed))
-        bridged[at] = np.minimum(self._off[at], _hollow_depths(designed, normals, at.astype(np.int32)))
+        bridged[at] = np.minimum(self._off[at], hollow_depths(designed, normals, at.astype(np.int32)))
         return bridged
 
     @property
@@ -209,10 +209,10 @@ def _spread(values: FloatArray, weights: FloatArray) -> dict[str, float]:
     return {"mean": mean, "p95": weighted_percentiles(values, weights, [0.95])[0], "max": float(values.max())}
 
 
-def _hollow_depths(points: FloatArray, normals: FloatArray, at: IntArray) -> FloatArray:
+def hollow_depths(points: FloatArray, normals: FloatArray, at: IntArray) -> FloatArray:
     """Measure how far the convex hull of a surface's neighbourhood lies above its vertices, along their normals.
 
-    The neighbourhood is the surface within `_HOLLOW_REACH` whose normal points to the same side. Cloth that is drawn taut
+    The neighbourhood is the surface within `HOLLOW_REACH` whose normal points to the same side. Cloth that is drawn taut
     over it lies within that hull, so that it may stand off by this much without being too large.
 
     Args:
@@ -225,7 +225,7 @@ def _hollow_depths(points: FloatArray, normals: FloatArray, at: IntArray) -> Flo
     """
     depths, tree = np.zeros(len(at)), cKDTree(points)
     for number, (vertex, near) in enumerate(
-        zip(at.tolist(), tree.query_ball_point(points[at], _HOLLOW_REACH), strict=True)
+        zip(at.tolist(), tree.query_ball_point(points[at], HOLLOW_REACH), strict=True)
     ):
         near = np.asarray(near)
         near = near[normals[near] @ normals[vertex] > 0.0]

@@ -19,7 +19,7 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
 from warpflat.kernels.grid_lists import lay_profiles
 from warpflat.solver.collapse import Coarsening, iterate_coarsenings
-from warpflat.surface.cells import CellArrays, make_cells
+from warpflat.surface.cells import LEAST_AREA, CellArrays, make_cells
 from warpflat.surface.connectivity import border_of, coincident_vertices, euler_characteristic, non_manifold_vertices
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges, half_edges_of, opposite_half_edges
@@ -47,8 +47,6 @@ _FEW_VERTICES = 100
 # A thread takes at least this many rows of a grid.
 _FEW_ROWS = 64
 _GOLDEN = 0.6180339887498949
-# A cell of less than this share of its area counts as mirrored, since it would slow the whole relaxation down.
-_LEAST_AREA = 0.01
 # A development is repaired rather than given up if at most this share of its faces is mirrored.
 _FEW = 0.1
 # Repairing at most this many faces, or this share of them, does not change the directions of the whole.
@@ -123,7 +121,7 @@ def develop(surface: Surface, datum: IntArray) -> Development:
         if folded > _FEW * len(surface.faces):
             continue
         for start, mirrored in _starts(surface, cells, positions):
-            mended, left = untangle(surface, start, least_area=_LEAST_AREA, suspects=mirrored)
+            mended, left = untangle(surface, start, least_area=LEAST_AREA, suspects=mirrored)
             if left == 0 and not winds_twice(surface, cells, mended):
                 smoothed = "" if start is positions else "smoothed by a coarser mesh and "
                 notes.append(f"they were {smoothed}turned back, with a few faces around them")
@@ -206,10 +204,10 @@ def close_cracks(surface: Surface, datum: IntArray) -> tuple[Surface, IntArray] 
 
 def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
     """Return the cells that are mirrored or nearly collapsed."""
-    if (cells.least_shares(positions) > _LEAST_AREA).all():
+    if (cells.least_shares(positions) > LEAST_AREA).all():
         return np.empty(0, dtype=np.int64)
     corner, _, weight = corner_triangles(cells.faces)
-    return np.flatnonzero(signed_cell_areas(corner, positions) * weight <= _LEAST_AREA * cells.area)
+    return np.flatnonzero(signed_cell_areas(corner, positions) * weight <= LEAST_AREA * cells.area)
 
 
 def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:

@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.surface.cells import make_cells
+from warpflat.surface.cells import LEAST_AREA, make_cells
 from warpflat.surface.injective import is_injective, winds_twice
 from warpflat.surface.laplacian import laplacian_of
 from warpflat.surface.mesh import Surface
 
 __all__ = ["as_rigid_layout"]
 
-# A cell of less than this share of its area counts as mirrored.
-_LEAST_AREA = 0.01
 # As-rigid iterations end with one that moves the piece by no more than this share of its size, or after so many.
 _SMALL_STEP = 1e-3
 _MOST_STEPS = 20
@@ -33,7 +31,7 @@ def as_rigid_layout(surface: Surface, positions: FloatArray) -> FloatArray | Non
             break
 
     def is_unfolded(layout: FloatArray) -> bool:
-        return bool(cells.least_shares(layout).min() > _LEAST_AREA)
+        return bool(cells.least_shares(layout).min() > LEAST_AREA)
 
     if is_unfolded(layouts[-1]) and is_injective(surface, layouts[-1]):
         return layouts[-1]

@@ -16,7 +16,10 @@ from warpflat.surface.mesh import Surface, once_per_surface, read_only, store_re
 from warpflat.surface.triangles import corner_triangles
 from warpflat.surface.unfold import VertexLists, corners_of, lay_cells, quad_creases
 
-__all__ = ["CellArrays", "face_creases", "first_of_faces", "inherit_cells", "make_cells"]
+__all__ = ["LEAST_AREA", "CellArrays", "face_creases", "first_of_faces", "inherit_cells", "make_cells"]
+
+#: A cell of less than this share of its area on the body counts as mirrored: it would slow the whole relaxation down.
+LEAST_AREA = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
