@@ -26,6 +26,14 @@ from warpflat.pattern.seam_words import seam_words
 SIZES = ("36", "38", "40")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def created():
+    """All files of these tests say that they were written on 17 May 2024 at 9:30 UTC."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", "1715938200")
+        yield
+
+
 @pytest.fixture(scope="module")
 def dress():
     return draft_garment(sample_dress(SIZES))
