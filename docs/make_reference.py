@@ -47,6 +47,8 @@ HEADINGS = {
     "AutoCutTable": "`[auto_cut]`",
     "SeamTable": "`[[seams]]`",
     "FindSeamsTable": "`[seams]`",
+    "SeamCutTable": "`[[seams_cut]]`",
+    "SeamCutPlane": "`plane` of a seam",
     "ConstraintTable": "`[[constraints]]`",
     "WearTable": "`[wear]`",
     "DrapeTable": "`[drape]`",

@@ -68,7 +68,7 @@ if TYPE_CHECKING:
     from warpflat.scene.run import run_scene
     from warpflat.seams.find import find_seams
     from warpflat.seams.layers import read_layers
-    from warpflat.seams.options import SeamOptions
+    from warpflat.seams.options import SeamCut, SeamOptions
     from warpflat.solver.options import RelaxOptions
     from warpflat.surface.io.read import read_surface
     from warpflat.surface.mesh import Surface
@@ -122,6 +122,7 @@ _HOME = {
     "RelaxationStep": "flattening.step_by_step",
     "Remedy": "flattening.fit_report",
     "ScanOptions": "mannequin.scan_pose",
+    "SeamCut": "seams.options",
     "SeamOptions": "seams.options",
     "SeamWish": "garment.ease",
     "Straight": "garment.constraints",
@@ -204,6 +205,7 @@ __all__ = [
     "RelaxationStep",
     "Remedy",
     "ScanOptions",
+    "SeamCut",
     "SeamOptions",
     "SeamWish",
     "Straight",

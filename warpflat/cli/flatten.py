@@ -11,9 +11,11 @@ import click
 from warpflat.cli.options import EXIT_CODES, RUN_FILES, ComputingCommand, output_options
 from warpflat.cli.run import run_and_report
 from warpflat.core.errors import InputError
-from warpflat.core.text import plain_letters
+from warpflat.core.text import plain_letters, quote_value
 
 __all__ = ["flatten"]
+
+_CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|marked)\s*(?::(?P<body>.*))?", re.DOTALL)
 
 
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
@@ -34,6 +36,18 @@ __all__ = ["flatten"]
 )
 @click.option("--up", metavar="AXIS", help="Where up is: +y, +z ...  [default: found]")
 @click.option("--no", multiple=True, metavar="SEAM", help='A seam that is left closed: "shoulder", "side left".')
+@click.option(
+    "--keep", multiple=True, metavar="SEAM", help='A seam that is made in any case: "waist", "yoke", "centre back".'
+)
+@click.option(
+    "--cut-seam",
+    "cut_seams",
+    multiple=True,
+    metavar="[NAME=]WAY",
+    help='A seam that you draw, in metres: "points:X,Y,Z X,Y,Z ..." over the cloth, "line:X,Y,Z X,Y,Z ..." projected onto it, '
+    '"plane:POINT NORMAL" or "plane:POINT NORMAL TOWARDS" for half a plane, "edges:FILE" of vertex numbers, "line:NAME" of the file, '
+    '"marked" for all lines and creases of the file.',
+)
 @click.option("--smooth", type=float, metavar="MM", help="Smooth wrinkles over so many millimetres before it is cut.")
 @click.option("--most-pieces", type=int, metavar="N", help="At most so many pieces.  [default: as usual for its kind]")
 @click.option(
@@ -107,6 +121,8 @@ def flatten(
       warpflat flatten front.obj --units m --datum 120,2087 --out front
       warpflat flatten garment.obj --units cm --component all
       warpflat flatten shirt.obj --units m --fabric woven --seams auto
+      warpflat flatten shirt.obj --units m --keep waist --cut-seam "yoke=points:-0.2,1.4,-0.1 0,1.38,-0.12 0.2,1.4,-0.1"
+      warpflat flatten leggings.ply --units m --seams none --cut-seam "plane:0,0,0 1,0,0"
     """
     from warpflat.scene.load import make_scene
 
@@ -133,8 +149,10 @@ def flatten(
     for option, (table, key) in places.items():
         if options[option] is not None:
             tables.setdefault(table, {})[key] = options[option]
-    if options["no"]:
-        tables.setdefault("find_seams", {})["no"] = list(options["no"])
+    for option in ("no", "keep"):
+        if options[option]:
+            tables.setdefault("find_seams", {})[option] = list(options[option])
+    tables["seams_cut"] = [_drawn_seam(text) for text in options["cut_seams"]]
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
     for key in ("name", "fabric", "start", "grain_angle", "model"):
@@ -157,10 +175,55 @@ def flatten(
         tables["cuts"] = [{"line": opening.rstrip("/").rpartition("/")[2]}]
     # "Ärmel (1).obj" gives files "Armel_1".
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-") or "piece"
-    scene = make_scene(tables, name=name, folder=Path(), where="command line")
     try:
+        scene = make_scene(tables, name=name, folder=Path(), where="command line")
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
     except InputError as error:
         message = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
+        message = re.sub(
+            r"command line: seams_cut\[(\d+)\]",
+            lambda found: f"--cut-seam {options['cut_seams'][int(found[1])]!r}",
+            message,
+        )
         # What is said of no option is about the mesh.
         raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", message)) from None
+
+
+def _drawn_seam(text: str) -> dict[str, Any]:
+    """Return the table of a scene's `[[seams_cut]]` that an option `--cut-seam` stands for.
+
+    Raises:
+        InputError: it is none.
+    """
+    found = _CUT.fullmatch(text.strip())
+    where = f"--cut-seam {quote_value(text)}"
+    if found is None or (found["body"] is None) != (found["way"] == "marked"):
+        raise InputError(
+            f"{where}: give points:, line:, plane:, edges:FILE or marked, perhaps with NAME= before it, "
+            'as "side left=points:0.2,1,0 0.2,0.6,0"'
+        )
+    way, body = found["way"], (found["body"] or "").strip()
+    name = {} if found["name"] is None else {"name": found["name"].strip()}
+    if way == "marked":
+        return {**name, "marked": True}
+    if way == "edges" or (way == "line" and "," not in body):
+        return {**name, way: body}
+    places: list[Any] = []
+    for word in body.split():
+        numbers = word.split(",")
+        try:
+            if way == "points" and re.fullmatch("[0-9]{1,18}", word):
+                places.append(int(word))
+                continue
+            places.append([float(number) for number in numbers])
+            if len(numbers) != 3:
+                raise ValueError
+        except ValueError:
+            right = "X,Y,Z in metres" + (", or the number of a vertex" if way == "points" else "")
+            raise InputError(f"{where}: {quote_value(word)} is no place; give {right}") from None
+    if way != "plane":
+        return {**name, way: places}
+    if len(places) not in (2, 3):
+        raise InputError(f"{where}: a plane is a point and a normal, and perhaps a direction; got {len(places)} places")
+    plane = dict(zip(("point", "normal", "towards"), places, strict=False))
+    return {**name, "plane": plane}

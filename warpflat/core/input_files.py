@@ -68,6 +68,9 @@ FORMATS: Mapping[str, FileFormat] = {
     "DXF": FileFormat("a DXF pattern", 50 * _MEGABYTE, "export it again as DXF R12, outlines as closed polylines"),
     "SVG": FileFormat("an SVG pattern", 20 * _MEGABYTE, "export it again as plain SVG, outlines as closed paths"),
     "mesh": FileFormat("a mesh", 500 * _MEGABYTE, "export it again with vertices and faces alone"),
+    "edges": FileFormat(
+        "a list of edges", 50 * _MEGABYTE, "give the numbers of a row of vertices in each line, or JSON lists"
+    ),
     "piece": FileFormat("a piece of a run", 500 * _MEGABYTE, "run the scene again"),
     "picture": FileFormat("a picture of a run", 200 * _MEGABYTE, "run the scene again"),
     "film": FileFormat("the film of a run", 4000 * _MEGABYTE, "run the scene again"),

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, is_number, nearest
+from warpflat.core.input_files import check_values, reading
 from warpflat.core.memory_limit import require_memory_for_run
+from warpflat.core.text import quote_value
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
-from warpflat.scene.schema import FileSurface
+from warpflat.scene.schema import FileSurface, SeamCutTable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from warpflat.flattening.result import Flattening
     from warpflat.seams.find import FoundSeams
+    from warpflat.seams.options import SeamCut
     from warpflat.surface.mesh import Surface
 
-__all__ = ["found_seams", "seams_entry"]
+__all__ = ["found_seams", "read_edges", "seams_entry"]
 
 # More than this share of the cloth beyond its limit is no pattern yet.
 _NO_PATTERN = 0.1
@@ -30,33 +36,38 @@ _FEWEST = 60
 
 
 def found_seams(scene: Scene) -> FoundSeams | None:
-    """Find the seams of a scene's garment; None where it asks for none, or its one piece can lie flat.
+    """Find the seams of a scene's garment, and make those that it draws; None where it asks for none, or its one piece can lie flat.
 
     Raises:
         InputError: the file is wrong.
     """
     from warpflat.seams.find import find_seams
-    from warpflat.seams.layers import read_layers
+    from warpflat.seams.layers import read_garment
     from warpflat.seams.options import SeamOptions
 
     settings, table = scene.settings, scene.settings.surface
     asked = settings.find_seams
-    if not isinstance(table, FileSurface) or table.component == "all" or (asked is not None and asked.find == "none"):
+    drawn = settings.seams_cut
+    if not isinstance(table, FileSurface) or table.component == "all":
+        return None
+    if asked is not None and asked.find == "none" and not (drawn or asked.keep):
         return None
     own = ("lines", "cuts", "auto_cut", "datum", "start", "constraints", "seams", "drape")
-    if asked is None and (table.component is not None or any(getattr(settings, key) for key in own)):
+    if asked is None and not drawn and (table.component is not None or any(getattr(settings, key) for key in own)):
         return None
     with errors_named(f"{scene.where}: surface.file"):
         path = scene.folder / expand_variables(table.file)
     try:
-        layers: Sequence[Surface] = read_layers(path, units=table.units, prim=table.prim, name=scene.name)
+        whole, marks = read_garment(path, units=table.units, prim=table.prim, name=scene.name)
+        layers: Sequence[Surface] = whole
     except InputError:
-        if asked is None:
+        if asked is None and not drawn:
             return None
         raise
     # Before anything is tried on it, or read again.
     require_memory_for_run(sum(len(layer.vertices) for layer in layers), frames=FrameSchedule(settings.output).wanted)
-    if asked is None and not _is_whole_garment(layers[0]):
+    by_itself = asked is None and _is_whole_garment(layers[0])
+    if asked is None and not drawn and not by_itself:
         return None
     if isinstance(table.component, int):
         if table.component >= len(layers):
@@ -66,12 +77,100 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         layers = [layers[table.component]]
     elif table.component == "largest":
         layers = layers[:1]
-    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"find", "smooth_mm"})
+    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"smooth_mm"})
+    given |= {"find": "auto" if by_itself else "none"} if asked is None else {}
     smooth = 0.0 if asked is None else 1e-3 * asked.smooth_mm
-    options = SeamOptions(**{**given, "no": tuple(given.get("no", ())), "smooth": smooth})
-    found = find_seams(layers, options, fabric=scene_fabric(scene))
+    cuts = tuple(cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, marks))
+    with errors_named(scene.where):
+        options = SeamOptions(
+            **{**given, "no": tuple(given.get("no", ())), "keep": tuple(given.get("keep", ()))},
+            smooth=smooth,
+            cuts=cuts,
+        )
+        found = find_seams(layers, options, fabric=scene_fabric(scene))
     why = "one piece cannot lie flat, so its seams were found; --seams none keeps it whole"
-    return found if asked is not None else replace(found, notes=(why, *found.notes))
+    if drawn:
+        why = "one piece cannot lie flat, so other seams were found, too; --seams none makes no others than you have drawn"
+    return replace(found, notes=(why, *found.notes)) if by_itself else found
+
+
+def _as_cuts(scene: Scene, number: int, table: SeamCutTable, marks: Sequence[SeamCut]) -> list[SeamCut]:
+    """Return the cuts of a table; `marks` are the lines of the garment's file.
+
+    Raises:
+        InputError: a line or a file is missing, or the file holds no rows of vertices.
+    """
+    from warpflat.seams.options import SeamCut
+
+    where = f"seams_cut[{number}]"
+    here = f"{scene.where}: {where}"
+    if table.marked or isinstance(table.line, str):
+        names = [mark.name or "" for mark in marks]
+        chosen = [mark for mark in marks if table.marked or mark.name == table.line]
+        if not chosen and table.marked:
+            raise InputError(
+                f"{here}: the file has no lines and no creases; mark edges in it, or give points, a plane or edges"
+            )
+        if not chosen:
+            raise InputError(
+                f"{here}: the file has no line {quote_value(table.line)}; {nearest(str(table.line), names)}"
+            )
+        return [replace(mark, name=table.name or mark.name) for mark in chosen]
+    edges: Sequence[Sequence[int]] = ()
+    if isinstance(table.edges, str):
+        with errors_named(here):
+            path = scene.folder / expand_variables(table.edges)
+        edges = read_edges(path)
+    elif table.edges is not None:
+        edges = table.edges
+    plane = table.plane
+    line = table.line if isinstance(table.line, list) else []
+    return [
+        SeamCut(
+            name=table.name,
+            points=tuple(tuple(place) if isinstance(place, list) else place for place in table.points or ()),
+            line=tuple(tuple(place) for place in line),
+            closed=table.closed,
+            plane=None if plane is None else (tuple(plane.point), tuple(plane.normal)),
+            towards=None if plane is None or plane.towards is None else tuple(plane.towards),
+            nearest=plane is not None and plane.nearest,
+            edges=tuple(tuple(row) for row in edges),
+            where=where,
+        )
+    ]
+
+
+def read_edges(path: Path) -> list[list[int]]:
+    """Read rows of vertices, each joined to the next by an edge: a row in each line of a text, or lists in JSON.
+
+    Raises:
+        InputError: one line that names the file: it is missing, or holds anything else.
+    """
+    right = "give the numbers of two vertices or more, from 0, as 12 13 14"
+    with reading(path, "edges") as place:
+        text = path.read_bytes().decode("utf-8-sig", errors="replace")
+        rows: list[list[int]] = []
+        if text.lstrip().startswith("["):
+            data = json.loads(text)
+            check_values(data)
+            for number, row in enumerate(data):
+                place.at = f"row {number + 1}"
+                if not (
+                    isinstance(row, list) and len(row) > 1 and all(is_number(v, whole=True) and v >= 0 for v in row)
+                ):
+                    raise InputError(f"{quote_value(row)} is no row of vertices; {right}")
+                rows.append(row)
+        else:
+            for number, line in enumerate(text.splitlines(), start=1):
+                words = line.partition("#")[0].replace(",", " ").split()
+                place.at = f"line {number}"
+                if words and not (len(words) > 1 and all(re.fullmatch("[0-9]{1,18}", word) for word in words)):
+                    raise InputError(f"{quote_value(line.strip())} is no row of vertices; {right}")
+                rows += [[int(word) for word in words]] if words else []
+        place.at = ""
+        if not rows:
+            raise InputError(f"holds no rows of vertices; {right}")
+    return rows
 
 
 def _is_whole_garment(surface: Surface) -> bool:

@@ -40,6 +40,7 @@ __all__ = [
     "PatternTable",
     "PocketTable",
     "SceneTable",
+    "SeamCutTable",
     "SeamTable",
     "ShapeSurface",
     "kind_of_surface",
@@ -294,8 +295,8 @@ class SeamTable(Table):
 class FindSeamsTable(Table):
     """How the seams of a whole garment are found (see `warpflat.find_seams`); in a scene it is `[seams]`, a table, not `[[seams]]`.
 
-    With `find = "auto"` the garment is cut where a tailor would cut it, with "none" it is kept whole. Without this table a garment that
-    cannot lie flat in one piece is cut.
+    With `find = "auto"` the garment is cut where a tailor would cut it, with "none" only where `[[seams_cut]]` says. Without this table
+    a garment that cannot lie flat in one piece is cut.
     """
 
     find: Literal["auto", "none"] = "auto"
@@ -303,12 +304,66 @@ class FindSeamsTable(Table):
     front: Direction | None = None
     no: list[str] = Field(default_factory=list)
     """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts."""
+    keep: list[str] = Field(default_factory=list)
+    """Seams that are made in any case: "waist", "yoke", "centre back", "side left"."""
     smooth_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
     """Length over which wrinkles of draped or scanned cloth are smoothed before it is cut; how far the cloth moves is told."""
     limit: Annotated[float, Field(ge=0, le=1)] = 0.02
     """Share of the cloth that may stay beyond its strain limit before further seams and darts are looked for."""
     most_pieces: Annotated[int, Field(ge=1, le=1000)] | None = None
     """At most so many pieces of one layer; as many as are usual for its kind if not given."""
+
+
+class SeamCutPlane(PlaneTable):
+    """A plane by a point on it [m] and its normal (any length); all curves in which it meets the garment are cut.
+
+    With `towards` only the half of it that lies in this direction from the point, with `nearest` only the curve that is the nearest to
+    the point.
+    """
+
+    towards: Point | None = None
+    nearest: bool = False
+
+
+class SeamCutTable(Table):
+    """A seam of a whole garment that you draw (see `warpflat.SeamCut`), in one of five ways.
+
+    `points` lists places through which it runs straight over the cloth: points [m], or vertices of the file, from 0. `line` is a polyline
+    near the cloth, which is projected onto it: points [m], or the name of a line of the file. `plane` cuts where it meets the cloth.
+    `edges` lists rows of vertices, or names a file of them: a row in each line, or JSON lists. `marked` takes all lines and creases that
+    the file has. Tables with one `name` are one seam. All are made at once, whatever their order.
+    """
+
+    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
+    points: Annotated[list[PointOrVertex], Field(min_length=2)] | None = None
+    line: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
+            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
+        ]
+        | None
+    ) = None
+    closed: bool = False
+    """Points and lines return to their first point."""
+    plane: SeamCutPlane | None = None
+    edges: (
+        Annotated[
+            Annotated[str, Tag("text")]
+            | Annotated[list[Annotated[list[Vertex], Field(min_length=2)]], Field(min_length=1), Tag("rows")],
+            Discriminator(lambda value: "text" if isinstance(value, str) else "rows"),
+        ]
+        | None
+    ) = None
+    marked: bool = False
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SeamCutTable:
+        ways = (self.points, self.line, self.plane, self.edges, self.marked or None)
+        if sum(way is not None for way in ways) != 1:
+            raise ValueError("give the seam in one way: points, line, plane, edges, or marked = true")
+        if self.closed and self.points is None and not isinstance(self.line, list):
+            raise ValueError("closed belongs to points, or to the points of a line")
+        return self
 
 
 class ConstraintTable(Table):
@@ -570,6 +625,7 @@ class SceneTable(Table):
     auto_cut: AutoCutTable | None = None
     seams: list[SeamTable] = Field(default_factory=list)
     find_seams: FindSeamsTable | None = None
+    seams_cut: list[SeamCutTable] = Field(default_factory=list)
     constraints: list[ConstraintTable] = Field(default_factory=list)
     datum: str | None = None
     start: str | None = None
@@ -617,12 +673,15 @@ class SceneTable(Table):
             if self.ease is not None:
                 raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
             found = self.find_seams is not None and self.find_seams.find == "auto"
-            if found and not isinstance(self.surface, FileSurface):
-                raise ValueError('[seams] find = "auto" takes a garment from a file')
-            if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or found):
+            whole = '[seams] find = "auto"' if found else "[[seams_cut]]" if self.seams_cut else None
+            if whole and not isinstance(self.surface, FileSurface):
+                raise ValueError(f"{whole} takes a garment from a file")
+            if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or whole):
+                if self.surface.component == "all" and self.seams_cut:
+                    raise ValueError('[[seams_cut]] cuts a whole garment; with component = "all" leave it out')
                 for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "constraints", "drape"):
                     if getattr(self, key):
-                        why = '[seams] find = "auto"' if found else 'component = "all"'
+                        why = whole or 'component = "all"'
                         raise ValueError(f"{key} belongs to one piece; with {why} leave it out")
             for number, cut in enumerate(self.cuts):
                 cut.check_for_surface(f"cuts[{number}]")
@@ -639,8 +698,11 @@ class SceneTable(Table):
                     )
         else:
             # Refuse what belongs to a surface.
-            if self.find_seams is not None:
-                raise ValueError("[seams] is for a garment from a file; a form has its own, and [[seams]] change them")
+            if self.find_seams is not None or self.seams_cut:
+                raise ValueError(
+                    f"{'[seams]' if self.find_seams else '[[seams_cut]]'} is for a garment from a file; a form has its own "
+                    "seams, and [[seams]] change them"
+                )
             if self.lines or self.datum:
                 raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
             if self.auto_cut and self.shape == "auto":

@@ -8,13 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.polyline import project_on_segments
 from warpflat.surface.connectivity import border_loops, components, join_labels
+from warpflat.surface.cut.split_faces import split_faces_along
 from warpflat.surface.half_edges import HalfEdges, half_edges
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.trace import SurfacePath
 
 __all__ = ["Cloth", "PieceMesh", "edge_components"]
 
@@ -22,6 +27,8 @@ Ids = NDArray[np.int64]
 
 # A line that passes a vertex within this share of an edge takes the vertex with it.
 _NEAR = 0.2
+# A line keeps this share of an edge away from a vertex that must stay: no needles arise.
+_CLEAR = 0.04
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,7 +116,7 @@ class Cloth:
         hit = (new < len(known)) & (known[np.minimum(new, max(len(known) - 1, 0))] == key) if len(known) else crossing
         middle = np.where(hit, count + new, -1)
         a, b = known // count, known % count
-        t = (f[a] / (f[a] - f[b]))[:, None] if len(known) else np.empty((0, 1))
+        t = np.clip(f[a] / (f[a] - f[b]), _CLEAR, 1.0 - _CLEAR)[:, None] if len(known) else np.empty((0, 1))
         values = {
             name: np.concatenate([value, (1.0 - t[:, 0]) * value[a] + t[:, 0] * value[b]])
             for name, value in cloth.values.items()
@@ -215,6 +222,63 @@ class Cloth:
         vertices[taken] += weight[:, None] * (self.vertices[other[row]] - self.vertices[taken])
         return replace(self, vertices=vertices, values=values)
 
+    def as_surface(self) -> Surface:
+        """Return the cloth as a surface, without its seams."""
+        return Surface(
+            vertices=self.vertices,
+            faces=np.column_stack([self.faces, np.full(len(self.faces), -1)]).astype(np.int32),
+            name="garment",
+            input_vertices=self.vertices,
+            input_index=np.arange(len(self.vertices), dtype=np.int32),
+        )
+
+    def drawn(self, path: SurfacePath) -> tuple[Cloth, Ids]:
+        """Draw a path over the cloth, along edges.
+
+        Vertices that it passes closely move onto it; those of borders and of seams stay.
+
+        Args:
+            path: on the cloth's own surface (see `as_surface`).
+
+        Returns:
+            The cloth, and the path's edges (#E by 2), without those along a border or a seam.
+
+        Raises:
+            InputError: the path crosses itself, or is shorter than the edges around it.
+        """
+        owner = [(name, edge) for name, edges in self.seams.items() for edge in edges]
+        lines = {str(number): edge.astype(np.int32) for number, (_, edge) in enumerate(owner)}
+        split = split_faces_along(replace(self.as_surface(), lines=lines), path)
+        pieces: dict[str, list[tuple[int, int]]] = {name: [] for name in self.seams}
+        for number, (name, _) in enumerate(owner):
+            pieces[name] += pairwise(split.surface.lines[str(number)].tolist())
+        weights, support = split.vertex_weights, np.maximum(split.vertex_support, 0)
+        made = Cloth(
+            vertices=split.surface.vertices.copy(),
+            faces=split.surface.faces[:, :3].astype(np.int64),
+            values={name: (weights * value[support]).sum(axis=1) for name, value in self.values.items()},
+            labels={name: label[split.face_origin] for name, label in self.labels.items()},
+            seams={
+                name: np.unique(np.sort(np.array(own, dtype=np.int64).reshape(-1, 2), axis=1), axis=0)
+                for name, own in pieces.items()
+            },
+        )
+        he = made.half_edges
+        held = np.union1d(he.edges[he.count == 1], made.seam_edges())
+        row = split.path.astype(np.int64)
+        free = np.setdiff1d(row[1:-1] if row[0] != row[-1] else row, held)
+        if len(free):
+            along = np.concatenate([path.points, path.points[:1]]) if path.closed else path.points
+            share, off = project_on_segments(made.vertices[free][:, None], along[:-1], along[1:])
+            best = off.argmin(axis=1)
+            at = share[np.arange(len(free)), best][:, None]
+            made.vertices[free] = (1.0 - at) * along[best] + at * along[best + 1]
+        edges = np.unique(np.sort(np.stack([row[:-1], row[1:]], axis=1), axis=1), axis=0)
+        stride = np.int64(len(made.vertices))
+        taken = np.concatenate([he.edges[he.count == 1].astype(np.int64), made.seam_edges()])
+        new = ~np.isin(edges[:, 0] * stride + edges[:, 1], taken[:, 0] * stride + taken[:, 1])
+        return made, edges[new]
+
     def line_between(self, sides: NDArray[np.generic], within: BoolArray) -> Ids:
         """Return the edges (#E by 2) between faces of different sides (#F), both of them in `within` (#F)."""
         he = self.half_edges
@@ -264,11 +328,19 @@ class Cloth:
         return [loop.astype(np.int64) for loop in border_loops(chosen.astype(np.int32), self.vertices)]
 
 
-def edge_components(edges: Ids) -> list[Ids]:
-    """Return the connected lines among edges (#E by 2), each as rows of edges."""
+def edge_components(edges: Ids, *, ends: Ids | None = None) -> list[Ids]:
+    """Return the connected lines among edges (#E by 2), each as rows of edges.
+
+    Args:
+        edges: #E by 2.
+        ends: vertices at which lines end, though others begin there.
+    """
     if len(edges) == 0:
         return []
-    used, place = np.unique(edges, return_inverse=True)
-    place = place.reshape(-1, 2)
-    label = join_labels(len(used), place[:, 0], place[:, 1])[place[:, 0]]
+    passed = ~np.isin(edges, [] if ends is None else ends)
+    # Edges are one line where they have a vertex in common that is no end.
+    order = np.flatnonzero(passed.ravel())
+    order = order[np.argsort(edges.ravel()[order], kind="stable")]
+    same = edges.ravel()[order[1:]] == edges.ravel()[order[:-1]]
+    label = join_labels(len(edges), order[1:][same] // 2, order[:-1][same] // 2)
     return [edges[label == number] for number in np.unique(label)]

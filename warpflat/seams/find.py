@@ -15,15 +15,17 @@ from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.seams.anatomy import ROLES, Anatomy, axis_name, describe, find_anatomy
+from warpflat.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.energy import Trial, cut_by_energy
 from warpflat.seams.fields import Operators
+from warpflat.seams.openings import open_tubes
 from warpflat.seams.options import SeamOptions
 from warpflat.seams.solid import is_panel, part_solids
 from warpflat.seams.symmetric import averaged, mirrored
-from warpflat.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word
+from warpflat.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves
 from warpflat.seams.thickness import without_thickness
-from warpflat.surface.connectivity import border_loops
+from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import line_on_plane
 from warpflat.surface.triangles import triangulate
@@ -34,6 +36,9 @@ Ids = NDArray[np.int64]
 
 # Pieces are alike if their sizes and outlines agree within this share of the outline.
 _ALIKE = 0.01
+
+# A piece whose parts in front and behind differ by less than this share is of neither.
+_AROUND = 0.35
 
 #: The line of a piece along which its grain runs.
 GRAIN = "grain"
@@ -105,9 +110,11 @@ def find_seams(
     layers = [surface] if isinstance(surface, Surface) else list(surface)
     for layer in layers:
         expect(layer, Surface, "surface", "a Surface, or a sequence of them")
+    # What the user draws lies on any of the layers, and before anything is changed in them.
+    cloths, drawn = cut_by_hand([cloth_of(layer) for layer in layers], layers, options.cuts)
     found: list[FoundSeams] = []
-    for layer in layers:
-        found.append(_find_in_layer(layer, options, None if fabric is None else as_fabric(fabric)))
+    for layer, cloth in zip(layers, cloths, strict=True):
+        found.append(_find_in_layer(cloth, layer, options, None if fabric is None else as_fabric(fabric)))
         # All layers of a garment are worn the same way up.
         options = replace(options, up=options.up or found[0].up, front=options.front or found[0].front)
     often = Counter(piece.name for one in found for piece in one.pieces)
@@ -124,37 +131,55 @@ def find_seams(
         what="; ".join(one.what for one in found),
         up=found[0].up,
         front=found[0].front,
-        notes=tuple(note for one in found for note in one.notes),
+        notes=(*drawn, *(note for one in found for note in one.notes)),
     )
 
 
-def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
-    cloth, turned = without_thickness(cloth_of(surface))
+def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
+    cloth, turned = without_thickness(cloth)
     operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     if options.smooth:
         cloth, words = _smoothed(cloth, operators, options.smooth)
         turned = [words, *turned]
         operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
-    cloth, moved, even = averaged(cloth, anatomy, operators)
-    turned = [*turned, *moved]
-    operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    even = False
+    if not options.cuts:  # what the user draws on one side is on that side alone
+        cloth, moved, even = averaged(cloth, anatomy, operators)
+        turned = [*turned, *moved]
+        operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     role = np.zeros(len(cloth.vertices))
     for border in anatomy.borders:
         role[border.vertices] = 1.0 + ROLES.index(border.role)
-    cloth = replace(cloth, values={"role": role})
-    notes = list[str]()
+    cloth = replace(cloth, values={**cloth.values, "role": role})
+    notes, auto = list[str](), options.find == "auto"
     if anatomy.kind in TAILORED:
-        cloth, notes = cut_as_a_tailor(draw_fields(cloth, anatomy, operators), anatomy)
-    shape = anatomy.kind not in TAILORED and not is_panel(cloth)
-    cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
-    notes += more
+        fields = draw_fields(cloth, anatomy, operators)
+        tailored = auto or options.keep
+        cloth, notes = (
+            cut_as_a_tailor(fields, anatomy) if tailored else (with_drawn_sleeves(fields, anatomy, anywhere=True), [])
+        )
+        for name in list(cloth.seams):
+            if not (auto or name.startswith(HAND) or options.keeps(name)):
+                cloth = cloth.without_seam(name)
+    cloth, left = leave_to_hand(cloth, options)
+    cloth, kept = keep_seams(cloth, anatomy, options)
+    cloth, inside = join_ends(cloth)
+    notes += [*left, *kept, *inside]
+    if auto:
+        shape = anatomy.kind not in TAILORED and not is_panel(cloth)
+        cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
+        notes += more
     cloth = (mirrored(cloth, anatomy) if even else None) or cloth
     for name in list(cloth.seams):
-        if options.forbids(name):
+        if not name.startswith(HAND) and options.forbids(name):
             cloth = cloth.without_seam(name)
+    cloth = open_tubes(cloth, anatomy, options)
+    cloth = replace(cloth, seams={name.removeprefix(HAND): edges for name, edges in cloth.seams.items()})
+    if not auto:
+        _require_open(cloth)
     trials, basic = list[Trial](), set(cloth.seams)
-    if fabric is not None:
+    if fabric is not None and auto:
         try:
             cloth, trials, _ = cut_by_energy(
                 cloth, anatomy, fabric, options, lambda trial, mesh: _surface_of(trial, anatomy, mesh, surface)
@@ -182,6 +207,23 @@ def _find_in_layer(surface: Surface, options: SeamOptions, fabric: Fabric | None
         front=axis_name(anatomy.front),
         notes=(*notes, *turned, *_alike(pieces), *anatomy.notes),
     )
+
+
+def _require_open(cloth: Cloth) -> None:
+    """Refuse what no cut opens: closed pieces, and those with a handle.
+
+    Raises:
+        InputError: there is one.
+    """
+    for mesh in cloth.pieces():
+        loops = len(border_loops(mesh.faces.astype(np.int32)))
+        if loops == 0 or euler_characteristic(mesh.faces.astype(np.int32)) != 2 - loops:
+            x, y, z = (100.0 * mesh.vertices.mean(axis=0)).tolist()
+            what = "is closed" if loops == 0 else "has a handle"
+            raise InputError(
+                f'what the cuts leave {what}, about ({x:.0f}, {y:.0f}, {z:.0f}) cm: cut it once more, or let find = "auto" (--seams auto) '
+                "find the other seams"
+            )
 
 
 def _smoothed(cloth: Cloth, operators: Operators, length: float) -> tuple[Cloth, str]:
@@ -279,19 +321,23 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
         weight = area[mesh.face_of]
         corners = cloth.faces[mesh.face_of]
         facing = cloth.values.get(FACING, np.zeros(len(cloth.vertices)))
-        ahead = float((facing[corners].mean(axis=1) * weight).sum()) > 0.0
         across = (cloth.vertices[corners].mean(axis=1) @ anatomy.normal - anatomy.offset) * weight
-        # Wholly on one side, or over the middle.
+        # Wholly on one side, or over the middle; of the front and the back, or of one of them.
         lopsided = abs(float(across.sum())) > 0.6 * float(np.abs(across).sum())
         side = float(across.sum())
+        turned = facing[corners].mean(axis=1) * weight
+        face = ("front" if float(turned.sum()) > 0.0 else "back") if FACING in cloth.values else ""
+        if FACING in cloth.values and abs(float(turned.sum())) < _AROUND * float(np.abs(turned).sum()):
+            face = ""
         sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
         if sleeve >= 0:
             name = f"{side_word(side)}_sleeve"
         elif anatomy.kind == "trousers":
-            name = f"{side_word(side)}_{'front' if ahead else 'back'}_leg"
+            rims = [border.vertices for border in anatomy.borders if border.role == "leg"]
+            part = "leg" if any(np.isin(rim, mesh.vertex_of).any() for rim in rims) else "yoke"
+            name = "_".join(filter(None, [side_word(side) if lopsided else "", face, part]))
         elif anatomy.kind in ("top", "dress", "skirt", "jumpsuit"):
-            name = "front" if ahead else "back"
-            name = f"{side_word(side)}_{name}" if lopsided else name
+            name = f"{side_word(side)}_{face or 'side'}" if lopsided else face or "body"
         elif len(meshes) == 1:
             name = anatomy.kind if anatomy.kind not in ("other", "closed") else "piece"
         else:
@@ -380,14 +426,13 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     normals = np.cross(b - a, c - a)
     facing = normals.sum(axis=0)
     middle = np.average((a + b + c) / 3.0, axis=0, weights=np.maximum(np.linalg.norm(normals, axis=1), 1e-300))
-    underarm = [edges for name, edges in cloth.seams.items() if name.startswith("underarm")]
-    if sleeve >= 0 and underarm:
-        # Over the arm, opposite to the seam.
-        seam = cloth.vertices[np.unique(np.concatenate(underarm))]
-        own = seam[np.linalg.norm(seam - middle, axis=1) < anatomy.size]
-        near = own[(own - middle) @ anatomy.normal * sleeves[sleeve].side > -0.3 * anatomy.size] if len(own) else own
-        if len(near):
-            facing = middle - near.mean(axis=0)
+    count = np.bincount(mesh.vertex_of, minlength=len(cloth.vertices))
+    opened = mesh.vertices[count[mesh.vertex_of] > 1]
+    if len(opened) and np.linalg.norm(facing) < 0.6 * np.linalg.norm(normals, axis=1).sum():
+        # It lies around a limb or the trunk: opposite to where it is opened.
+        facing = middle - opened.mean(axis=0)
+        rims = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, mesh.vertex_of).all()]
+        along = rims[0].along if len(rims) == 1 and rims[0].kind == "leg" else along
     across = np.cross(along, facing)
     if np.linalg.norm(across) < 0.1 * np.linalg.norm(facing) or not facing.any():
         return None

@@ -1,4 +1,4 @@
-"""The layers of a garment that was made as a whole: its connected parts, without buttons and crumbs."""
+"""The layers of a garment that was made as a whole: its connected parts, without buttons and crumbs; and the lines drawn on it."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from os import PathLike
 import numpy as np
 
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name
-from warpflat.core.text import format_count
+from warpflat.core.file_names import make_file_name, plain_label
+from warpflat.core.text import format_count, quote_value
+from warpflat.seams.options import SeamCut
 from warpflat.surface.io.read import POSSIBLE, check_size, read_mesh_file
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.validate import make_surface, parts_of_faces
 
-__all__ = ["read_layers"]
+__all__ = ["read_garment", "read_layers"]
 
 # A part is a trifle, such as a button, below this share of the area of all; a closed one below this.
 _TRIFLE, _CLOSED_TRIFLE = 0.004, 0.05
@@ -36,6 +37,19 @@ def read_layers(
         path, units: as :func:`warpflat.read_surface`.
         prim: of a USD stage or a GLB scene; all meshes if not given.
         name: of the layers; by default the file's stem.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    return read_garment(path, units=units, prim=prim, name=name)[0]
+
+
+def read_garment(
+    path: str | PathLike[str], *, units: str | None = None, prim: str | None = None, name: str | None = None
+) -> tuple[tuple[Surface, ...], tuple[SeamCut, ...]]:
+    """Read the layers of a garment as :func:`read_layers`, and as cuts the lines of its file.
+
+    These are line elements of OBJ, edge elements of PLY, and curves and creases of USD.
 
     Raises:
         InputError: one line that names the file.
@@ -79,7 +93,21 @@ def read_layers(
         notes.append(f"{format_count(trifles, 'small part')}, such as buttons, left out")
     notes += [f"a part left out: {str(fault).removeprefix(f'{file}: ')}" for fault in faults[:3]]
     kept.sort(key=lambda surface: -Layer(surface.vertices, surface.faces).area)
-    return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
+    marks = [
+        SeamCut(name=plain_label(key), edges=(tuple(chain.tolist()),), where=f"line {quote_value(key)} of {file}")
+        for key, chain in raw.chains.items()
+    ]
+    if raw.marked:
+        rows = tuple(tuple(row.tolist()) for row in raw.marked)
+        marks.append(SeamCut(name="marked", edges=rows, where=f"marked edges of {file}"))
+    for key, curve in raw.curves.items():
+        points = [tuple(point) for point in (curve * scale).tolist()]
+        closed = len(points) > 3 and points[0] == points[-1]
+        line = tuple(points[:-1] if closed else points)
+        marks.append(
+            SeamCut(name=plain_label(key), line=line, closed=closed, where=f"line {quote_value(key)} of {file}")
+        )
+    return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:]), tuple(marks)
 
 
 def _is_closed(surface: Surface) -> bool:

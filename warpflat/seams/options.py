@@ -2,13 +2,109 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from warpflat.core.errors import InputError, nearest
+from warpflat.core.errors import InputError, is_number, nearest
+from warpflat.core.text import quote_value
 
-__all__ = ["DIRECTIONS", "SeamOptions"]
+__all__ = ["DIRECTIONS", "FAMILIES", "SeamCut", "SeamOptions", "in_family"]
 
 DIRECTIONS = ("+x", "-x", "+y", "-y", "+z", "-z")
+#: Names of seams that are found, without their side.
+FAMILIES = (
+    "armhole",
+    "centre back",
+    "centre front",
+    "dart",
+    "inseam",
+    "panel",
+    "princess",
+    "shoulder",
+    "side",
+    "underarm",
+    "waist",
+    "yoke",
+)
+
+Point = Sequence[float]
+
+
+def in_family(seam: str, family: str) -> bool:
+    """Return whether a seam is of a family, as "side left" of "side"; "side left" is a family of one."""
+    return seam == family or seam.startswith(f"{family} ")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamCut:
+    """A seam that the user draws on a whole garment, in one way.
+
+    Attributes:
+        name: of the seam; cuts of one name are one seam.
+        points: places through which it runs straight over the cloth: points [m], or numbers of vertices of the file.
+        line: points [m] of a polyline near the cloth, onto which it is projected.
+        closed: points and line return to their first point.
+        plane: point [m] and normal; the seam is where it meets the cloth.
+        towards: only the half of the plane that lies in this direction from its point.
+        nearest: only the one curve that is the nearest to the plane's point.
+        edges: rows of vertices of the file, from 0, each joined to the next by an edge.
+        where: what messages call it.
+    """
+
+    name: str | None = None
+    points: tuple[Point | int, ...] = ()
+    line: tuple[Point, ...] = ()
+    closed: bool = False
+    plane: tuple[Point, Point] | None = None
+    towards: Point | None = None
+    nearest: bool = False
+    edges: tuple[Sequence[int], ...] = ()
+    where: str = "cut"
+
+    def validate(self) -> None:
+        """Check the cut.
+
+        Raises:
+            InputError: it is given in no way or in several, or by what are no points or vertices.
+        """
+        ways = {"points": self.points, "line": self.line, "plane": self.plane, "edges": self.edges}
+        given = [way for way, value in ways.items() if value]
+        if len(given) != 1:
+            raise InputError(f"{self.where}: give it in one way: {', '.join(ways)}")
+        way = given[0]
+        if self.closed and way not in ("points", "line"):
+            raise InputError(f"{self.where}: closed belongs to points or a line, not to {way}")
+        if (self.towards is not None or self.nearest) and way != "plane":
+            raise InputError(
+                f"{self.where}: {'nearest' if self.nearest else 'towards'} belongs to a plane, not to {way}"
+            )
+        least = 3 if self.closed else 2
+        if way in ("points", "line") and len(ways[way] or ()) < least:
+            raise InputError(f"{self.where}: {way} needs at least {least} places")
+        places = [place for place in self.points if not is_number(place, whole=True)]
+        for place in (*places, *self.line, *(self.plane or ()), *(() if self.towards is None else (self.towards,))):
+            if not (isinstance(place, Sequence) and len(place) == 3 and all(map(_is_coordinate, place))):
+                raise InputError(f"{self.where}: {place!r} is no point; a point is three numbers [m]")
+        for direction in (() if self.plane is None else self.plane[1:]) + (
+            () if self.towards is None else (self.towards,)
+        ):
+            if not any(direction):
+                raise InputError(
+                    f"{self.where}: a direction of (0, 0, 0) leads nowhere; give three numbers, one of them not 0"
+                )
+        for row in (*self.edges, *([place] for place in self.points if is_number(place, whole=True))):
+            if not (isinstance(row, Sequence) and all(is_number(v, whole=True) and v >= 0 for v in row)):
+                raise InputError(
+                    f"{self.where}: {row!r} is no row of vertices; they are numbered from 0, as in the file"
+                )
+        if any(len(row) < 2 for row in self.edges):
+            raise InputError(f"{self.where}: a row of one vertex has no edge; give two vertices or more")
+
+
+def _is_coordinate(value: object) -> bool:
+    return is_number(value) and math.isfinite(value) and abs(value) <= 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,30 +112,55 @@ class SeamOptions:
     """How seams are looked for.
 
     Attributes:
+        find: "auto" looks for seams beside those that the user draws; "none" makes these alone.
+        cuts: seams that the user draws.
         up, front: directions as "+y" and "+z"; found from the shape if not given.
         no: seams that are left closed, by name, as "shoulder" or "shoulder left"; "dart" for no darts.
+        keep: seams that are made in any case, by name: "waist", "side left".
         limit: share of the cloth that may stay beyond its strain limit before further seams and darts are looked for.
         smooth: wrinkles of draped or scanned cloth are smoothed over this length before anything is cut [m]; 0 leaves them.
         most_pieces: at most so many of one layer; as many as are usual for its kind if not given.
     """
 
+    find: Literal["auto", "none"] = "auto"
+    cuts: tuple[SeamCut, ...] = ()
     up: str | None = None
     front: str | None = None
     no: tuple[str, ...] = ()
+    keep: tuple[str, ...] = ()
     limit: float = 0.02
     most_pieces: int | None = None
     smooth: float = 0.0
 
     def forbids(self, seam: str) -> bool:
         """Return whether a seam is to be left closed."""
-        return any(seam == no or seam.startswith(f"{no} ") for no in self.no)
+        return any(in_family(seam, no) for no in self.no)
+
+    def keeps(self, seam: str) -> bool:
+        """Return whether a seam is made in any case."""
+        return any(in_family(seam, keep) for keep in self.keep)
 
     def validate(self) -> None:
         """Check the options.
 
         Raises:
-            InputError: an unknown direction, or both along one axis.
+            InputError: an unknown direction or seam, a cut that is none, or a value out of range.
         """
+        if self.find not in ("auto", "none"):
+            raise InputError(f"find = {self.find!r} is unknown; {nearest(str(self.find), ('auto', 'none'))}")
+        for cut in self.cuts:
+            cut.validate()
+        for key, names in (("no", self.no), ("keep", self.keep)):
+            for name in names:
+                plain = str(name).removesuffix(" left").removesuffix(" right")
+                if plain not in FAMILIES and not (key == "no" and in_family(name, "seam")):
+                    raise InputError(
+                        f"{key} = {quote_value(name)}: no seam has that name; {nearest(plain, FAMILIES)}, each with left or right behind it"
+                    )
+                if key == "keep" and plain == "dart":
+                    raise InputError("keep = 'dart': where a dart lies is for the energy to say; draw it as a cut")
+                if key == "keep" and self.forbids(name):
+                    raise InputError(f"{quote_value(name)} is both in keep and in no; leave it out of one")
         for key, value in (("up", self.up), ("front", self.front)):
             if value is not None and value not in DIRECTIONS:
                 raise InputError(f"{key} = {value!r} is no direction; {nearest(str(value), DIRECTIONS)}")

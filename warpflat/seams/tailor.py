@@ -13,7 +13,19 @@ from warpflat.seams.anatomy import Anatomy, Limb
 from warpflat.seams.cloth import Cloth, edge_components
 from warpflat.seams.fields import Operators
 
-__all__ = ["FACING", "LEFT", "TAILORED", "Fields", "cut_as_a_tailor", "draw_fields", "side_word", "tidied"]
+__all__ = [
+    "BESIDE",
+    "FACING",
+    "LEFT",
+    "TAILORED",
+    "Fields",
+    "cut_as_a_tailor",
+    "draw_fields",
+    "section",
+    "side_word",
+    "tidied",
+    "with_drawn_sleeves",
+]
 
 Ids = NDArray[np.int64]
 
@@ -30,6 +42,10 @@ _OUTSIDE, _STEP, _STEPS = 0.004, 0.008, 12
 _STEEP = 3.0
 # Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
+#: A line that the user has drawn is meant where a tailor would have cut within this.
+BESIDE = 0.08
+# A sleeve has no more than this share of the neck, or of the opening.
+_NECK = 0.35
 # An island of the other sign of less than this share of its part is a wrinkle.
 _ISLAND = 0.06
 
@@ -191,7 +207,7 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
         if not beyond[rim].all() or beyond[others].any():
             lengths, middles, offsets = [], [], []
             continue
-        length, middle = _section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))
+        length, middle = section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))
         lengths.append(length)
         middles.append(middle)
         offsets.append(offset)
@@ -200,7 +216,7 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     return (offsets[0], middles[0]) if offsets else None
 
 
-def _section(cloth: Cloth, f: FloatArray, within: BoolArray) -> tuple[float, FloatArray]:
+def section(cloth: Cloth, f: FloatArray, within: BoolArray) -> tuple[float, FloatArray]:
     """Return length [m] and middle of the zero line of a field within some faces."""
     faces = cloth.faces[within]
     faces = faces[(f[faces].min(axis=1) < 0.0) & (f[faces].max(axis=1) >= 0.0)]
@@ -222,9 +238,10 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]
 
     Its faces have the label "sleeve": the number of the sleeve, or -1.
     """
-    cloth, notes = fields.cloth, list[str]()
-    cloth = replace(cloth, labels={**cloth.labels, "sleeve": np.full(len(cloth.faces), -1, dtype=np.int64)})
+    cloth, notes = with_drawn_sleeves(fields, anatomy), list[str]()
     for number, (name, limb) in enumerate(fields.sleeves.items()):
+        if number in cloth.labels["sleeve"]:
+            continue
         cut = _cut_armhole(cloth, anatomy, name, limb, number)
         if cut is None:
             notes.append(
@@ -281,6 +298,27 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]
     return cloth, notes
 
 
+def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = False) -> Cloth:
+    """Return the cloth with the label "sleeve": the number of the sleeve that seams have cut off already, or -1.
+
+    Args:
+        fields: with the cloth.
+        anatomy: of the garment.
+        anywhere: whether a sleeve may begin elsewhere than near its armhole, and with some of the neck, as a raglan sleeve does.
+    """
+    cloth, part = fields.cloth, fields.cloth.parts()
+    label = np.full(len(cloth.faces), -1, dtype=np.int64)
+    for number, (name, limb) in enumerate(fields.sleeves.items()):
+        own = np.isin(part, part[np.isin(cloth.faces, anatomy.borders[limb.border].vertices).any(axis=1)])
+        line = np.intersect1d(cloth.faces[own], cloth.faces[~own])
+        others = [b for k, b in enumerate(anatomy.borders) if k != limb.border and b.role != "hole"]
+        most = max((float(np.isin(border.vertices, cloth.faces[own]).mean()) for border in others), default=0.0)
+        near = anywhere or (len(line) > 0 and np.abs(cloth.values[name][line]).mean() <= BESIDE * anatomy.size)
+        if len(line) and near and most <= (_NECK if anywhere else 0.0):
+            label[own] = number
+    return replace(cloth, labels={**cloth.labels, "sleeve": label})
+
+
 def _upper(anatomy: Anatomy) -> float:
     """Return the height above which a line is a shoulder where there are no sleeves: the middle of the armholes."""
     own = [border.middle @ anatomy.up for border in anatomy.borders if border.role == "sleeve"]
@@ -320,7 +358,7 @@ def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: I
     """Return the cloth with a sleeve opened along the line that goes on from the side seam."""
     own = cloth.labels["sleeve"] == number
     name = f"underarm {side_word(limb.side)}"
-    armhole = np.unique(cloth.seams[f"armhole {side_word(limb.side)}"])
+    armhole = np.intersect1d(cloth.faces[own], cloth.faces[~own])
     rim_edges = cloth.half_edges
     border = np.unique(rim_edges.edges[rim_edges.count == 1])
     for part in edge_components(cloth.line_between(ahead, own)):

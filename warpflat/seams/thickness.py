@@ -45,7 +45,14 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
     kept = replace(kept, faces=kept.faces[part == np.bincount(part).argmax()])
     used, place = np.unique(kept.faces, return_inverse=True)
     area_out = 1e4 * float(cloth.face_areas[drop].sum())
-    made = Cloth(vertices=cloth.vertices[used], faces=place.reshape(-1, 3).astype(np.int64))
+    number = np.full(len(cloth.vertices), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    seams = {name: number[edges] for name, edges in cloth.seams.items()}
+    made = Cloth(
+        vertices=cloth.vertices[used],
+        faces=place.reshape(-1, 3).astype(np.int64),
+        seams={name: edges[(edges >= 0).all(axis=1)] for name, edges in seams.items()},
+    )
     return made, [
         f"cloth turned inside at {format_count(openings, 'opening')} ({area_out:.0f} cm2) left out: it is drawn thickness"
     ]

@@ -64,6 +64,7 @@ class RawMesh:
         curves: #P by 3 by name; `chains`: vertices by name.
         notes: one sentence each.
         groups: objects, nodes or prims as (first vertex, name), in their order.
+        marked: rows of vertices without a name: creases of USD, edge elements of PLY.
     """
 
     vertices: FloatArray
@@ -75,6 +76,7 @@ class RawMesh:
     chains: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     groups: list[tuple[int, str]] = field(default_factory=list)
+    marked: list[NDArray[np.int64]] = field(default_factory=list)
 
 
 def read_surface(
@@ -211,6 +213,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
             curves=usd.curves,
             notes=usd.notes,
             groups=usd.groups,
+            marked=usd.creases,
         )
     if prim == ALL_PRIMS:
         prim = None
@@ -257,6 +260,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         scale=scale,
         split_corners=mesh.split_corners,
         groups=mesh.groups,
+        marked=list(mesh.edges),
     )
 
 

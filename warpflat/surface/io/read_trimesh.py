@@ -31,12 +31,14 @@ class TrimeshMesh:
         faces: #F by 3 vertices.
         split_corners: whether the format splits vertices per corner of a face or per texture coordinate.
         groups: the nodes as (first vertex, name), in their order.
+        edges: #E by 2, elements of a PLY file.
     """
 
     vertices: FloatArray
     faces: NDArray[np.int64]
     split_corners: bool
     groups: list[tuple[int, str]]
+    edges: NDArray[np.int64]
 
 
 def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
@@ -63,7 +65,13 @@ def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
     textured = suffix == ".ply" and any(
         getattr(getattr(geometry, "visual", None), "kind", None) == "texture" for geometry in scene.geometry.values()
     )
+    total = sum(len(vertices) for _, vertices, _ in meshes)
+    elements = [_edges(geometry) for geometry in scene.geometry.values()] if suffix == ".ply" else []
+    edges = np.concatenate([*elements, np.empty((0, 2), dtype=np.int64)])
+    if len(edges) and not 0 <= edges.min() <= edges.max() < total:
+        raise InputError(f"an edge refers to vertex {edges.max()}, but the file has {total:,}, numbered from 0")
     return TrimeshMesh(
+        edges=edges,
         vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
         faces=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
         split_corners=suffix in (".stl", *GLTF) or textured,
@@ -97,6 +105,16 @@ def _load_scene(file: Path) -> Any:
             f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
             "vertices and faces alone"
         ) from error
+
+
+def _edges(geometry: Any) -> NDArray[np.int64]:
+    """Return the edges that a PLY file lists (#E by 2), which trimesh leaves as they are."""
+    data = geometry.metadata.get("_ply_raw", {}).get("edge", {}).get("data")
+    try:
+        pairs = [np.asarray(data[end]).ravel() for end in ("vertex1", "vertex2")]
+        return np.stack(pairs, axis=1).astype(np.int64)
+    except (IndexError, KeyError, TypeError, ValueError):  # none, or under other names
+        return np.empty((0, 2), dtype=np.int64)
 
 
 def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]]:

@@ -37,6 +37,7 @@ class UsdMesh:
         notes: what could not be read, one sentence each.
         layers: the files of which the stage is composed.
         groups: the meshes as (first vertex, name of the prim), in their order.
+        creases: rows of vertices, as of edges that are marked with a crease in Blender.
     """
 
     name: str
@@ -47,6 +48,7 @@ class UsdMesh:
     notes: list[str] = field(default_factory=list)
     layers: list[str] = field(default_factory=list)
     groups: list[tuple[int, str]] = field(default_factory=list)
+    creases: list[NDArray[np.int64]] = field(default_factory=list)
 
 
 def read_usd_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
@@ -126,7 +128,8 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
             world = np.column_stack([world[:, 0], world[:, 2], -world[:, 1]])
         return world * metres_per_unit, bool(np.linalg.det(matrix[:3, :3]) < 0)
 
-    parts = []
+    parts = list[tuple[FloatArray, NDArray[np.int64], NDArray[np.int64]]]()
+    creases = list[NDArray[np.int64]]()
     for one in chosen:
         mesh = UsdGeom.Mesh(one)
         counts, flat = _value(mesh.GetFaceVertexCountsAttr()), _value(mesh.GetFaceVertexIndicesAttr())
@@ -158,6 +161,15 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
             # Faces are wound the other way, from the same first corner.
             first, size = np.repeat(np.cumsum(sizes) - sizes, sizes), np.repeat(sizes, sizes)
             corners = corners[first + (size - np.arange(len(corners)) + first) % size]
+        before = sum(len(points) for points, _, _ in parts)
+        rows = np.asarray(_value(mesh.GetCreaseIndicesAttr()) or [], dtype=np.int64)
+        lengths = np.asarray(_value(mesh.GetCreaseLengthsAttr()) or [], dtype=np.int64)
+        if len(rows) and (
+            lengths.sum() != len(rows) or lengths.min() < 2 or rows.min() < 0 or rows.max() >= len(points)
+        ):
+            notes.append(f"creases of mesh {at} are broken and were left out")
+        elif len(rows):
+            creases += np.split(rows + before, np.cumsum(lengths)[:-1])
         parts.append((vertices, sizes, corners))
     start = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)]).tolist()
     out = UsdMesh(
@@ -168,6 +180,7 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
         notes=notes,
         layers=[layer.realPath for layer in stage.GetUsedLayers() if layer.realPath],
         groups=[(at, one.GetName()) for one, at in zip(chosen, start, strict=False)],
+        creases=creases,
     )
     for curves in _curve_prims(chosen[0]) if len(chosen) == 1 else []:
         lines = UsdGeom.BasisCurves(curves)

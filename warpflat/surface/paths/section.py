@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,7 +22,7 @@ from warpflat.surface.paths.trace import (
     simplify_places,
 )
 
-__all__ = ["plane_path", "plane_section"]
+__all__ = ["plane_path", "plane_section", "plane_sections"]
 
 
 def plane_section(surface: Surface, point: ArrayLike, normal: ArrayLike) -> SurfacePath:
@@ -46,6 +48,55 @@ def plane_section(surface: Surface, point: ArrayLike, normal: ArrayLike) -> Surf
         )
     _, places, closed = found
     return make_path(surface, places, closed=closed)
+
+
+def plane_sections(
+    surface: Surface, point: ArrayLike, normal: ArrayLike, *, towards: ArrayLike | None = None
+) -> list[SurfacePath]:
+    """Return all curves in which a plane meets the surface, from border to border or closed; none where it misses.
+
+    Args:
+        surface: the surface.
+        point: of the plane [m]; it need not lie on the surface.
+        normal: of the plane, any length but zero.
+        towards: if given, only what lies in this direction from the point: the curves of half a plane.
+
+    Raises:
+        InputError: for a direction of zero.
+    """
+    axis, origin = _direction(normal, "a plane's normal"), np.asarray(point, dtype=float)
+    paths = [
+        make_path(surface, places, closed=closed)
+        for places, closed in _curves(surface, origin, axis, path_triangles(surface)[0])
+    ]
+    if towards is None:
+        return paths
+    ahead = _direction(towards, "`towards`")
+    found = []
+    for path in paths:
+        row = [path.place(number) for number in range(len(path.points))]
+        along = (path.points - origin) @ ahead
+        if path.closed and (along < 0.0).any() and (along >= 0.0).any():
+            # From a point behind, so that no run goes on over the end.
+            first = int(along.argmin())
+            row, along = [*row[first:], *row[: first + 1]], np.concatenate([along[first:], along[: first + 1]])
+        elif path.closed:
+            found += [path] if (along >= 0.0).all() else []
+            continue
+        runs: list[list[Place]] = [[]]
+        for number, place in enumerate(row):
+            if number and (along[number - 1] >= 0.0) != (along[number] >= 0.0):
+                share = along[number - 1] / (along[number - 1] - along[number])
+                edge = {v: (1.0 - share) * w for v, w in row[number - 1].items()}
+                for v, w in place.items():
+                    edge[v] = edge.get(v, 0.0) + share * w
+                runs[-1].append({v: w for v, w in edge.items() if w > 0.0})
+                if along[number] < 0.0:
+                    runs.append([])
+            if along[number] >= 0.0:
+                runs[-1].append(place)
+        found += [make_path(surface, simplify_places(run)) for run in runs if len(run) > 1]
+    return [path for path in found if path.length > 0.0]
 
 
 def plane_path(
@@ -110,21 +161,28 @@ def _nearest_curve(
     surface: Surface, origin: FloatArray, axis: FloatArray, triangles: IntArray
 ) -> tuple[float, list[Place], bool] | None:
     """Return the nearest to the plane's origin of the curves in which it meets the surface: distance [m], places, whether closed."""
-    height = (surface.vertices - origin) @ axis
-    # A vertex in the plane counts as above it: each triangle is then crossed in two of its edges or in none. Heights of
-    # rounding size must be exactly 0, or the curve would pass by a vertex instead of through it.
-    height[np.abs(height) < 1e-10 * np.ptp(surface.vertices, axis=0).max()] = 0.0
     best: tuple[float, list[Place], bool] | None = None
-    for chain, closed in _chains(triangles, height >= 0):
-        places = simplify_places([_crossing(edge, height) for edge in chain])
-        if closed and len(places) > 1 and places[0] == places[-1]:
-            places.pop()
-        if len(places) < 2:
-            continue
+    for places, closed in _curves(surface, origin, axis, triangles):
         gap = _distances(surface, places, closed, origin).min()
         if best is None or gap < best[0]:
             best = gap, places, closed
     return best
+
+
+def _curves(
+    surface: Surface, origin: FloatArray, axis: FloatArray, triangles: IntArray
+) -> Iterator[tuple[list[Place], bool]]:
+    """Yield the curves in which a plane meets the surface: places, and whether the curve is closed."""
+    height = (surface.vertices - origin) @ axis
+    # A vertex in the plane counts as above it: each triangle is then crossed in two of its edges or in none. Heights of
+    # rounding size must be exactly 0, or the curve would pass by a vertex instead of through it.
+    height[np.abs(height) < 1e-10 * np.ptp(surface.vertices, axis=0).max()] = 0.0
+    for chain, closed in _chains(triangles, height >= 0):
+        places = simplify_places([_crossing(edge, height) for edge in chain])
+        if closed and len(places) > 1 and places[0] == places[-1]:
+            places.pop()
+        if len(places) >= 2:
+            yield places, closed
 
 
 def _direction(value: ArrayLike, what: str) -> FloatArray:
