@@ -98,7 +98,7 @@ def sewn(found: FoundSeams, fabric: str) -> Garment:
     surfaces = [warpflat.open_tube(piece) if tube_borders(piece) else piece for piece in found.pieces]
     grain = ["grain" if "grain" in piece.lines else None for piece in surfaces]
     pieces = [warpflat.flatten(piece, fabric=fabric, datum=datum) for piece, datum in zip(surfaces, grain, strict=True)]
-    return warpflat.sew_pieces(pieces)
+    return warpflat.sew_pieces(pieces, eased=True)
 
 
 def strain(garment: Garment) -> list[str]:

@@ -86,6 +86,19 @@ def test_a_seam_that_costs_nothing_is_closed_again() -> None:
     assert any(note.startswith("side left, side right closed again") for note in easy.notes)
 
 
+def test_eased_seams_are_as_long_as_each_other_and_cost_less() -> None:
+    found = warpflat.find_seams(lopsided(0.0))
+    pieces = [warpflat.flatten(piece, fabric="woven", datum="grain") for piece in found.pieces]
+    strict, eased = (warpflat.sew_pieces(pieces, eased=eased) for eased in (False, True))
+    for garment in (strict, eased):
+        assert garment.sewn is not None
+        assert garment.sewn.converged
+        assert max(abs(seam.difference) for seam in garment.seams) < (3e-5 if garment is eased else 1e-4)
+    own = sum(piece.stages[-1].strain_energy_j for piece in pieces)
+    cost = [sum(p.stages[-1].strain_energy_j for p in garment.pieces.values()) - own for garment in (strict, eased)]
+    assert 0.0 <= cost[1] < 0.7 * cost[0]
+
+
 def test_mirrored_pieces_are_drawn_once(tmp_path: Path) -> None:
     surface = lopsided(0.0)
     mesh = tmp_path / "shirt.obj"

@@ -267,7 +267,7 @@ def _constraint_equations(
             smooth_equations(side, unsewn, on_fold.get(name)) for side, name in sides if not drawn.issuperset(side)
         ]
         if seam.joints is None:
-            sewn = seam_equations(first, second, seam.ratio)
+            sewn = seam_equations(first, second, seam.ratio, eased=seam.eased)
         else:
             sewn = stretch_equations(first, second, seam.joints, joined.surface.vertices, unsewn, seam.ratio)
         groups.setdefault((seam.name, "seam"), []).append(one_group(sewn, *smooth))

@@ -22,6 +22,7 @@ class Stitching:
         vertices: of the two pieces, in corresponding order.
         ratio: wished length of the first side over the second, for all edges or for each.
         joints: #J by 2, places in the two chains that are sewn to each other; None where all are, one to one.
+        eased: whether the edges of both sides are equal in sum, not each to its partner.
         sides: what the two chains are called among the garment's seams, "piece.edge" twice; None of a dart, which is none of them.
     """
 
@@ -30,6 +31,7 @@ class Stitching:
     vertices: tuple[IntArray, IntArray]
     ratio: float | FloatArray = 1.0
     joints: IntArray | None = None
+    eased: bool = False
     sides: tuple[str, str] | None = None
 
 

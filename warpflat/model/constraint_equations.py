@@ -41,6 +41,8 @@ _PLACE_TOLERANCE = 5e-5
 WAVE, SMOOTH = 0.04, 0.3
 # Stiffness of equations that hold together, over the stiffer thread's.
 _SHARED = 1.0
+# Stiffness of the edges of a seam that is eased, over the stiffer thread's.
+_EASED = 0.3
 # The part of an offset by which the residual of such a group is expected to fall, at first, and at least.
 _RESPONSE, _LEAST_RESPONSE = 0.3, 0.1
 
@@ -140,9 +142,17 @@ def join_equations(equations: Sequence[ConstraintEquations]) -> ConstraintEquati
     )
 
 
-def seam_equations(first: IntArray, second: IntArray, ratio: float | FloatArray = 1.0) -> ConstraintEquations:
-    """Return equations that make each edge of the first row `ratio` times as long as its partner of the second."""
+def seam_equations(
+    first: IntArray, second: IntArray, ratio: float | FloatArray = 1.0, *, eased: bool = False
+) -> ConstraintEquations:
+    """Return equations that make each edge of the first row `ratio` times as long as its partner of the second.
+
+    Eased, only all edges together are, exactly; each is drawn to it softly, so that what one side has more here it has less nearby.
+    """
     ends = np.column_stack([first[:-1], first[1:], second[:-1], second[1:]])
+    if eased:
+        together = _equations(ends, LENGTHS, ratio=ratio, tolerance=np.inf, sum_tolerance=_EDGE_TOLERANCE)
+        return replace(together, soft=np.full(len(ends), _EASED), share=np.ones(len(ends)))
     return _equations(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 

@@ -126,7 +126,9 @@ class MeshPlan:
                             recorder.record_result(pieces[place])
             lines = {piece.surface.name: piece.network.surface.lines for piece in pieces}
             constraints = scene_constraints(settings.constraints, lines)
-            garment = sew_pieces(pieces, constraints, seams=self.seams, options=relax, name=scene.name)
+            # Where nobody has said what meets what, a seam is eased as a tailor does it.
+            eased = self.found is not None
+            garment = sew_pieces(pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased)
         if garment.sewn is not None:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])

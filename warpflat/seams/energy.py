@@ -430,9 +430,14 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
             yield _Candidate(name=name, normal=anatomy.normal, point=anatomy.offset * anatomy.normal, parts=True)
         tall = float(np.ptp(heights))
         level = float(np.average(heights[[m.vertex for m in misfits]], weights=[m.area for m in misfits]))
+        name = "waist" if tall > 0.8 * size else "yoke"
+        known = [edges for other, edges in cloth.seams.items() if other.startswith(name)]
+        if known:
+            # Front and back meet at the sides.
+            level = float((cloth.vertices[np.unique(known[0])] @ anatomy.up).mean())
         if 0.2 * tall < level - heights.min() < 0.8 * tall and tall > 0.5 * size:
             yield _Candidate(
-                name="waist" if tall > 0.8 * size else "yoke",
+                name=name,
                 normal=anatomy.up,
                 point=level * anatomy.up,
                 parts=True,
