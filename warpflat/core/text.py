@@ -76,9 +76,11 @@ def _is_control(letter: str) -> bool:
 
 def energy_words(joules: float, digits: int = 3) -> str:
     """Return an energy in J, or in mJ if it is below one; what is below a microjoule is rounding."""
-    if abs(joules) >= 1.0:
-        return f"{joules:.{digits}g} J" if abs(joules) < 10**digits else f"{joules:,.0f} J"
-    return f"{1e3 * joules:.{digits}g} mJ" if abs(joules) >= 1e-6 else "0 mJ"
+    if abs(joules) < 1e-6:
+        return "0 mJ"
+    number, unit = (joules, "J") if abs(joules) >= 1.0 else (1e3 * joules, "mJ")
+    # Not 1e+02 for 104.
+    return f"{float(f'{number:.{digits}g}'):,.{max(digits, 15)}g} {unit}"
 
 
 def quote_value(value: object) -> str:
