@@ -34,6 +34,10 @@ SCENES = {
     "hem_mm = 25\nkinds = {top = 'hem'}\nallowances_mm = {left = 20}\n" + SHORT,
     "seam": "[surface]\nshape = 'cone'\nresolution = 7\n[[seams]]\nname = 'back'\nsides = ['left', 'right']\n"
     "[pattern]\nformats = ['dxf', 'svg', 'json']\n" + SHORT,
+    "drawn": "[surface]\nfile = 'cloth.obj'\nunits = 'm'\n[seams]\nfind = 'none'\nkeep = ['waist']\n[[seams_cut]]\nname = 'middle'\n"
+    "points = [[0.5, 0.0, 0.0], [0.5, 1.0, 0.0]]\n[[seams_cut]]\nline = [[0.0, 0.25, 0.1], [1.0, 0.25, 0.1]]\nclosed = false\n"
+    "[[seams_cut]]\nplane = {point = [0.2, 0.6, 0.0], normal = [0.1, 1.0, 0.0], towards = [1.0, 0.0, 0.0], nearest = true}\n"
+    "[[seams_cut]]\nedges = [[1, 2]]\n" + SHORT,
 }
 FORM_SCENE = (
     "fabric = 'interlock'\nform = {like = 'skirt'}\n[mannequin]\nsize = 'EU 40'\nresolution_mm = 40\n"
@@ -78,6 +82,19 @@ COMMANDS = (
         "own.toml",
         "--grain-angle",
         "45",
+        *BARE,
+    ),
+    (
+        "flatten",
+        "cloth.obj",
+        "--units",
+        "m",
+        "--seams",
+        "none",
+        "--cut-seam",
+        "plane:0.5,0,0 1,0,0",
+        "--keep",
+        "waist",
         *BARE,
     ),
     ("run", "cap.scene.toml", "--out", "out", "--quiet"),

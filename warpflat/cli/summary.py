@@ -68,7 +68,11 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
     if seams or constraints:
         parts = []
         if seams:
-            parts.append(f"{len(seams)}, sides equal within {_within(max(abs(s['difference_mm']) for s in seams))}")
+            apart = [abs(seam["difference_mm"]) for seam in seams]
+            if "garment" in metrics:
+                # As drawn, where the borders of a scan are too ragged for smooth curves of the same length.
+                apart.append(metrics.get("pattern", {}).get("seam_difference_mm") or 0.0)
+            parts.append(f"{len(seams)}, sides equal within {_within(max(apart))}")
         if eased := [f"{seam['name']} {100 * seam['ease']:+.3g} %" for seam in seams if seam["ease"]]:
             parts.append(f"eased: {_some(eased)}")
         if constraints:

@@ -346,7 +346,7 @@ def keep_seams(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> tuple[Cl
             continue
         made = _kept(cloth, anatomy, name)
         if made is None:
-            notes.append(f"there is no {name} to keep: a {anatomy.kind} has none that was found")
+            notes.append(f"there is no {name} to keep: none was found in what is taken for: {anatomy.kind}")
         else:
             cloth = made
     return cloth, notes
