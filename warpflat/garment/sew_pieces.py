@@ -36,6 +36,8 @@ BESIDE = 1e-3
 _APART, _SHORTEST = 1e-2, 3e-3
 # Distance [m] of places along borders that are compared, and how many there are at most.
 _SAMPLES, _MOST_SAMPLES = 5e-4, 200_000
+# Layouts of mirrored pieces that differ by less than this [m] are two roundings of one.
+_ALIKE = 5e-3
 # A layer that keeps within this distance [m] of another one is its lining.
 _LINING = 5e-3
 
@@ -121,9 +123,19 @@ def sew_pieces(
     garment = Garment(name=name or first, pieces=flat, stitching=pairs, border_seams=seams)
     if not pairs and not constraints:
         return garment
-    sewn = sew(flat, pairs, constraints=constraints, options=options)
-    # One pattern serves for both pieces of a pair only where both are the same.
+    # One pattern serves for both pieces of a pair only where both are the same: they are sewn from the same layout.
     images = mirror_images({own: piece.network.surface for own, piece in flat.items()}) if len(flat) > 1 else {}
+    if any(piece.grain_angle for piece in flat.values()):
+        images = {}
+    for own, (mate, partners) in images.items():
+        first_of_two = list(flat).index(own) < list(flat).index(mate)
+        if first_of_two and len(flat[mate].positions) == len(partners):
+            laid = flat[mate].positions.copy()
+            laid[partners] = flat[own].positions * [-1.0, 1.0]
+            laid += flat[mate].positions.mean(axis=0) - laid.mean(axis=0)
+            if np.abs(laid - flat[mate].positions).max() < _ALIKE:
+                flat[mate] = replace(flat[mate], positions=laid)
+    sewn = sew(flat, pairs, constraints=constraints, options=options)
     even = even_sides({own: sewn.pieces[own].positions for own in flat}, images)
     sewn_pieces = {own: replace(sewn.pieces[own], positions=even[own]) for own in flat}
     return replace(garment, pieces=sewn_pieces, sewn=replace(sewn, pieces=sewn_pieces))

@@ -68,11 +68,14 @@ def mirror_images(surfaces: Mapping[str, Surface]) -> dict[str, tuple[str, IntAr
 
 
 def even_sides(layouts: Mapping[str, FloatArray], images: Mapping[str, tuple[str, IntArray]]) -> dict[str, FloatArray]:
-    """Return layouts (#P by 2 [m]) of which each is the mean of itself and of its mirror image's, where both are nearly the same."""
-    made = dict(layouts)
+    """Return layouts (#P by 2 [m]) of which each is the mean of itself and of its mirror image's; as they are unless all are nearly that.
+
+    All or none: seams between pieces of which one has moved would not be equal any more.
+    """
+    made = dict[str, FloatArray]()
     for name, (mate, partners) in images.items():
         own, other = layouts[name], layouts[mate][partners] * [-1.0, 1.0]
         other = other + own.mean(axis=0) - other.mean(axis=0)
         if np.abs(own - other).max() < NEARLY:
             made[name] = 0.5 * (own + other)
-    return made
+    return made if made.keys() == layouts.keys() else dict(layouts)
