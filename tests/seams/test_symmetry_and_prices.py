@@ -86,6 +86,14 @@ def test_a_seam_that_costs_nothing_is_closed_again() -> None:
     assert any(note.startswith("side left, side right closed again") for note in easy.notes)
 
 
+def test_a_seam_that_costs_nothing_stays_where_it_is_asked_for_or_drawn() -> None:
+    asked = warpflat.find_seams(solids.trousers(), warpflat.SeamOptions(keep=("side",)), fabric="jersey")
+    assert {"side left", "side right"} <= {seam.name for seam in asked.seams}
+    hip = warpflat.SeamCut(name="stripe", plane=((0.0, -0.3, 0.0), (0.0, 1.0, 0.0)))
+    drawn = warpflat.find_seams(solids.trousers(), warpflat.SeamOptions(cuts=(hip,)), fabric="jersey")
+    assert any(seam.name.startswith("stripe") for seam in drawn.seams)
+
+
 def test_eased_seams_are_as_long_as_each_other_and_cost_less() -> None:
     found = warpflat.find_seams(lopsided(0.0))
     pieces = [warpflat.flatten(piece, fabric="woven", datum="grain") for piece in found.pieces]

@@ -243,7 +243,7 @@ def _priced(
         if alike:
             found[mate] = replace(trial, name=mate)
         most = _NO_ENERGY * energy + _NO_DENSITY * area
-        kept = name.startswith(_STRUCTURAL)
+        kept = name.startswith(_STRUCTURAL) or any(options.keeps(one) for one in both)
         if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
             continue
         if len(both) == 2:

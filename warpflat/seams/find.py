@@ -175,6 +175,8 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         if not name.startswith(HAND) and options.forbids(name):
             cloth = cloth.without_seam(name)
     cloth = open_tubes(cloth, anatomy, options)
+    by_hand = tuple(name.removeprefix(HAND) for name in cloth.seams if name.startswith(HAND))
+    options = replace(options, keep=(*options.keep, *by_hand))
     cloth = replace(cloth, seams={name.removeprefix(HAND): edges for name, edges in cloth.seams.items()})
     if not auto:
         _require_open(cloth)
