@@ -312,7 +312,7 @@ def test_drape_and_correction_of_any_pieces(worn_pieces: list[Any], fabric: str,
         )
         return SimpleNamespace(
             cloth=cloth,
-            body=SimpleNamespace(vertices=corners, triangles=triangles),
+            body=SimpleNamespace(vertices=corners, triangles=triangles, shrunk=corners),
             positions=space,
             gap=np.full(len(space), gap),
             pressure=np.zeros(len(space)),

@@ -63,7 +63,7 @@ def sew_pieces(
         options: of the relaxation.
         name: of the garment; that of the first piece if not given.
         eased: whether the two sides of a seam where borders meet are as long as each other as a whole, what one has more here eased in
-            there; otherwise they are alike edge by edge. Darts are.
+            there; otherwise they are alike edge by edge. Darts and seams that close a piece to a tube are.
 
     Returns:
         The garment; its `sewn` is None where there is nothing to be sewn or held.
@@ -107,8 +107,7 @@ def sew_pieces(
     }
     for pair in meeting_borders({own: piece.network.surface for own, piece in flat.items()}, without=sewn_edges):
         if len(flat) > 1:
-            is_dart = pair.pieces[0] == pair.pieces[1] and bool((pair.vertices[0] == pair.vertices[1]).any())
-            pairs.append(replace(pair, sides=pair.pieces, eased=eased and not is_dart))
+            pairs.append(replace(pair, sides=pair.pieces, eased=eased and pair.pieces[0] != pair.pieces[1]))
             continue
         # What was cut open before, here or in the file, is sewn like any cut, and called by the line along which that was.
         sides, opening = {frozenset(side[:2].tolist()) for side in pair.vertices}, None
