@@ -63,6 +63,17 @@ def test_underarm_and_side_meet_at_the_armhole() -> None:
         assert np.linalg.norm(underarm[:, None] - ends, axis=2).min() < 1e-9
 
 
+def test_a_sleeves_grain_runs_over_the_arm_opposite_to_its_seam() -> None:
+    for sleeve in (piece for piece in found_on(0.0).pieces if piece.name.endswith("sleeve")):
+        grain = sleeve.vertices[sleeve.lines["grain"]]
+        seams = [line for name, line in sleeve.lines.items() if name.startswith("underarm")]
+        seam = sleeve.vertices[np.concatenate(seams)]
+        # Both run along the arm; its top is as far from its underside as it is thick.
+        across = np.linalg.norm(grain[:, None] - seam, axis=2).min(axis=1)
+        thick = np.linalg.norm(sleeve.vertices[:, None] - seam, axis=2).min(axis=1).max()
+        assert across.min() > 0.7 * thick
+
+
 def test_every_seam_has_a_price_or_a_reason() -> None:
     found = warpflat.find_seams(lopsided(0.0), warpflat.SeamOptions(no=("dart",), limit=1.0), fabric="woven")
     price = {seam.name: seam for seam in found.seams}

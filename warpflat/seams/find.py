@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, expect
+from warpflat.core.polyline import polyline_length
 from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
@@ -27,7 +28,8 @@ from warpflat.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields
 from warpflat.seams.thickness import without_thickness
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths.lines import line_on_plane
+from warpflat.surface.paths.lines import line_from_curve, line_on_plane
+from warpflat.surface.paths.section import plane_sections
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["GRAIN", "FoundSeam", "FoundSeams", "find_seams", "seam_words"]
@@ -430,7 +432,8 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     middle = np.average((a + b + c) / 3.0, axis=0, weights=np.maximum(np.linalg.norm(normals, axis=1), 1e-300))
     count = np.bincount(mesh.vertex_of, minlength=len(cloth.vertices))
     opened = mesh.vertices[count[mesh.vertex_of] > 1]
-    if len(opened) and np.linalg.norm(facing) < 0.6 * np.linalg.norm(normals, axis=1).sum():
+    around = len(opened) > 0 and np.linalg.norm(facing) < 0.6 * np.linalg.norm(normals, axis=1).sum()
+    if around:
         # It lies around a limb or the trunk: opposite to where it is opened.
         facing = middle - opened.mean(axis=0)
         rims = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, mesh.vertex_of).all()]
@@ -439,8 +442,14 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     if np.linalg.norm(across) < 0.1 * np.linalg.norm(facing) or not facing.any():
         return None
     try:
-        line = line_on_plane(piece, middle, across)
-    except InputError:
+        if around:
+            # The plane meets it on both sides.
+            beyond = np.cross(across, along)
+            sections = plane_sections(piece, middle, across, towards=beyond if beyond @ facing > 0.0 else -beyond)
+            line = line_from_curve(piece, max(sections, key=lambda one: polyline_length(one.points)).points, name=GRAIN)
+        else:
+            line = line_on_plane(piece, middle, across)
+    except (InputError, ValueError):
         return None
     reach = float(np.linalg.norm(piece.vertices[line[-1]] - piece.vertices[line[0]])) if len(line) > 1 else 0.0
     if line[0] == line[-1] or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
