@@ -61,7 +61,7 @@ class Factor(Protocol):
         """Return the inverse times forces, #V by 2."""
 
     def columns(self, vertices: IntArray) -> FloatArray:
-        """Return what the inverse says of some vertices (#N), for the two below."""
+        """Return the inverse's columns at some vertices (#N), which `spread` and `between` take."""
 
     def spread(self, columns: FloatArray, pull: FloatArray) -> FloatArray:
         """Return the inverse times forces `pull` (#N by 2) at those vertices and none elsewhere, #V by 2."""
