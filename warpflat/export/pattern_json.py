@@ -38,7 +38,7 @@ from warpflat.pattern.drafted import (
 )
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 
 __all__ = [
     "SCHEMA",
@@ -219,6 +219,16 @@ class SideEntry(Entry):
     mirrored: bool = False
 
 
+class OpeningEntry(Entry):
+    """An opening of a seam (see `warpflat.pattern.pieces.SeamOpening`)."""
+
+    kind: Literal["zip", "buttons", "slit", "vent"]
+    length: float
+    begin: float
+    whole: bool
+    style: Text
+
+
 class StitchEntry(Entry):
     """A seam, or a dart that is sewn shut."""
 
@@ -226,6 +236,7 @@ class StitchEntry(Entry):
     kind: Literal["seam", "dart"]
     ease: float
     eased: Shares = Field(default=[0.0, 1.0])
+    openings: list[OpeningEntry] = Field(default_factory=list)
     sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
 
 
@@ -272,6 +283,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
             "ease": seam.ease,
             "eased": list(seam.eased),
             "sides": [[_side(part) for part in side] for side in seam.sides],
+            "openings": [asdict(opening) for opening in seam.openings],
         }
         for seam in garment.garment.seams
     ]
@@ -448,6 +460,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
                     sides=(_read_side(stitch.sides[0]), _read_side(stitch.sides[1])),
                     ease=stitch.ease,
                     eased=(stitch.eased[0], stitch.eased[1]),
+                    openings=tuple(SeamOpening(**each.model_dump()) for each in stitch.openings),
                 )
                 for stitch in data.stitches
                 if stitch.kind == "seam"

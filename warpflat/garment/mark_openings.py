@@ -14,7 +14,7 @@ from warpflat.core.text import find_unused_name
 from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand
 from warpflat.garment.openings import Opening, OpeningPart
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 
 __all__ = ["mark_openings", "with_notches"]
 
@@ -59,6 +59,12 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
             seam = next((each for each in pattern.seams if each.name == part.seam), None)
             if seam is None:
                 raise InputError(f"openings[{number}]: the pattern has no seam {part.seam!r} of its own")
+            opened = SeamOpening(
+                kind=opening.kind, length=min(opening.length, sum(each.whole for each in placed[pattern.sample][number])),
+                begin=begin, whole=end >= part.whole, style=opening.style if opening.kind == "zip" else "",
+            )  # fmt: skip
+            seam = replace(seam, openings=(*seam.openings, opened))
+            pattern = replace(pattern, seams=[seam if each.name == seam.name else each for each in pattern.seams])
             if opening.kind == "zip":
                 pattern = _with_zip(pattern, seam, opening, end if end < part.whole else None, number, placed)
             elif opening.kind == "buttons":

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
 
 
+#: Kinds of :class:`SeamOpening`.
+OPENINGS = ("zip", "buttons", "slit", "vent")
 ROLES = ("shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket")
 
 
@@ -135,6 +137,29 @@ class SeamSide:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SeamOpening:
+    """Where a seam can be opened, or is not closed.
+
+    Attributes:
+        kind: "zip" or "buttons", from the upper end of the seam; "slit" or "vent", from its lower end.
+        length: of the whole opening [m]; it may run on into another seam.
+        begin: how far from that end of the seam it begins [m].
+        whole: whether it reaches from there to the seam's other end.
+        style: of a zip, "invisible" or "lapped".
+    """
+
+    kind: str
+    length: float
+    begin: float = 0.0
+    whole: bool = False
+    style: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind not in OPENINGS:
+            raise InputError(f"unknown kind of opening {self.kind!r}; {nearest(self.kind, OPENINGS)}")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Seam:
     """Two sides that are sewn together, each a chain of one or more edges in the same direction.
 
@@ -146,6 +171,7 @@ class Seam:
         notches: fractions of the first side's length in (0, 1) that get notches on both sides; None places them by length.
         size_notches: by size, fractions instead of `notches`, where a notch stands for a length, as the end of a zip.
         double: double notches; None means double where a back takes part and no front does.
+        openings: where it can be opened, or is not closed.
     """
 
     name: str
@@ -155,6 +181,7 @@ class Seam:
     notches: tuple[float, ...] | None = None
     size_notches: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     double: bool | None = None
+    openings: tuple[SeamOpening, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.sides) != 2 or not all(self.sides):
