@@ -18,7 +18,7 @@ __all__ = ["with_shaped_waistband", "without_strip"]
 
 
 def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
-    """Return a piece without the strip along one of its borders.
+    """Return a piece without the strip along one of its borders, and with the parts of its lines that lie inside what is left.
 
     Args:
         piece: whole.
@@ -28,6 +28,8 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
     Raises:
         InputError: hardly anything of a neighbouring edge is left.
     """
+    import shapely
+
     names = [edge.name for edge in strip]
     at = names.index(INNER)
     covered, after, before = names[: at - 1], strip[at - 1], strip[at + 1]
@@ -44,8 +46,14 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
             edges.append(replace(edge, points=_rest(edge, part, at_start=edge.name == after.name), vertices=None))
         elif edge.name not in covered:
             edges.append(edge)
+    body, lines = shapely.Polygon(np.concatenate([edge.points[:-1] for edge in edges])).buffer(1e-6), {}
+    for name, line in piece.internal_lines.items():
+        parts = shapely.get_parts(shapely.LineString(line).intersection(body))
+        parts = [part for part in parts if part.geom_type == "LineString" and part.length > 1e-3]
+        if parts:
+            lines[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
     try:
-        return replace(piece, edges=edges)
+        return replace(piece, edges=edges, internal_lines=lines)
     except InputError:
         raise InputError(f"{piece.name}: nothing can be drawn beside {covered[0]!r}; take a narrower strip") from None
 
@@ -80,7 +88,7 @@ def with_shaped_waistband(
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == name)
             strip = facing_edges(row[at], (edge,), width)
-            rest = _inside(without_strip(row[at], strip, f"{edge} seam"))
+            rest = without_strip(row[at], strip, f"{edge} seam")
             row.append(_band(row[at], strip, names[name]))
             row[at] = rest
         whole = pattern.piece(name, pattern.sample)
@@ -122,19 +130,6 @@ def _band(piece: Piece, strip: Sequence[Edge], title: str) -> Piece:
         )  # fmt: skip
     except InputError:
         raise InputError(f"no waistband can be drawn along {piece.name}.{strip[0].name}: make it narrower") from None
-
-
-def _inside(piece: Piece) -> Piece:
-    """Return a piece with the parts of its lines that lie inside it."""
-    import shapely
-
-    body, lines = shapely.Polygon(piece.outline).buffer(1e-6), {}
-    for name, line in piece.internal_lines.items():
-        parts = shapely.get_parts(shapely.LineString(line).intersection(body))
-        parts = [part for part in parts if part.geom_type == "LineString" and part.length > 1e-3]
-        if parts:
-            lines[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
-    return replace(piece, internal_lines=lines)
 
 
 def _with_moved_notches(
