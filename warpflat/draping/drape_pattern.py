@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
 from warpflat.draping.lift import Lift, whole_lifts
@@ -44,6 +45,8 @@ class Placement:
         spacing: wished edge of the mesh [m].
         hold: edges that stay where they are, as "piece.edge", or "edge" for every piece that has one.
     """
+
+    __repr__ = short_repr
 
     at: Mapping[str, str] = field(default_factory=dict)
     top: str | float | None = None

@@ -12,6 +12,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
+from warpflat.core.short_repr import short_repr
 from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
@@ -49,6 +50,8 @@ class Piece:
         title: what is printed instead of the name, in any language; the name with spaces if not given.
         units: of lengths in printed words, one of :data:`warpflat.pattern.measures.UNITS`.
     """
+
+    __repr__ = short_repr
 
     name: str
     size: str = ""
@@ -217,6 +220,8 @@ class Pattern:
         sample_size: the size that files of one size show; None takes the middle one.
         words: what is printed instead of English words and names (see `warpflat.pattern.words`).
     """
+
+    __repr__ = short_repr
 
     name: str
     pieces: Mapping[str, Sequence[Piece]]
