@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -45,6 +46,9 @@ def run_and_report(
     folder = out if out is not None else Path("out") / scene.name
     with ExitStack() as stack:
         bar = stack.enter_context(ProgressBar(scene.name, hidden=quiet or as_json))
+        if "warp" in sys.modules:
+            # A process beside this one asks Warp for its devices, which starts it.
+            start_warp_silently()
         stack.enter_context(work_beside())
         built = None
         if scene.settings.mannequin is not None and scene.settings.auto_cut is None and scene.settings.shape != "auto":
