@@ -17,6 +17,7 @@ __all__ = ["MIRRORED", "hole_edges", "whole_pieces"]
 
 #: Ends the name of a piece that is cut turned over, and of an edge beyond the fold.
 MIRRORED = " mirrored"
+_OTHER_SIDE = {"left arm": "right arm", "right arm": "left arm"}
 
 
 def whole_pieces(pieces: Iterable[Piece], seams: Sequence[Seam]) -> tuple[dict[str, Piece], list[Seam], list[str]]:
@@ -136,7 +137,7 @@ def _turned(piece: Piece) -> Piece:
         piece, name=piece.name + MIRRORED, edges=edges, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
         holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
         internal_lines={name: line * across for name, line in piece.internal_lines.items()},
-        grain=None if piece.grain is None else piece.grain * across,
+        grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at), placement=None,
     )  # fmt: skip
 
 

@@ -48,6 +48,7 @@ __all__ = [
     "SideEntry",
     "pattern_from_json",
     "pattern_json",
+    "read_pattern_data",
     "read_pattern_json",
     "write_pattern_json",
 ]
@@ -413,12 +414,20 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
     Raises:
         InputError: the file is missing, no JSON, of another schema, or does not hold together.
     """
-    path = Path(path)
+    data = read_pattern_data(Path(path))
+    with guarded(Path(path), "JSON"):
+        return pattern_from_json(data)
+
+
+def read_pattern_data(path: Path) -> Any:
+    """Return what a pattern's file in JSON holds.
+
+    Raises:
+        InputError: the file is missing, or no JSON.
+    """
     if path.parent.is_file():
         raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies")
-    data = read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
-    with guarded(path, "JSON"):
-        return pattern_from_json(data)
+    return read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
 
 
 def pattern_from_json(data: Any) -> DraftedGarment:
@@ -428,7 +437,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
         InputError: another schema, a missing key, a value of the wrong kind, or lines that are no pattern.
     """
     if not isinstance(data, Mapping) or "sizes" not in data:
-        raise InputError('is no pattern of warpflat: it has no "sizes"')
+        raise InputError('is no pattern of warpflat, which has "sizes", or of GarmentCode, which has "pattern"')
     if data.get("schema") != SCHEMA:
         raise InputError(
             f"has schema {quote_value(data.get('schema'))}; this version reads {SCHEMA}: run the scene again"

@@ -155,28 +155,32 @@ def surface_files(
 
 
 def export_patterns(
-    folder: Path,
+    source: Path,
     formats: Sequence[str],
     *,
+    out: Path | None = None,
+    allowance: float | None = None,
     dialect: str = "aama",
     paper: str = "A4",
     sizes: Sequence[str] | None = None,
-) -> list[str]:
-    """Write files of a run's pattern again, all or none, from its `pattern.json`, and return their names.
+) -> list[Path]:
+    """Write files of a pattern, all or none, from its `pattern.json` or the JSON of GarmentCode, and return them.
 
     Args:
-        folder: of the run.
+        source: the folder of a run, its `pattern.json`, or a file of GarmentCode.
         formats: some of "dxf", "svg", "pdf" and "json".
+        out: the folder for the files; that of the run, or out/NAME for a file of another program, if not given.
+        allowance: [m] around pieces of a file that knows of none; that of seams if not given.
         dialect: of a DXF.
         paper: of a PDF.
         sizes: only these; None takes all. Not for "json", from which the others are made.
 
     Raises:
-        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder
-            cannot be written.
+        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
+            has its own, or the folder cannot be written.
     """
     from warpflat.core.output import file_in, output_folder, record_file
-    from warpflat.export.pattern_json import read_pattern_json
+    from warpflat.export.read_pattern import read_drafted
 
     for format in formats:
         if format not in FORMATS:
@@ -185,19 +189,21 @@ def export_patterns(
         raise InputError(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
         )
-    source = folder / "pattern.json"
-    drafted = read_pattern_json(source)
+    file = source if source.suffix.lower() == ".json" and not source.is_dir() else source / "pattern.json"
+    drafted = read_drafted(file, allowance=allowance)
+    folder = out or (file.parent if file.name == "pattern.json" else Path("out") / drafted.name)
     # pattern.json may be written over itself: that is what was asked for.
-    with output_folder(folder, sources=[] if "json" in formats else [source], guard=True):
+    over_itself = "json" in formats and file.name == "pattern.json" and out is None
+    with output_folder(folder, sources=[] if over_itself else [file], guard=True):
         files = [
             _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
             for format in formats
         ]
         if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
             files.append(file_in(folder, drafted.name, ".rul").name)
-        for file in files:
-            record_file(folder, drafted.name, file)
-    return files
+        for name in files:
+            record_file(folder, drafted.name, name)
+    return [folder / name for name in files]
 
 
 def _write_pattern(
