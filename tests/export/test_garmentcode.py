@@ -1,10 +1,12 @@
-"""The JSON of GarmentCode: curves, stitches, darts and places read; what others wrote, and faults, each one line."""
+"""The JSON of GarmentCode: curves, stitches, darts and places read, faults, each one line, and patterns written and read back."""
 
 from __future__ import annotations
 
 import copy
 import json
 import os
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,14 @@ import pytest
 from command import Command
 
 from warpflat.core.errors import InputError
+from warpflat.export.garmentcode import garmentcode_json, write_garmentcode
+from warpflat.export.pattern_json import write_pattern_json
 from warpflat.export.read_garmentcode import garmentcode_pattern
 from warpflat.export.read_pattern import read_drafted, read_pattern
-from warpflat.pattern.pieces import Pattern
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.whole_pieces import whole_pieces
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no patterns of GarmentCode")
@@ -194,6 +201,119 @@ def test_a_file_is_exported_and_its_lines_stay(command: Command, tmp_path: Path)
     Path("out/bag/bag.svg").write_text("changed by hand")
     refused = command("export", "bag_specification.json", "--format", "svg")
     assert refused.code == 2
+
+
+def piece_of(name: str, corners: list[tuple[float, float]], **more: Any) -> Piece:
+    """A piece whose edges e1, e2 ... join its corners; a corner with a third number ends an edge that bulges out by that."""
+    edges = []
+    for number, (start, end) in enumerate(pairwise([*corners, corners[0]]), start=1):
+        (x, y), (u, v), bulge = start[:2], end[:2], (*end, 0.0)[2]
+        t = np.linspace(0.0, 1.0, 41 if bulge else 2)[:, None]
+        points = [x, y] + t * [u - x, v - y] + bulge * np.sin(np.pi * t) * [v - y, x - u]
+        points[[0, -1]] = (x, y), (u, v)
+        edges.append(Edge(name=f"e{number}", points=points))
+    return Piece(name=name, edges=edges, **more)
+
+
+def side_of(text: str, *, reversed: bool) -> tuple[SeamSide, ...]:
+    return tuple(
+        SeamSide(piece=word.split(".")[0], edge=word.split(".")[1], reversed=reversed) for word in text.split(" + ")
+    )
+
+
+def worn() -> Pattern:
+    """A half front on the fold with a curved waist and a curved armhole, a back with a dart, and a sleeve that is cut twice."""
+    front = piece_of("front", [(0.0, 0.0), (0.25, 0.0), (0.25, 0.3, 0.04), (0.15, 0.5, -0.15), (0.0, 0.5, -0.1)])
+    front = replace(
+        front, edges=[*front.edges[:4], Edge(name="fold", points=front.edges[4].points, kind="fold")], at="front",
+        placement=np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.9], [0.0, 0.0, 0.2]]),
+    )  # fmt: skip
+    back = piece_of("back", [(-0.25, 0.0), (0.25, 0.0), (0.25, 0.31), (0.15, 0.5, -0.1), (0.02, 0.5), (0.0, 0.35),
+                             (-0.02, 0.5), (-0.15, 0.5), (-0.25, 0.31, -0.1)])  # fmt: skip
+    kinds = ["seam", "seam", "seam", "seam", "dart", "dart", "seam", "seam", "seam"]
+    back = replace(
+        back, edges=[replace(edge, kind=kind) for edge, kind in zip(back.edges, kinds, strict=True)], at="back",
+        darts=[Dart(name="neck", left="e5", right="e6")],
+        placement=np.array([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.9], [0.0, 0.0, -0.2]]),
+    )  # fmt: skip
+    sleeve = piece_of("sleeve", [(0.0, 0.0), (0.4, 0.0), (0.4, 0.2), (0.0, 0.2, 0.3)], quantity=2)
+    seams = [
+        Seam(name="side", sides=(side_of("front.e2", reversed=False), side_of("back.e9", reversed=True))),
+        Seam(name="shoulder", sides=(side_of("front.e4", reversed=False), side_of("back.e7", reversed=True))),
+        Seam(name="under the arm", sides=(side_of("sleeve.e2", reversed=False), side_of("sleeve.e4", reversed=True))),
+        Seam(name="armhole", sides=(side_of("front.e3 + back.e8", reversed=False), side_of("sleeve.e3", reversed=True)),
+             eased=(0.3, 0.7)),
+    ]  # fmt: skip
+    return Pattern(name="worn", pieces={"": [front, back, sleeve]}, seams=seams)
+
+
+def test_a_pattern_comes_back_with_its_lengths_and_seams(tmp_path: Path):
+    drafted = draft_garment(worn(), true=False)
+    file = tmp_path / "worn_specification.json"
+    assert write_garmentcode(drafted, file) == ()
+    found = read_pattern(file)
+    flat = [
+        replace(each.piece, edges=[replace(edge.edge, points=edge.line) for edge in each.edges])
+        for each in drafted.pieces[""]
+    ]
+    pieces, seams, _ = whole_pieces(flat, drafted.garment.seams)
+    assert {piece.name for piece in found.pieces[""]} == {"front", "back", "sleeve", "sleeve mirrored"}
+    for name, piece in pieces.items():
+        lengths = {edge.name: edge.length for edge in found.piece(name, "").edges}
+        assert lengths == pytest.approx({edge.name: edge.length for edge in piece.edges}, abs=1e-4)
+    sewn = {seam.name: seam for seam in seams if seam.name != "back.neck"}
+    assert [(dart.left, dart.right) for dart in found.piece("back", "").darts] == [("e5", "e6")]
+    assert {seam.name for seam in found.seams} == sewn.keys()
+    for seam in found.seams:
+        assert set(seam.sides) == set(sewn[seam.name].sides)
+    # What the file says again is the same; what a drape needs is there.
+    again = tmp_path / "again_specification.json"
+    write_garmentcode(draft_garment(found, true=False), again)
+    assert {seam.name: set(seam.sides) for seam in read_pattern(again).seams} == {
+        seam.name: set(seam.sides) for seam in found.seams
+    }
+    front = found.piece("front", "")
+    assert front.at == "front"
+    assert front.placement is not None
+    np.testing.assert_allclose((front.placement @ [*front.outline.mean(axis=0), 1.0])[2], 0.2, atol=1e-9)
+
+
+def test_other_programs_can_read_what_is_written(tmp_path: Path):
+    """Each edge is in one stitch, both sides of a stitch have one label at most, edges chain, and the file has the library's keys."""
+    data, notes = garmentcode_json(draft_garment(worn(), true=False))
+    assert notes == ()
+    assert list(data) == ["pattern", "parameters", "parameter_order", "properties"]
+    pattern = data["pattern"]
+    assert list(pattern) == ["panels", "stitches", "panel_order"]
+    stitched = [
+        (side["panel"], side["edge"]) for stitch in pattern["stitches"] for side in stitch if side != "right_wrong"
+    ]
+    assert len(set(stitched)) == len(stitched)
+    for panel in pattern["panels"].values():
+        assert {"translation", "rotation", "vertices", "edges"} <= panel.keys()
+        count = len(panel["vertices"])
+        assert [edge["endpoints"] for edge in panel["edges"]] == [[k, (k + 1) % count] for k in range(count)]
+        assert panel["vertices"][0] == [0.0, 0.0]
+    if DATA is not None:
+        given = json.loads((Path(DATA) / "patterns" / "dress_pencil.json").read_text())
+        assert given["properties"] == data["properties"]
+        assert given.keys() == data.keys()
+        assert given["pattern"].keys() == pattern.keys()
+
+
+def test_what_garmentcode_does_not_know_is_named(command: Command):
+    hole = Hole(name="eye", points=0.05 * np.array([(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]))
+    cloth = piece_of("cloth", [(0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)], holes=[hole])
+    sides = side_of("cloth.e1", reversed=False), side_of("cloth.e3", reversed=True)
+    seams = [Seam(name=name, sides=sides) for name in ("first", "second")]
+    Path("run").mkdir()
+    write_pattern_json(draft_garment(Pattern(name="p", pieces={"": [cloth]}, seams=seams)), "run/pattern.json")
+    ended = command("export", "run", "--format", "garmentcode")
+    assert ended.code == 0
+    assert ended.out == "run: p_specification.json\n"
+    assert "cloth: GarmentCode knows no holes: eye left out" in ended.err
+    assert "seam 'second': one of its edges is in another seam" in ended.err
+    assert [seam.name for seam in read_pattern("run/p_specification.json").seams] == ["first"]
 
 
 @needs_data

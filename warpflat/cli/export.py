@@ -14,7 +14,12 @@ __all__ = ["export"]
 @click.command(cls=ComputingCommand)
 @click.argument("source", metavar="DIR|PATTERN", type=click.Path(path_type=Path))
 @click.option(
-    "--format", "formats", type=click.Choice(["dxf", "svg", "pdf", "json"]), multiple=True, required=True, help="Which."
+    "--format",
+    "formats",
+    type=click.Choice(["dxf", "svg", "pdf", "json", "garmentcode"]),
+    multiple=True,
+    required=True,
+    help="Which.",
 )
 @click.option("--dialect", type=click.Choice(["aama", "astm"]), default="aama", show_default=True, help="Of the DXF.")
 @click.option(
@@ -56,11 +61,12 @@ def export(
     Examples:
       warpflat export out/dress --format dxf --dialect astm
       warpflat export out/dress --format pdf --paper Letter --size "EU 38"
+      warpflat export out/dress --format garmentcode
       warpflat export shirt_specification.json --format dxf --format pdf
     """
     from warpflat.garment.pattern_files import export_patterns
 
-    files = export_patterns(
+    files, notes = export_patterns(
         source,
         formats,
         out=out,
@@ -70,5 +76,7 @@ def export(
         sizes=sizes or None,
     )
     if not quiet:
+        for note in notes:
+            click.echo(f"warpflat: {note}", err=True)
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
     return DONE

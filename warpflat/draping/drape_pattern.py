@@ -19,11 +19,11 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.draping.whole_pieces import whole_pieces
 from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.pieces import Pattern
+from warpflat.pattern.whole_pieces import whole_pieces
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["Placement", "drape_pattern"]

@@ -195,6 +195,9 @@ class PieceEntry(Entry):
     paired: bool
     title: Text = ""
     printed_units: Literal["mm", "cm", "in"] = "cm"
+    at: Literal["", "front", "back", "left arm", "right arm"] = ""
+    placement: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = None
+    levels: dict[Name, Text] = Field(default_factory=dict)
     frame: Annotated[list[Row], Field(min_length=2, max_length=2)]
     edges: Annotated[list[EdgeEntry], Field(min_length=1)]
     cut_line: Ring
@@ -341,7 +344,10 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
         "title": piece.piece.title,
         "printed_units": piece.piece.units,
         "on_fold": piece.piece.on_fold,
+        "at": piece.piece.at,
+        "placement": None if piece.piece.placement is None else piece.piece.placement.tolist(),
         "frame": piece.frame.tolist(),
+        "levels": dict(piece.piece.levels),
         "edges": [
             {
                 "name": edge.name,
@@ -519,6 +525,9 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         paired=data.paired,
         title=data.title,
         units=data.printed_units,
+        at=data.at,
+        placement=None if data.placement is None else np.array(data.placement),
+        levels=data.levels,
         edges=[
             Edge(
                 name=edge.name,

@@ -16,20 +16,20 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.core.toml_file import check_table
-from warpflat.export.pattern_json import Coordinate, Entry, Name, Point, Text
+from warpflat.export.pattern_json import Coordinate, Ends, Entry, Name, Point, Text
 from warpflat.pattern.curves import Curve, as_cubic
 from warpflat.pattern.piece_parts import Dart, Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 
-__all__ = ["CENTIMETRES", "garmentcode_pattern"]
+__all__ = ["CENTIMETRES", "LABELS", "EdgeKey", "garmentcode_pattern"]
 
 #: Units in a metre where the file says nothing.
 CENTIMETRES = 100.0
 # Chords of a curve stray from it by at most this [m]: a wide hem is then as long as its curve within .01 mm.
 _CHORD = 5e-6
-# Labels of edges that are attached to a level of the body.
-_LEVELS = {"lower_interface": "waist"}
+#: By level of the body the label of the edges that are attached there.
+LABELS = {"waist": "lower_interface"}
 
 
 class CurvatureEntry(Entry):
@@ -59,21 +59,27 @@ class PanelEdgeEntry(Entry):
 
 
 class PanelEntry(Entry):
-    """A panel: its outline in its own plane, and the way from there to the body; angles in degrees about x, y, z in turn."""
+    """A panel: its outline in its own plane, and the way from there to the body; angles in degrees about x, y, z in turn.
+
+    `grain` and `placed` are the package's own keys; the latter is false where the place is a guess.
+    """
 
     translation: Annotated[list[Coordinate], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012
     rotation: Annotated[list[Coordinate], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012
     vertices: Annotated[list[Point], Field(min_length=2, max_length=100_000)]
     edges: Annotated[list[PanelEdgeEntry], Field(min_length=2, max_length=100_000)]
     label: Text = ""
+    grain: Ends | None = None
+    placed: bool = True
 
 
 class StitchSideEntry(Entry):
-    """An edge of a panel, by its number; `seam` is the package's own key."""
+    """An edge of a panel, by its number; `seam` and `reversed` are the package's own keys, as in `warpflat.pattern.pieces.SeamSide`."""
 
     panel: Name
     edge: Annotated[int, Field(ge=0)]
     seam: Text = ""
+    reversed: bool = False
 
 
 class PropertiesEntry(Entry):
@@ -101,7 +107,7 @@ class GarmentCodeEntry(Entry):
 
 #: A panel and the number of its edge.
 EdgeKey = tuple[str, int]
-#: What an edge is stitched to, whether both run the same way, and the seam's name if the file is the package's own.
+#: What an edge is stitched to, whether both run the same way, and the name that the package has given to the seam.
 Partners = dict[EdgeKey, tuple[EdgeKey, bool, str]]
 
 
@@ -113,8 +119,9 @@ class _Panel:
     lines: list[FloatArray]
     names: list[str]
     labels: list[str]
-    placement: FloatArray
+    placement: FloatArray | None
     at: str
+    grain: FloatArray | None
     darts: list[tuple[list[int], list[int], str]] = field(default_factory=list)
 
     @property
@@ -126,11 +133,11 @@ class _Panel:
 
 @dataclass(eq=False)
 class _Chain:
-    """Stitches that follow each other on both sides."""
+    """Stitches that follow each other on both sides; `against` says of each edge whether the seam runs against it."""
 
     sides: tuple[list[EdgeKey], list[EdgeKey]]
-    same_way: bool
-    name: str
+    against: tuple[list[bool], list[bool]]
+    name: str = ""
 
 
 def garmentcode_pattern(data: Any, name: str) -> Pattern:
@@ -153,10 +160,11 @@ def garmentcode_pattern(data: Any, name: str) -> Pattern:
     """
     entry = check_table(GarmentCodeEntry, data)
     panels = {key: _read_panel(key, each, entry.properties) for key, each in entry.pattern.panels.items()}
-    partners = _read_stitches(entry.pattern.stitches, panels)
+    partners, own_chains = _read_stitches(entry.pattern.stitches, panels)
     for panel in panels.values():
         _find_darts(panel, partners)
-    chains = _chains(panels, partners)
+    chains = [chain for chain in own_chains if {*chain.sides[0], *chain.sides[1]} <= partners.keys()]
+    chains += _chains(panels, {edge: found for edge, found in partners.items() if not found[2]})
     # Stretches that are one edge with the next: of a leg, and where the package itself has split an edge.
     joined = {
         (key, k) for key, panel in panels.items() for left, right, _ in panel.darts for k in left[:-1] + right[:-1]
@@ -192,8 +200,23 @@ def garmentcode_pattern(data: Any, name: str) -> Pattern:
             Dart(name=own or f"dart_{number}", left=named[key, left[0]], right=named[key, right[0]])
             for number, (left, right, own) in enumerate(panel.darts, start=1)
         ]
-        levels = {named[key, k]: _LEVELS[label] for k, label in enumerate(panel.labels) if label in _LEVELS}
-        pieces.append(Piece(name=key, edges=edges, darts=darts, at=panel.at, placement=panel.placement, levels=levels))
+        levels = {
+            named[key, k]: level
+            for k, label in enumerate(panel.labels)
+            for level, its in LABELS.items()
+            if label == its
+        }
+        pieces.append(
+            Piece(
+                name=key,
+                edges=edges,
+                darts=darts,
+                at=panel.at,
+                grain=panel.grain,
+                placement=panel.placement,
+                levels=levels,
+            )
+        )
     return Pattern(name=name, pieces={"": pieces}, seams=_seams(chains, panels, named))
 
 
@@ -239,8 +262,9 @@ def _read_panel(key: str, entry: PanelEntry, properties: PropertiesEntry) -> _Pa
         lines=[line @ way for line in lines],
         names=[edge.name for edge in entry.edges],
         labels=[edge.label for edge in entry.edges],
-        placement=placement,
-        at=at,
+        placement=placement if entry.placed else None,
+        at=at if entry.placed else "",
+        grain=None if entry.grain is None else np.array(entry.grain) @ way / properties.units_in_meter,
     )
 
 
@@ -271,11 +295,14 @@ def _curve(start: FloatArray, end: FloatArray, entry: CurvatureEntry | list[floa
     return Curve(bezier=as_cubic(np.vstack([start, control, end]))[None], straight=np.array([False]))
 
 
-def _read_stitches(stitches: Sequence[Sequence[StitchSideEntry | str]], panels: Mapping[str, _Panel]) -> Partners:
-    """Return what each edge is stitched to."""
+def _read_stitches(
+    stitches: Sequence[Sequence[StitchSideEntry | str]], panels: Mapping[str, _Panel]
+) -> tuple[Partners, list[_Chain]]:
+    """Return what each edge is stitched to, and the seams that the package itself has split into stitches."""
     partners: Partners = {}
+    own: dict[str, _Chain] = {}
     for number, stitch in enumerate(stitches):
-        where, ends, named = f"pattern.stitches[{number}]", list[EdgeKey](), ""
+        where, ends, named, against = f"pattern.stitches[{number}]", list[EdgeKey](), "", list[bool]()
         for side in stitch[:2]:
             if isinstance(side, str):
                 raise InputError(f'{where}: {side!r} is no edge; a stitch joins two {{"panel": NAME, "edge": NUMBER}}')
@@ -286,13 +313,19 @@ def _read_stitches(stitches: Sequence[Sequence[StitchSideEntry | str]], panels: 
                 raise InputError(f"{where}: panel {side.panel!r} has no edge {side.edge}; its edges are 0 to {last}")
             ends.append((side.panel, side.edge))
             named = side.seam
+            against.append(side.reversed)
         if any(not isinstance(word, str) for word in stitch[2:]):
             raise InputError(f'{where}: joins three edges; a stitch joins two, and only "right_wrong" may follow')
         for edge, other in (ends, ends[::-1]):
             if edge in partners or edge == other:
                 raise InputError(f"{where}: edge {edge[1]} of {edge[0]!r} is stitched twice; an edge is in one stitch")
             partners[edge] = other, len(stitch) == 3, named
-    return partners
+        if named:
+            chain = own.setdefault(named, _Chain(sides=([], []), against=([], []), name=named))
+            for k in range(2):
+                chain.sides[k].append(ends[k])
+                chain.against[k].append(against[k])
+    return partners, list(own.values())
 
 
 def _find_darts(panel: _Panel, partners: Partners) -> None:
@@ -331,14 +364,14 @@ def _chains(panels: Mapping[str, _Panel], partners: Partners) -> list[_Chain]:
 
     def onward(edge: EdgeKey, step: Mapping[EdgeKey, EdgeKey], back: Mapping[EdgeKey, EdgeKey]) -> EdgeKey | None:
         """Return the next edge of the same seam."""
-        other, same_way, named = partners[edge]
+        other, same_way, _ = partners[edge]
         if (following := step[edge]) not in partners:
             return None
-        beside, runs, called = partners[following]
-        if beside != (step if same_way else back)[other] or runs != same_way or named != called:
+        beside, runs, _ = partners[following]
+        if beside != (step if same_way else back)[other] or runs != same_way:
             return None
         eased = abs(length[beside] - length[following] * length[other] / length[edge])
-        return following if named or eased <= SEAM_TOLERANCE else None
+        return following if eased <= SEAM_TOLERANCE else None
 
     found, used = list[_Chain](), set[EdgeKey]()
     for edge in partners:
@@ -354,11 +387,8 @@ def _chains(panels: Mapping[str, _Panel], partners: Partners) -> list[_Chain]:
             chain.append(following)
             seen |= {following, partners[following][0]}
         used |= seen
-        found.append(
-            _Chain(
-                sides=(chain, [partners[each][0] for each in chain]), same_way=partners[edge][1], name=partners[edge][2]
-            )
-        )
+        others, same_way = [partners[each][0] for each in chain], partners[chain[0]][1]
+        found.append(_Chain(sides=(chain, others), against=([False] * len(chain), [not same_way] * len(chain))))
     return found
 
 
@@ -368,11 +398,9 @@ def _seams(chains: Sequence[_Chain], panels: Mapping[str, _Panel], named: Mappin
     for number, chain in enumerate(chains, start=1):
         lengths = [np.array([polyline_length(panels[key].lines[k]) for key, k in side]) for side in chain.sides]
         sides = []
-        for side, is_second in zip(chain.sides, (False, True), strict=True):
-            edges = dict.fromkeys((key, named[key, k]) for key, k in side)
-            sides.append(
-                tuple(SeamSide(piece=key, edge=edge, reversed=is_second and not chain.same_way) for key, edge in edges)
-            )
+        for side, against in zip(chain.sides, chain.against, strict=True):
+            edges = {(key, named[key, k]): against[at] for at, (key, k) in enumerate(side)}
+            sides.append(tuple(SeamSide(piece=key, edge=edge, reversed=back) for (key, edge), back in edges.items()))
         if lengths[0].sum() > lengths[1].sum():
             sides, lengths = sides[::-1], lengths[::-1]
         excess, whole = lengths[1] - lengths[0], float(lengths[0].sum())

@@ -34,7 +34,15 @@ __all__ = [
     "surface_files",
 ]
 
-FORMATS = ("dxf", "svg", "pdf", "json")
+#: The formats, and the names of their files; the first four are written if nothing is said.
+FORMATS = {
+    "dxf": "{}.dxf",
+    "svg": "{}.svg",
+    "pdf": "pattern.pdf",
+    "json": "pattern.json",
+    "garmentcode": "{}_specification.json",
+}
+_USUAL = ("dxf", "svg", "pdf", "json")
 _MARKER = (".marker.svg", ".marker.json")
 
 
@@ -43,7 +51,7 @@ class PatternOptions:
     """The formats of a pattern, and options of the drawing.
 
     Attributes:
-        formats: some of "dxf", "svg", "pdf", "json".
+        formats: some of "dxf", "svg", "pdf", "json" and "garmentcode".
         dialect: of the DXF, "aama" or "astm".
         paper: of the PDF, "A4", "Letter" or "A0".
         tolerance: how far [m] a drawn curve may lie from the mesh's border; None takes 0.1 mm, and more only where the
@@ -58,7 +66,7 @@ class PatternOptions:
         lining, interfacing: what these cloths are called; none without a name.
     """
 
-    formats: Sequence[str] = FORMATS
+    formats: Sequence[str] = _USUAL
     dialect: str = "aama"
     paper: str = "A4"
     tolerance: float | None = None
@@ -163,17 +171,20 @@ def export_patterns(
     dialect: str = "aama",
     paper: str = "A4",
     sizes: Sequence[str] | None = None,
-) -> list[Path]:
-    """Write files of a pattern, all or none, from its `pattern.json` or the JSON of GarmentCode, and return them.
+) -> tuple[list[Path], list[str]]:
+    """Write files of a pattern, all or none, from its `pattern.json` or the JSON of GarmentCode.
 
     Args:
         source: the folder of a run, its `pattern.json`, or a file of GarmentCode.
-        formats: some of "dxf", "svg", "pdf" and "json".
+        formats: some of "dxf", "svg", "pdf", "json" and "garmentcode".
         out: the folder for the files; that of the run, or out/NAME for a file of another program, if not given.
         allowance: [m] around pieces of a file that knows of none; that of seams if not given.
         dialect: of a DXF.
         paper: of a PDF.
         sizes: only these; None takes all. Not for "json", from which the others are made.
+
+    Returns:
+        The files, and what their formats leave out, one sentence each.
 
     Raises:
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
@@ -194,16 +205,18 @@ def export_patterns(
     folder = out or (file.parent if file.name == "pattern.json" else Path("out") / drafted.name)
     # pattern.json may be written over itself: that is what was asked for.
     over_itself = "json" in formats and file.name == "pattern.json" and out is None
+    notes = list[str]()
     with output_folder(folder, sources=[] if over_itself else [file], guard=True):
-        files = [
-            _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
-            for format in formats
-        ]
+        files = list[str]()
+        for format in formats:
+            name, lost = _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
+            files.append(name)
+            notes += lost
         if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
             files.append(file_in(folder, drafted.name, ".rul").name)
         for name in files:
             record_file(folder, drafted.name, name)
-    return [folder / name for name in files]
+    return [folder / name for name in files], notes
 
 
 def _write_pattern(
@@ -271,11 +284,12 @@ def _write_pattern(
     refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
     notes = (*notes, f"pattern.pdf was left out: {refused}") if refused else notes
     with output_folder(to) as folder:
-        files = [
-            _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
-            for kind in FORMATS
-            if kind in options.formats and not (kind == "pdf" and refused)
-        ]
+        files = list[str]()
+        for kind in FORMATS:
+            if kind in options.formats and not (kind == "pdf" and refused):
+                file, lost = _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
+                files.append(file)
+                notes = (*notes, *lost)
         if "dxf" in options.formats and len(drafted.pieces) > 1:
             files.append(file_in(folder, name, ".rul").name)
         if options.cloth is not None:
@@ -288,7 +302,7 @@ def _write_pattern(
 
 def pattern_names(name: str, formats: Iterable[str], *, marker: bool = False) -> list[str]:
     """Return the names of the files of a pattern, as far as they are known: without rules of sizes, or markers of further cloths."""
-    files = [f"{name if kind in ('dxf', 'svg') else 'pattern'}.{kind}" for kind in FORMATS if kind in formats]
+    files = [FORMATS[kind].format(name) for kind in FORMATS if kind in formats]
     return [*files, *(f"{name}{ending}" for ending in _MARKER if marker)]
 
 
@@ -313,15 +327,18 @@ def _write(
     dialect: str,
     paper: str,
     sizes: Sequence[str] | None = None,
-) -> str:
-    """Write one file and return its name."""
+) -> tuple[str, tuple[str, ...]]:
+    """Write one file and return its name, and what the format leaves out."""
     from warpflat.core.output import file_in
     from warpflat.export.dxf import write_dxf
+    from warpflat.export.garmentcode import write_garmentcode
     from warpflat.export.pattern_json import write_pattern_json
     from warpflat.export.pdf import write_pdf
     from warpflat.export.svg import write_svg
 
-    file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
+    start, _, ending = FORMATS[kind].partition("{}")
+    file = file_in(folder, start or name, ending) if "{}" in FORMATS[kind] else folder / start
+    lost: tuple[str, ...] = ()
     report_activity(f"writing {file.name}")
     if kind == "dxf":
         write_dxf(drafted, file, dialect=dialect, sizes=sizes, rul=file_in(folder, name, ".rul"))
@@ -329,9 +346,13 @@ def _write(
         write_svg(drafted, file, sizes=sizes, nested=True)
     elif kind == "pdf":
         write_pdf(drafted, file, paper=paper, sizes=sizes)
+    elif kind == "garmentcode":
+        if sizes is not None and len(sizes) > 1:
+            raise InputError(f"a file of GarmentCode holds one size: give one --size, not {', '.join(sizes)}")
+        lost = write_garmentcode(drafted, file, size=None if sizes is None else sizes[0])
     else:
         write_pattern_json(drafted, file)
-    return file.name
+    return file.name, lost
 
 
 def _marker(

@@ -192,8 +192,8 @@ def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:
 
 
 def _side(text: str, *, reversed: bool) -> Any:
-    from warpflat.draping.whole_pieces import MIRRORED
     from warpflat.pattern.pieces import SeamSide
+    from warpflat.pattern.whole_pieces import MIRRORED
 
     piece, _, edge = text.partition(".")
     if not edge:
