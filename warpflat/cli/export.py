@@ -16,7 +16,7 @@ __all__ = ["export"]
 @click.option(
     "--format",
     "formats",
-    type=click.Choice(["dxf", "svg", "pdf", "json", "garmentcode"]),
+    type=click.Choice(["dxf", "svg", "pdf", "json", "garmentcode", "plt"]),
     multiple=True,
     required=True,
     help="Which.",

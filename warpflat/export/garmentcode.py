@@ -15,9 +15,10 @@ from scipy.spatial.transform import Rotation
 from warpflat.core.arrays import FloatArray
 from warpflat.core.output import atomic_path
 from warpflat.core.polyline import arc_lengths, points_at_lengths, turning_angles
-from warpflat.export.read_garmentcode import CENTIMETRES, LABELS, EdgeKey
+from warpflat.export.read_garmentcode import CENTIMETRES, LABELS
 from warpflat.pattern.curves import cubic_weights
 from warpflat.pattern.drafted import DraftedGarment
+from warpflat.pattern.fitting import EdgeKey
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.whole_pieces import whole_pieces
 

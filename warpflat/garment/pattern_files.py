@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpflat._version import __version__
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import format_count, plain_letters
@@ -41,6 +42,7 @@ FORMATS = {
     "pdf": "pattern.pdf",
     "json": "pattern.json",
     "garmentcode": "{}_specification.json",
+    "plt": "{}.plt",
 }
 _USUAL = ("dxf", "svg", "pdf", "json")
 _MARKER = (".marker.svg", ".marker.json")
@@ -51,7 +53,7 @@ class PatternOptions:
     """The formats of a pattern, and options of the drawing.
 
     Attributes:
-        formats: some of "dxf", "svg", "pdf", "json" and "garmentcode".
+        formats: some of "dxf", "svg", "pdf", "json", "garmentcode" and "plt".
         dialect: of the DXF, "aama" or "astm".
         paper: of the PDF, "A4", "Letter" or "A0".
         tolerance: how far [m] a drawn curve may lie from the mesh's border; None takes 0.1 mm, and more only where the
@@ -176,7 +178,7 @@ def export_patterns(
 
     Args:
         source: the folder of a run, its `pattern.json`, or a file of GarmentCode.
-        formats: some of "dxf", "svg", "pdf", "json" and "garmentcode".
+        formats: some of "dxf", "svg", "pdf", "json", "garmentcode" and "plt".
         out: the folder for the files; that of the run, or out/NAME for a file of another program, if not given.
         allowance: [m] around pieces of a file that knows of none; that of seams if not given.
         dialect: of a DXF.
@@ -190,7 +192,7 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
             has its own, or the folder cannot be written.
     """
-    from warpflat.core.output import file_in, output_folder, record_file
+    from warpflat.core.output import file_in, output_folder, record_file, write_report
     from warpflat.export.read_pattern import read_drafted
 
     for format in formats:
@@ -214,8 +216,14 @@ def export_patterns(
             notes += lost
         if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
             files.append(file_in(folder, drafted.name, ".rul").name)
-        for name in files:
-            record_file(folder, drafted.name, name)
+        # A folder that is new knows its files from here on, so that the next export may replace them.
+        if folder != file.parent and not (folder / "metrics.json").exists():
+            head = {"schema": 1, "warpflat": __version__, "pieces": {}}
+            write_report(folder / "metrics.json", head, name=drafted.name, files=files)
+            files.append("metrics.json")
+        else:
+            for name in files:
+                record_file(folder, drafted.name, name)
     return [folder / name for name in files], notes
 
 
@@ -334,6 +342,7 @@ def _write(
     from warpflat.export.garmentcode import write_garmentcode
     from warpflat.export.pattern_json import write_pattern_json
     from warpflat.export.pdf import write_pdf
+    from warpflat.export.plt import write_plt
     from warpflat.export.svg import write_svg
 
     start, _, ending = FORMATS[kind].partition("{}")
@@ -346,6 +355,8 @@ def _write(
         write_svg(drafted, file, sizes=sizes, nested=True)
     elif kind == "pdf":
         write_pdf(drafted, file, paper=paper, sizes=sizes)
+    elif kind == "plt":
+        write_plt(drafted, file, sizes=sizes)
     elif kind == "garmentcode":
         if sizes is not None and len(sizes) > 1:
             raise InputError(f"a file of GarmentCode holds one size: give one --size, not {', '.join(sizes)}")
