@@ -49,6 +49,9 @@ class Piece:
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.
         units: of lengths in printed words, one of :data:`warpflat.pattern.measures.UNITS`.
+        at: where it is worn, "front", "back", "left arm" or "right arm"; "" leaves that to its name and its seams.
+        placement: 3 by 3 [m], where it hangs beside the body: (x, y, 1) on the piece maps to a place; None if unknown.
+        levels: by edge the level of the body where it lies, such as the waist.
     """
 
     __repr__ = short_repr
@@ -68,6 +71,9 @@ class Piece:
     paired: bool = True
     title: str = ""
     units: str = "cm"
+    at: str = ""
+    placement: FloatArray | None = None
+    levels: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         where = f"piece {self.name!r}" + (f" {size_words(self.size)}" if self.size else "")
