@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from contextlib import ExitStack
 from functools import partial
@@ -96,7 +97,9 @@ def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool,
     if as_json:
         click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet and not verbose:
-        for line in summary_lines(result.metrics, result.files, str(folder)):
+        # A pipe takes whole lines.
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+        for line in summary_lines(result.metrics, result.files, str(folder), width=width):
             click.echo(line)
     elif not quiet:
         click.echo(run_summary(result.metrics, result.files, str(folder)))
