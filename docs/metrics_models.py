@@ -501,7 +501,7 @@ class Drape(Entry):
 
     converged: bool
     fits: bool
-    """At rest, and no place that misfits the designed surface or is strained beyond the cloth's limit; against a body ease is no misfit."""
+    """At rest, and no place that misfits the designed surface where it is meant to touch, or is strained beyond the cloth's limit."""
     residual: float
     steps: int
     seconds: float

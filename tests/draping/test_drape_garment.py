@@ -60,6 +60,21 @@ def test_a_bodice_without_darts_gapes_at_the_armholes(worn: warpflat.Drape):
     assert worn.pressure[worn.gap > 2e-3].max() == 0.0
 
 
+def test_cloth_that_hangs_is_described_and_no_misfit(worn: warpflat.Drape):
+    place = worn.places[0]
+    assert (place.kind, worn.meant_to_touch[place.vertex]) == ("misfit", True)
+    # Cloth that takes up its ease is no misfit, wherever it lies.
+    assert not worn.meant_to_touch[worn.gap < worn.designed_gap].any()
+    # Under the height below which it hangs, the same place is told as such.
+    hanging = dataclasses.replace(worn, hangs_below=float(worn.cloth.designed[:, 1].max()) + 0.1)
+    kinds = {each.kind for each in hanging.places}
+    assert "hang" in kinds
+    assert "misfit" not in kinds
+    (same,) = [each for each in hanging.places if each.vertex == place.vertex]
+    assert "stands off" in same.words
+    assert "may take it up" not in same.words
+
+
 def test_a_misfit_names_the_cut_that_may_take_it_up(worn: warpflat.Drape):
     place = worn.places[0]
     at = worn.cloth.designed[place.vertex]

@@ -116,7 +116,9 @@ def summary_lines(
         if found := drape.get("correction"):
             first, *_, last = (1e3 * each["misfit_m"] for each in found["rounds"])
             rounds = format_count(len(found["rounds"]) - 1, "round")
-            lines.append(_clipped(f"corrected: misfit {first:.2f} to {last:.2f} mm in {rounds}; {found['reason']}", width))
+            lines.append(
+                _clipped(f"corrected: misfit {first:.2f} to {last:.2f} mm in {rounds}; {found['reason']}", width)
+            )
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
     return [*lines, _listed(f"files: {folder}: ", ordered, width)]
 

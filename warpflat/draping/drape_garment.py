@@ -73,9 +73,11 @@ def drape(
     for piece in _pieces(garment):
         paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
         cuts[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
+    mannequin = garment.mannequin if isinstance(garment, Garment) else None
+    hip = -np.inf if mannequin is None else float(mannequin.vertices[mannequin.layout.lines["hip"], 1].mean())
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
-        cuts=cuts,
+        hangs_below=hip, cuts=cuts,
     )  # fmt: skip
 
 

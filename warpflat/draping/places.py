@@ -25,7 +25,7 @@ class Place:
     """A connected place where the cloth does not lie as designed.
 
     Attributes:
-        kind: "misfit", "bridged" or "strain".
+        kind: "misfit", "strain", "bridged", or "hang" where the cloth is not meant to touch the body.
         line: the feature line or edge next to its worst vertex, "piece.line".
         worst: the largest distance from the designed surface [m], or strain.
         gap: the distance from the body there [m].
@@ -55,6 +55,7 @@ def find_places(
     areas: FloatArray,
     *,
     misfit: FloatArray,
+    meant_to_touch: BoolArray,
     bridged: FloatArray,
     lift: FloatArray,
     gap: FloatArray,
@@ -66,12 +67,18 @@ def find_places(
         cloth: the sewn cloth.
         areas: #V, flat areas [m2].
         misfit, bridged: #V, parts of the distance from the designed surface [m].
+        meant_to_touch: #V, true where the cloth was designed to lie on the body; elsewhere a misfit is how it hangs.
         lift: #V, how much farther than designed the cloth is from the body [m].
         gap: #V, the distance from the body [m].
         strains: #F along warp and weft.
     """
     found = []
-    for kind, values in (("misfit", misfit), ("bridged", bridged)):
+    parts = {
+        "misfit": np.where(meant_to_touch, misfit, 0.0),
+        "hang": np.where(meant_to_touch, 0.0, misfit),
+        "bridged": bridged,
+    }
+    for kind, values in parts.items():
         for part in _parts(cloth, values > _WORTH):
             if areas[part].sum() >= _LEAST_AREA:
                 worst = int(part[values[part].argmax()])
@@ -79,8 +86,10 @@ def find_places(
                 size = f"over {1e4 * area:.0f} cm2"
                 if kind == "bridged":
                     words = f"{_called(line)} bridges a hollow, {1e3 * distance:.1f} mm off, {size}"
-                elif lift[worst] > 0.5 * distance:
+                elif lift[worst] > 0.5 * distance and kind == "misfit":
                     words = f"{_called(line)} gapes by {1e3 * gap[worst]:.1f} mm {size}"
+                elif lift[worst] > 0.5 * distance:
+                    words = f"{_called(line)} stands off {1e3 * distance:.1f} mm farther than designed, {size}"
                 elif lift[worst] < -0.5 * distance:
                     words = f"{_called(line)} falls in by {1e3 * distance:.1f} mm {size}"
                 else:
@@ -123,7 +132,7 @@ def find_places(
                         vertex=worst,
                     )
                 )
-    order = {"misfit": 0, "strain": 1, "bridged": 2}
+    order = {"misfit": 0, "strain": 1, "hang": 2, "bridged": 3}
     found.sort(key=lambda place: (order[place.kind], -abs(place.worst) * place.area))
     return tuple(found[:_MOST])
 

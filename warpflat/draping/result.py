@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.short_repr import short_repr
 from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
@@ -27,6 +27,12 @@ __all__ = ["HOLLOW_REACH", "Drape", "hollow_depths"]
 
 # Distances up to this are not looked into [m].
 _NEGLIGIBLE = 1e-3
+#: Cloth that is designed within this distance of the body is meant to touch it [m]: 9 cm of ease around a trunk.
+TOUCHING = 0.015
+# A smaller place that stands off is told, and does not spoil the fit [m2].
+_MISFIT_AREA = 1e-3
+# Places above a vertex at which its plumb line is looked at [m], and how near to the body it touches [m].
+_PLUMB_LINE, _TOUCHES = np.arange(0.02, 0.31, 0.02), 0.005
 #: Cloth bridges a hollow that has the surface on all sides within this distance [m].
 HOLLOW_REACH = 0.12
 # A cut within this distance of a place may take it up [m].
@@ -48,6 +54,7 @@ class Drape:
         options: friction, tolerance and limits.
         sources: the files that its surface was read from; none of them is ever replaced.
         frames: #V by 3 each, where the cloth was on its way to rest [m].
+        hangs_below: the height under which cloth hangs freely [m]: that of a mannequin's hip.
         cuts: by piece those that were advised for it: what to cut, and where on the designed surface (#P by 3 [m]).
     """
 
@@ -60,6 +67,7 @@ class Drape:
     options: DrapeOptions
     sources: tuple[Path, ...] = ()
     frames: tuple[NDArray[np.float32], ...] = ()
+    hangs_below: float = -np.inf
     cuts: Mapping[str, Sequence[tuple[str, FloatArray]]] = field(default_factory=dict)
 
     @property
@@ -108,6 +116,18 @@ class Drape:
         bridged[at] = np.minimum(self._off[at], hollow_depths(designed, normals, at.astype(np.int32)))
         return bridged
 
+    @cached_property
+    def meant_to_touch(self) -> BoolArray:
+        """#V, true where the cloth is meant to lie on the body, and neither takes up its ease nor hangs from a fuller place above."""
+        meant = (self.designed_gap <= TOUCHING) & (self.gap >= self.designed_gap)
+        meant &= self.cloth.designed[:, 1] >= self.hangs_below
+        at = np.flatnonzero(meant)
+        # A plumb line from the fuller place comes down to where the cloth hangs.
+        lines = self.positions[at, None] + _PLUMB_LINE[:, None] * np.array([0.0, 1.0, 0.0])
+        nearest = self.body.gaps(lines.reshape(-1, 3)).reshape(len(at), len(_PLUMB_LINE)).min(axis=1)
+        meant[at[nearest <= _TOUCHES]] = False
+        return meant
+
     @property
     def misfit(self) -> FloatArray:
         """#V, the distance that no hollow explains [m]."""
@@ -145,7 +165,8 @@ class Drape:
     def places(self) -> tuple[Place, ...]:
         """The worst places, the worst first; a misfit near an advised cut names it."""
         found = find_places(
-            self.cloth, self.areas, misfit=self.misfit, bridged=self.bridged, lift=self.gap - self.designed_gap, gap=self.gap,
+            self.cloth, self.areas, misfit=self.misfit, meant_to_touch=self.meant_to_touch, bridged=self.bridged,
+            lift=self.gap - self.designed_gap, gap=self.gap,
             strains={name: self.strains[name] for name in ("warp", "weft")},
         )  # fmt: skip
         places = []
@@ -156,20 +177,21 @@ class Drape:
                 for words, path in self.cuts.get(place.line.partition(".")[0], ())
             ]
             distance, words = min(near, default=(np.inf, ""))
-            # A hollow that is bridged asks for no cut.
-            if place.kind != "bridged" and distance <= _NEAR_CUT:
+            # A hollow that is bridged asks for no cut, nor does cloth that hangs.
+            if place.kind not in ("bridged", "hang") and distance <= _NEAR_CUT:
                 place = replace(place, words=f"{place.words}; {words} may take it up")
             places.append(place)
         return tuple(places)
 
     @property
     def fits(self) -> bool:
-        """True if the cloth is at rest and no place is strained beyond its limit, or misfits the designed surface.
+        """True if the cloth is at rest and no place is strained beyond its limit, or misfits where it is meant to touch the body.
 
-        Against a body alone, ease is no misfit.
+        How it hangs elsewhere is told by places, and is no misfit. Against a body alone, ease is no misfit.
         """
         misfits = {"strain"} if self.designed is self.body else {"strain", "misfit"}
-        return self.converged and not any(place.kind in misfits for place in self.places)
+        counted = (place for place in self.places if place.kind != "misfit" or place.area >= _MISFIT_AREA)
+        return self.converged and not any(place.kind in misfits for place in counted)
 
     def measures(self) -> dict[str, Any]:
         """Return the entry `drape` of `metrics.json`."""
