@@ -132,7 +132,7 @@ import numpy as np
 from warpflat.core import compile as compiling
 from warpflat.kernels.reduce import subtract
 from warpflat.core.launch import launch_each
-compiling._COMMON_MODULES = ("reduce", "springs")
+compiling._COMMON_MODULES = ("reduce", "closest")
 way = np.ones((3, 2))
 launch_each(subtract, 3, [np.full((3, 2), 5.0), np.full((3, 2), 3.0)], [way])
 sys.exit(int(way[0, 0]))
@@ -141,4 +141,4 @@ sys.exit(int(way[0, 0]))
     assert done.returncode == 2, done.stderr
     # Both by the first kernel of one.
     compiled = {module.name.rpartition("_")[0] for module in tmp_path.glob("**/wp_warpflat*") if module.is_dir()}
-    assert compiled == {"wp_warpflat.kernels.reduce", "wp_warpflat.kernels.springs"}
+    assert compiled == {"wp_warpflat.kernels.reduce", "wp_warpflat.kernels.closest"}
