@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from warpflat.draping.write import save_drape
     from warpflat.export.pattern_json import read_pattern_json
     from warpflat.export.read_dxf import read_dxf
+    from warpflat.export.read_pattern import read_pattern
     from warpflat.export.read_svg import read_svg
     from warpflat.fabric.fabric import Fabric
     from warpflat.fabric.library import find_fabric, load_library
@@ -164,6 +165,7 @@ _HOME = {
     "read_dxf": "export.read_dxf",
     "read_layers": "seams.layers",
     "read_pieces": "surface.io.read_pieces",
+    "read_pattern": "export.read_pattern",
     "read_pattern_json": "export.pattern_json",
     "read_surface": "surface.io.read",
     "read_svg": "export.read_svg",
@@ -247,6 +249,7 @@ __all__ = [
     "pattern_of_garment",
     "read_dxf",
     "read_layers",
+    "read_pattern",
     "read_pattern_json",
     "read_pieces",
     "read_surface",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -69,3 +71,16 @@ def test_edges_are_listed(tube: Path, capsys: pytest.CaptureFixture[str]):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 8
     assert lines[0].startswith("front.e1: 500.0 mm, seam, from (")
+
+
+def test_json_of_a_form_is_all_that_is_printed(tmp_path: Path):
+    scene = tmp_path / "skirt.toml"
+    scene.write_text(
+        'form = "a_line_skirt"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[output]\nframes = 0\npicture = false\n',
+        encoding="utf-8",
+    )
+    # Warp is loaded before the mannequin is built beside, as it is by the modules of a drape.
+    words = f"import warp; from warpflat.cli.main import main; main(['run', {str(scene)!r}, '--json', '--out', 'out'])"
+    ended = subprocess.run([sys.executable, "-c", words], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert json.loads(ended.stdout)["schema"] == 1
+    assert ended.stderr == ""

@@ -18,7 +18,6 @@ from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.lift import read_lift, whole_lifts
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.options import DrapeOptions
-from warpflat.draping.whole_pieces import whole_pieces
 from warpflat.draping.wrap_pieces import wrap_pieces
 from warpflat.export.dxf import write_dxf
 from warpflat.export.read_dxf import read_dxf
@@ -27,6 +26,7 @@ from warpflat.export.svg import write_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Dart, Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.whole_pieces import whole_pieces
 from warpflat.scene.outside_pattern import OutsideJob
 
 

@@ -114,7 +114,9 @@ def test_sewing_lines_and_mirror_line_keep_their_names(dress, file):
     named = {t.dxf.text for t in block.query('TEXT[layer=="15"]')}
     sewn = {f"SEAM: {w}" for (p, _), rows in seam_words(dress.garment.seams).items() if p == piece.name for w in rows}
     assert sewn
-    assert named == {f"EDGE: {e.name}" for e in piece.edges} | {f"DART: {d.dart.name}" for d in piece.darts} | sewn
+    assert piece.internal_lines
+    inner = {f"LINE: {name}" for name in piece.internal_lines} | {f"DART: {d.dart.name}" for d in piece.darts}
+    assert named == {f"EDGE: {e.name}" for e in piece.edges} | inner | sewn
     (mirror,) = block.query('LINE[layer=="6"]')
     assert abs(mirror.dxf.start.x) < 1e-6
     assert abs(mirror.dxf.end.x) < 1e-6

@@ -76,18 +76,40 @@ _GARMENTCODE = {
             "front": {
                 "translation": [0, 100, 20],
                 "rotation": [0, 0, 0],
-                "vertices": [[0, 0], [40, 0], [40, 60], [0, 60]],
+                "vertices": [[0, 0], [40, 0], [40, 60], [24, 60], [20, 45], [16, 60], [0, 60]],
+                "edges": [
+                    {"endpoints": [0, 1], "curvature": {"type": "circle", "params": [50, 0, 1]}, "label": "hem"},
+                    {"endpoints": [1, 2], "curvature": {"type": "quadratic", "params": [[0.5, 0.1]]}},
+                    {"endpoints": [2, 3], "label": "lower_interface"},
+                    {"endpoints": [3, 4]},
+                    {"endpoints": [4, 5]},
+                    {"endpoints": [5, 6], "label": "lower_interface"},
+                    {"endpoints": [6, 0], "curvature": [0.5, 0.1]},
+                ],
+            },
+            "left_sleeve": {
+                "translation": [50, 110, -5],
+                "rotation": [0, 0, -50],
+                "label": "arm",
+                "vertices": [[0, 0], [0, 30], [20, 30], [20, 0]],
                 "edges": [
                     {"endpoints": [0, 1]},
-                    {"endpoints": [1, 2], "curvature": {"type": "quadratic", "params": [[0.5, 0.1]]}},
+                    {"endpoints": [1, 2], "curvature": {"type": "cubic", "params": [[0.3, 0.1], [0.7, -0.1]]}},
                     {"endpoints": [2, 3]},
                     {"endpoints": [3, 0]},
                 ],
-            }
+            },
         },
-        "stitches": [[{"panel": "front", "edge": 1}, {"panel": "front", "edge": 3}]],
+        "stitches": [
+            [{"panel": "front", "edge": 1}, {"panel": "front", "edge": 6}],
+            [{"panel": "front", "edge": 3}, {"panel": "front", "edge": 4}],
+            [{"panel": "left_sleeve", "edge": 0}, {"panel": "left_sleeve", "edge": 2}, "right_wrong"],
+        ],
+        "panel_order": ["front", "left_sleeve"],
     },
-    "properties": {"units_in_meter": 100, "normalize_panel_translation": False},
+    "parameters": {},
+    "parameter_order": [],
+    "properties": {"curvature_coords": "relative", "units_in_meter": 100, "normalize_panel_translation": False},
 }
 _RUL = b"ASTM/D13Proposal 1 Version: D 6673-04\nUNITS: METRIC\nGRADE RULE TABLE: a\nSIZE LIST: 36 38\nRULE: DELTA 1\n0.0,0.0 1.0,2.0\nEND\n"
 _SVG = b"""<?xml version="1.0"?>
@@ -208,7 +230,11 @@ def foreign_cases_of_file(kind: str, content: bytes, *, name: str = "odd", refus
         return [case(("drape", "p.dxf", "--seams", file, "--edges"), {"p.dxf": _dxf(), file: content}, file)]
     if kind == "rul":
         return [case(("drape", file), {file: content}, file)]
-    return [case(("drape", file, "--edges"), {file: content}, file)]
+    listed = case(("drape", file, "--edges"), {file: content}, file)
+    if kind == "garmentcode":
+        formats = ("--format", "svg", "--format", "dxf", "--format", "json")
+        return [listed, case(("export", file, *formats, "--quiet"), {file: content}, file)]
+    return [listed]
 
 
 def foreign_bounds() -> Iterator[Case]:

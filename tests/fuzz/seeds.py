@@ -134,7 +134,20 @@ def case_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool 
         used = case((*flatten, "--fabric-file", file, "--fabric", "own"), {**plain, file: content})
         return [listed, used]
     if kind == "pattern":
-        formats = ("--format", "dxf", "--format", "svg", "--format", "pdf", "--format", "json")
+        formats = (
+            "--format",
+            "dxf",
+            "--format",
+            "svg",
+            "--format",
+            "pdf",
+            "--format",
+            "json",
+            "--format",
+            "garmentcode",
+            "--format",
+            "plt",
+        )
         return [
             case(
                 ("export", "out", *formats, "--quiet"),

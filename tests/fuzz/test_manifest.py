@@ -218,5 +218,5 @@ def test_a_result_saved_by_hand_does_not_replace_the_metrics_of_another_program(
 def test_a_pattern_is_exported_beside_the_metrics_of_another_program(tmp_path: Path):
     run(tmp_path, formats=("json",))
     (tmp_path / "out" / "metrics.json").write_text('{"accuracy": 0.9}')
-    assert export_patterns(tmp_path / "out", ["svg"]) == ["cap.svg"]
+    assert export_patterns(tmp_path / "out", ["svg"])[0] == [tmp_path / "out" / "cap.svg"]
     assert (tmp_path / "out" / "metrics.json").read_text() == '{"accuracy": 0.9}'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -63,6 +65,19 @@ def test_lining_and_facing_together_are_as_large_as_the_shell():
     assert {"side left of the lining", "shoulder right of the lining", "lining to front neck facing"} <= names
     hem = pattern.piece("front_lining", "").edge("hem")
     assert hem.width == pytest.approx(pattern.piece("front", "").edge("hem").width - 0.02)
+
+
+def test_lines_of_a_lining_end_where_its_facing_begins():
+    pattern = bodice()
+    down = {"centre front": np.array([[0.0, 0.42], [0.0, 0.0]]), "yoke": np.array([[-0.08, 0.44], [0.0, 0.415]])}
+    pieces = [replace(p, internal_lines=down) if p.name == "front" else p for p in pattern.pieces[""]]
+    lining = add_lining(replace(pattern, pieces={"": pieces}), "silk").piece("front_lining", "")
+    body = shapely.Polygon(lining.outline).buffer(1e-6)
+    # The yoke lies in the facing alone.
+    assert set(lining.internal_lines) == {"centre front"}
+    line = shapely.LineString(lining.internal_lines["centre front"])
+    assert body.contains(line)
+    assert line.length == pytest.approx(0.42 - 0.05, abs=1e-3)
 
 
 def test_lining_of_facings_that_meet_is_refused():

@@ -19,7 +19,7 @@ from warpflat.pattern.words import language_words, printed_in, translate, transl
 def test_longest_run_of_a_name_is_replaced():
     assert translate_name("front_neck_facing") == "front_neck_facing"
     with printed_in(language_words("de")):
-        assert translate_name("front_neck_facing") == "Vorderteil Halsbeleg"
+        assert translate_name("front_armhole_facing") == "Vorderteil Armlochbeleg"
         assert translate_name("side left") == "Seite links"
         assert translate_name("unheard of") == "unheard of"
     assert translate("Cut {count}", count=2) == "Cut 2"

@@ -81,7 +81,7 @@ def test_the_pattern_has_the_ease(skirt):
 
 def test_the_console_is_a_line_each_and_none_is_wide(skirt):
     result, _ = skirt
-    lines = summary_lines(result.metrics, result.files, "out")
+    lines = summary_lines(result.metrics, result.files, "out", width=100)
     heads = [line.split(":")[0] for line in lines if not line.startswith(" ")]
     assert heads == ["pieces", "relaxed", "girths [cm] (ease)", "wearer", "lies on the form", "seams", "rings", "files"]
     assert max(map(len, lines)) <= 100

@@ -1,4 +1,4 @@
-"""`warpflat export`: pattern files are written again from a run's pattern.json."""
+"""`warpflat export`: pattern files are written from a run's pattern.json, or from the JSON of GarmentCode."""
 
 from __future__ import annotations
 
@@ -12,9 +12,14 @@ __all__ = ["export"]
 
 
 @click.command(cls=ComputingCommand)
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("source", metavar="DIR|PATTERN", type=click.Path(path_type=Path))
 @click.option(
-    "--format", "formats", type=click.Choice(["dxf", "svg", "pdf", "json"]), multiple=True, required=True, help="Which."
+    "--format",
+    "formats",
+    type=click.Choice(["dxf", "svg", "pdf", "json", "garmentcode", "plt"]),
+    multiple=True,
+    required=True,
+    help="Which.",
 )
 @click.option("--dialect", type=click.Choice(["aama", "astm"]), default="aama", show_default=True, help="Of the DXF.")
 @click.option(
@@ -25,22 +30,53 @@ __all__ = ["export"]
     help="Of the PDF.",
 )
 @click.option("--size", "sizes", multiple=True, metavar="SIZE", help="Only this size of a graded pattern; not of json.")
+@click.option(
+    "--allowance",
+    type=click.FloatRange(0, 100),
+    metavar="MM",
+    help="Around the panels of GarmentCode, which has none.  [default: 10]",
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the files.  [default: the run's, or out/NAME of a file of GarmentCode]",
+)
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 def export(
-    folder: Path, formats: tuple[str, ...], dialect: str, paper: str, sizes: tuple[str, ...], quiet: bool
+    source: Path,
+    formats: tuple[str, ...],
+    dialect: str,
+    paper: str,
+    sizes: tuple[str, ...],
+    allowance: float | None,
+    out: Path | None,
+    quiet: bool,
 ) -> int:
     """Write a run's pattern files again, from its pattern.json: another dialect, another paper, one size.
+
+    A file of GarmentCode is drafted: its panels get an allowance, notches and labels.
 
     \b
     Examples:
       warpflat export out/dress --format dxf --dialect astm
       warpflat export out/dress --format pdf --paper Letter --size "EU 38"
+      warpflat export out/dress --format garmentcode
+      warpflat export shirt_specification.json --format dxf --format pdf
     """
     from warpflat.garment.pattern_files import export_patterns
 
-    if folder.name == "pattern.json" and folder.is_file():
-        folder = folder.parent
-    files = export_patterns(folder, formats, dialect=dialect, paper=paper, sizes=sizes or None)
+    files, notes = export_patterns(
+        source,
+        formats,
+        out=out,
+        allowance=None if allowance is None else 1e-3 * allowance,
+        dialect=dialect,
+        paper=paper,
+        sizes=sizes or None,
+    )
     if not quiet:
-        click.echo(f"{folder}: {', '.join(files)}")
+        for note in notes:
+            click.echo(f"warpflat: {note}", err=True)
+        click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
     return DONE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -45,6 +47,9 @@ def run_and_report(
     folder = out if out is not None else Path("out") / scene.name
     with ExitStack() as stack:
         bar = stack.enter_context(ProgressBar(scene.name, hidden=quiet or as_json))
+        if "warp" in sys.modules:
+            # A process beside this one asks Warp for its devices, which starts it.
+            start_warp_silently()
         stack.enter_context(work_beside())
         built = None
         if scene.settings.mannequin is not None and scene.settings.auto_cut is None and scene.settings.shape != "auto":
@@ -92,7 +97,9 @@ def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool,
     if as_json:
         click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet and not verbose:
-        for line in summary_lines(result.metrics, result.files, str(folder)):
+        # A pipe takes whole lines.
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+        for line in summary_lines(result.metrics, result.files, str(folder), width=width):
             click.echo(line)
     elif not quiet:
         click.echo(run_summary(result.metrics, result.files, str(folder)))

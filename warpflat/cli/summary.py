@@ -11,10 +11,10 @@ from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_wo
 from warpflat.flattening.progress import relaxation_words
 from warpflat.garment.rings import rings_line
 
-__all__ = ["WIDTH", "notes_line", "summary_lines"]
+__all__ = ["notes_line", "summary_lines"]
 
-#: Letters in a line, at most.
-WIDTH = 100
+# Letters in the line of notes, at most.
+_NOTES_WIDTH = 100
 # What a reader opens first.
 _OPENED_FIRST = ("review.html", "pattern.pdf", "picture.png", "metrics.json")
 # Girths that every pattern is judged by, whether or not their ease was given.
@@ -23,13 +23,16 @@ _MAIN_GIRTHS = ("bust", "waist", "hip")
 _COMPLETED = re.compile(r"\w+ = [\d.]+ c?m (?!instead of )")
 
 
-def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> list[str]:
-    """Return the lines at the end of a run, none longer than `WIDTH` unless the folder's name is.
+def summary_lines(
+    metrics: Mapping[str, Any], files: Sequence[str], folder: str, *, width: int | None = None
+) -> list[str]:
+    """Return the lines at the end of a run.
 
     Args:
         metrics: as `metrics.json`.
         files: their names.
         folder: where they lie.
+        width: letters in a line at most, unless the folder's name is longer; None never cuts a line.
     """
     pieces = metrics["pieces"]
     unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
@@ -42,7 +45,7 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         f"area within {100 * max(piece['area_error'] for piece in pieces.values()):.3g} %",
         f"energy {energy_words(sum(piece['strain_energy_j'] for piece in pieces.values()))}",
     ]
-    lines = [_clipped(f"pieces: {len(pieces)}; {', '.join(parts)}")]
+    lines = [_clipped(f"pieces: {len(pieces)}; {', '.join(parts)}", width)]
     if relaxed := relaxation_words(piece["stages"] for piece in pieces.values()):
         lines.append(f"relaxed: {relaxed}")
     if girths := metrics.get("girths"):
@@ -55,15 +58,15 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         first = [level for level in girths if level in _MAIN_GIRTHS]
         then = [level for level in girths if level not in first and "ease_wanted_m" in girths[level]]
         rest = [level for level in girths if level not in (*first, *then)]
-        lines.append(_listed("girths [cm] (ease): ", [by_level[level] for level in (*first, *then, *rest)]))
+        lines.append(_listed("girths [cm] (ease): ", [by_level[level] for level in (*first, *then, *rest)], width))
     wearer = metrics.get("wear", {}).get("wearer")
     if wearer:
-        lines.append(_clipped(wearer_words(wearer, draped="drape" in metrics)))
+        lines.append(_clipped(wearer_words(wearer, draped="drape" in metrics), width))
     if "drape" in metrics:
         head = "lies on the form" if wearer else "lies on the surface"
     else:
         head = "lies on the form" if wearer else "fit"
-    lines += _fit_lines(pieces, head)
+    lines += _fit_lines(pieces, head, width)
     seams, constraints = metrics.get("seams", ()), metrics.get("constraints", ())
     if seams or constraints:
         parts = []
@@ -78,7 +81,7 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         if constraints:
             amiss = _within(max(held["amiss_mm"] for held in constraints))
             parts.append(f"{format_count(len(constraints), 'constraint')} within {amiss}")
-        lines.append(_clipped(f"seams: {'; '.join(parts)}"))
+        lines.append(_clipped(f"seams: {'; '.join(parts)}", width))
     if found := metrics.get("garment", {}).get("found_seams"):
         # Left and right together, the one that releases most first.
         groups: dict[str, list[Mapping[str, Any]]] = {}
@@ -90,16 +93,16 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
             tried = any(seam["released_j"] is not None for seam in groups[name])
             price = f" {energy_words(prices[name], 2)}" if tried else f" ({groups[name][0]['needed'] or 'not tried'})"
             words.append(f"{name}{price}, {100 * sum(seam['length_m'] for seam in groups[name]):.0f} cm")
-        lines.append(_listed("seams release: ", words))
+        lines.append(_listed("seams release: ", words, width))
     if metrics.get("rings"):
-        lines.append(_clipped(rings_line(metrics["rings"])))
+        lines.append(_clipped(rings_line(metrics["rings"]), width))
     if len(metrics.get("cloths", ())) > 1:
         # What is cut from each of several cloths.
         parts = [
             f"{cloth['name']}: " + ", ".join(f"{piece['title']} {piece['quantity']}" for piece in cloth["pieces"])
             for cloth in metrics["cloths"]
         ]
-        lines.append(_clipped(f"cut from {'; '.join(parts)}"))
+        lines.append(_clipped(f"cut from {'; '.join(parts)}", width))
     if "drape" in metrics:
         drape = metrics["drape"]
         mean, misfit = 1e3 * drape["distance_m"]["mean"], drape["misfit_m"]
@@ -109,9 +112,15 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
             f"at most {1e3 * misfit['max']:.1f} mm",
         ]
         places = [place["words"] for place in drape["places"][:1]]
-        lines.append(_clipped(f"drape: {'; '.join([', '.join(parts), *places])}"))
+        lines.append(_clipped(f"drape: {'; '.join([', '.join(parts), *places])}", width))
+        if found := drape.get("correction"):
+            first, *_, last = (1e3 * each["misfit_m"] for each in found["rounds"])
+            rounds = format_count(len(found["rounds"]) - 1, "round")
+            lines.append(
+                _clipped(f"corrected: misfit {first:.2f} to {last:.2f} mm in {rounds}; {found['reason']}", width)
+            )
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
-    return [*lines, _listed(f"files: {folder}: ", ordered)]
+    return [*lines, _listed(f"files: {folder}: ", ordered, width)]
 
 
 def notes_line(notes: Sequence[str]) -> str:
@@ -125,13 +134,13 @@ def notes_line(notes: Sequence[str]) -> str:
     for count in range(len(parts), 0, -1):
         more = [f"{len(parts) - count} more"] if count < len(parts) else []
         line = "; ".join([*parts[:count], *more, *(["-v lists them"] if more or guessed else [])])
-        if len(line) <= WIDTH - len("warpflat: note: "):
+        if len(line) <= _NOTES_WIDTH - len("warpflat: note: "):
             return f"note: {line}"
     rest = f"; {len(parts) - 1} more" if len(parts) > 1 else ""
     return f"note: {parts[0]}{rest}" + ("; -v lists them" if rest else "") if parts else ""
 
 
-def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str) -> list[str]:
+def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str, width: int | None) -> list[str]:
     """Return whether all pieces fit, with their ranges or the worst place, and the best advice where one does not."""
     worn = {name: piece for name, piece in pieces.items() if piece.get("wear")}
     if not worn:
@@ -147,7 +156,7 @@ def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str) -> list[str]:
             ranges.append(f"{thread} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} %")
         highest = max(wear["pressure"]["max"] for wear in wears)
         ranges += [f"at most {highest:,.0f} Pa"] if highest >= 1.0 else []
-        return [_clipped(f"{head}: yes; {beyond}; {', '.join(ranges)}")]
+        return [_clipped(f"{head}: yes; {beyond}; {', '.join(ranges)}", width)]
     worst = max(
         (name for name in worn if not worn[name]["wear"]["fits"]),
         key=lambda name: worn[name]["wear"]["outside"] * worn[name]["area_m2"],
@@ -162,7 +171,7 @@ def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str) -> list[str]:
     advice = no_cut_words(before, sewn=sewn) if best is None else remedy_words(best, before, sewn=sewn)
     place = next(iter(wear["where_not"]), "").partition(" (limit")[0]
     unfit = [name for name in worn if not worn[name]["wear"]["fits"]]
-    return [_clipped(f"{head}: no: {_some(unfit)}; {beyond}; {worst} {place}"), _clipped(f"  {advice}")]
+    return [_clipped(f"{head}: no: {_some(unfit)}; {beyond}; {worst} {place}", width), _clipped(f"  {advice}", width)]
 
 
 def _within(millimetres: float) -> str:
@@ -175,15 +184,16 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + more
 
 
-def _listed(head: str, parts: Sequence[str]) -> str:
+def _listed(head: str, parts: Sequence[str], width: int | None) -> str:
     """Return as many parts as fit into a line, at least one, and how many more there are."""
     for count in range(len(parts), 1, -1):
         more = "" if count == len(parts) else f", {len(parts) - count} more"
-        if len(line := f"{head}{', '.join(parts[:count])}{more}") <= WIDTH:
+        line = f"{head}{', '.join(parts[:count])}{more}"
+        if width is None or len(line) <= width:
             return line
     return f"{head}{parts[0]}" + (f", {len(parts) - 1} more" if len(parts) > 1 else "")
 
 
-def _clipped(line: str) -> str:
+def _clipped(line: str, width: int | None) -> str:
     """Return a line, a long one cut after a word that leaves room for dots."""
-    return line if len(line) <= WIDTH else line[: WIDTH - 3].rpartition(" ")[0].rstrip(",;(") + " ..."
+    return line if width is None or len(line) <= width else line[: width - 3].rpartition(" ")[0].rstrip(",;(") + " ..."

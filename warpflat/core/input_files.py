@@ -67,6 +67,7 @@ FORMATS: Mapping[str, FileFormat] = {
     "JSON": FileFormat("JSON", 200 * _MEGABYTE, "run the scene again"),
     "DXF": FileFormat("a DXF pattern", 50 * _MEGABYTE, "export it again as DXF R12, outlines as closed polylines"),
     "SVG": FileFormat("an SVG pattern", 20 * _MEGABYTE, "export it again as plain SVG, outlines as closed paths"),
+    "pattern": FileFormat("a pattern", 50 * _MEGABYTE, "export it again from the program that made it"),
     "mesh": FileFormat("a mesh", 500 * _MEGABYTE, "export it again with vertices and faces alone"),
     "edges": FileFormat(
         "a list of edges", 50 * _MEGABYTE, "give the numbers of a row of vertices in each line, or JSON lists"

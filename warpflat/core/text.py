@@ -52,7 +52,7 @@ def without_side(name: str) -> str:
 def other_side(name: str) -> str:
     """Return a name with left and right exchanged."""
     swapped = {"left": "right", "right": "left"}
-    return " ".join(swapped.get(word, word) for word in name.split(" "))
+    return "".join(swapped.get(word, word) for word in re.split("([ _])", name))
 
 
 def control_in(text: str, allowed: str = "") -> str:

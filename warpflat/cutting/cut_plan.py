@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths
+from warpflat.core.short_repr import short_repr
 from warpflat.flattening.applied_cut import AppliedCut
 from warpflat.surface.cut.cut_mesh import Crack, Cut, cut_along_many
 from warpflat.surface.cut.pieces import apply_cut
@@ -36,6 +37,8 @@ class CutPlan:
         paths: rows of vertices of the uncut surface along its edges; several are made at once.
         tip_back: how far the tips of its darts are drawn back [m].
     """
+
+    __repr__ = short_repr
 
     name: str
     paths: tuple[IntArray, ...]

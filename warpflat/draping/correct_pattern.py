@@ -21,6 +21,7 @@ from scipy.sparse import coo_array, csc_array, diags_array
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
 from warpflat.core.sparse import factor_symmetric
 from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
@@ -67,6 +68,8 @@ class Correction:
         rounds: the misfit before the first round, and after each.
         reason: why it ended.
     """
+
+    __repr__ = short_repr
 
     before: Drape
     after: Drape

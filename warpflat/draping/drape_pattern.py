@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
 from warpflat.draping.lift import Lift, whole_lifts
@@ -19,11 +20,11 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.draping.whole_pieces import whole_pieces
 from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.pieces import Pattern
+from warpflat.pattern.whole_pieces import whole_pieces
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["Placement", "drape_pattern"]
@@ -37,7 +38,6 @@ class Placement:
     """Where the pieces of a pattern go, and how they are meshed.
 
     Attributes:
-        at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
         top: a level of the body or a height [m] for the highest point of what does not hang from the shoulders.
         lifts: by piece the map to its designed surface, where there is one; it must be there for all of them or for none.
         size: of the pattern; its sample size if not given.
@@ -45,7 +45,8 @@ class Placement:
         hold: edges that stay where they are, as "piece.edge", or "edge" for every piece that has one.
     """
 
-    at: Mapping[str, str] = field(default_factory=dict)
+    __repr__ = short_repr
+
     top: str | float | None = None
     lifts: Mapping[str, Lift] = field(default_factory=dict)
     size: str | None = None
@@ -112,7 +113,18 @@ def drape_pattern(
     elif body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
     else:
-        placed = wrap_pieces(meshes, welds, body, at=placement.at, top=placement.top)
+        at = {name: piece.at for name, piece in pieces.items() if piece.at}
+        hung = {
+            name: np.column_stack([mesh.points, np.ones(len(mesh.points))]) @ place.T
+            for name, mesh in meshes.items()
+            if (place := pieces[name].placement) is not None
+        }
+        heights: dict[str, list[float]] = {}
+        for name, points in hung.items():
+            for edge, level in pieces[name].levels.items():
+                heights.setdefault(level, []).extend(points[meshes[name].edges[edge], 1].tolist())
+        levels = {level: float(np.mean(row)) for level, row in heights.items()}
+        placed = wrap_pieces(meshes, welds, body, at=at, hung=hung, levels=levels, top=placement.top)
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()

@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
-from warpflat.draping.whole_pieces import MIRRORED
 from warpflat.pattern.pieces import Piece
+from warpflat.pattern.whole_pieces import MIRRORED
 
 __all__ = ["Lift", "read_lift", "whole_lifts"]
 
@@ -68,7 +68,7 @@ def read_lift(path: Path) -> Lift:
 
 
 def whole_lifts(pieces: Iterable[Piece], lifts: Mapping[str, Lift]) -> dict[str, Lift]:
-    """Return the lifts of whole pieces, as of :func:`warpflat.draping.whole_pieces.whole_pieces`: bodies are mirrored at x = 0."""
+    """Return the lifts of whole pieces, as of :func:`warpflat.pattern.whole_pieces.whole_pieces`: bodies are mirrored at x = 0."""
     found: dict[str, Lift] = {}
     for piece in pieces:
         if piece.name in lifts:

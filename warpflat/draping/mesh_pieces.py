@@ -12,9 +12,9 @@ from scipy.spatial import Delaunay, cKDTree
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import points_at_lengths
-from warpflat.draping.whole_pieces import hole_edges
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam
+from warpflat.pattern.whole_pieces import hole_edges
 
 __all__ = ["FlatMesh", "mesh_pieces"]
 

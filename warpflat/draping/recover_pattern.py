@@ -22,6 +22,7 @@ from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_arr
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
 from warpflat.core.sparse import factor_symmetric
 from warpflat.draping.drape_energy import DrapeEnergy
 from warpflat.draping.drape_garment import held_vertices
@@ -50,6 +51,8 @@ class Recovery:
         strains: mean strain of the pattern in each step.
         converged: whether the last step was small.
     """
+
+    __repr__ = short_repr
 
     cloth: SewnCloth
     off: FloatArray

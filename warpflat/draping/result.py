@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.short_repr import short_repr
 from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
@@ -49,6 +50,8 @@ class Drape:
         frames: #V by 3 each, where the cloth was on its way to rest [m].
         cuts: by piece those that were advised for it: what to cut, and where on the designed surface (#P by 3 [m]).
     """
+
+    __repr__ = short_repr
 
     cloth: SewnCloth
     worn: DrapedCloth

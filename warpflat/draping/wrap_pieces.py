@@ -2,9 +2,10 @@
 
 The pieces around the trunk are laid beside and upon each other in the plane, each by the longest seam (longest upwards) that
 joins it to one that lies. The plane is rolled up around the trunk, so that its first and last edge meet; a tier that goes around
-the body by itself, such as a gathered skirt, by its own width. A sleeve is rolled up around its arm. Then the seams are closed,
-and the cloth is drawn together as rigidly as it can be, outside the body, by projective dynamics (Bouaziz et al. 2014): each
-triangle is laid as near to its place as it goes without strain, and one sparse factor joins them.
+the body by itself, such as a gathered skirt, by its own width. The pieces on an arm are rolled up around it. Where a file says how
+its pieces hang around the trunk, they start there instead. Then the seams are closed, and the cloth is drawn together as rigidly as
+it can be, outside the body, by projective dynamics (Bouaziz et al. 2014): each triangle is laid as near to its place as it goes
+without strain, and one sparse factor joins them.
 """
 
 from __future__ import annotations
@@ -36,6 +37,10 @@ _WIDTH_OVER_DEPTH = 1.4
 _FAR = 0.25
 # Pieces that hang from the shoulders start this much higher [m].
 _ABOVE = 0.01
+# A piece that hangs beside the body starts this far from it at least [m].
+_BESIDE = 0.02
+# The highest of a sleeve, whose middle is laid above the arm, is what reaches up to this share of its height.
+_CAP = 0.95
 # Rounds at most, and the mean displacement in one of them after which it is still enough for a start [m].
 _ROUNDS, _STILL = 300, 1e-4
 # The cloth is kept this far off the body [m], with this stiffness over the cloth's, and drawn by this share to where it was.
@@ -65,6 +70,8 @@ def wrap_pieces(
     body: Mannequin,
     *,
     at: Mapping[str, str] | None = None,
+    hung: Mapping[str, FloatArray] | None = None,
+    levels: Mapping[str, float] | None = None,
     top: str | float | None = None,
 ) -> dict[str, FloatArray]:
     """Place the points of each piece (#P by 3 [m]) around a body.
@@ -74,12 +81,14 @@ def wrap_pieces(
         welds: for each seam the vertices that it joins.
         body: with its levels.
         at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
+        hung: by piece the points (#P by 3 [m]) where it hangs beside a body.
+        levels: by level of the body the height [m] at which what hangs there begins in `hung`.
         top: the highest point of what does not hang from the shoulders: a level of the body or a height [m]; its waist if not given.
 
     Raises:
         InputError: a piece hangs together with no other, the pieces go around half the waist only, or a level is unknown.
     """
-    at = dict(at or {})
+    at, hung, hanging_from = dict(at or {}), hung or {}, levels or {}
     for name in meshes:
         words = name.lower().replace("_", " ").split()
         if name not in at and any(word.startswith("sleeve") for word in words):
@@ -88,18 +97,7 @@ def wrap_pieces(
     if not trunk:
         raise InputError("there are sleeves alone; a garment needs a piece around the trunk")
     fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
-    # What each seam joins of the pieces around the trunk, a piece to itself too.
-    joins: list[_Join] = []
-    for seam in welds:
-        pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
-        for (piece, vertex), *others in seam:
-            for other, its in others:
-                if piece in trunk and other in trunk:
-                    pairs.setdefault((piece, other), []).append((vertex, its))
-        for names, rows in pairs.items():
-            if len(rows) > 1:
-                first, second = np.array(rows, dtype=np.int32).T
-                joins.append(_Join(names, (first, second)))
+    joins = _joins(welds, trunk)
     plane = _lay_out(meshes, joins, trunk, fronts or trunk[:1])
     hangs_from_shoulder, width, _ = _girth(plane, joins)
     points = np.concatenate(list(plane.values()))
@@ -107,19 +105,34 @@ def wrap_pieces(
     if hangs_from_shoulder and top is None:
         level = float(max(body.line(f"shoulder {side}")[:, 1].max() for side in ("left", "right"))) + _ABOVE
     else:
-        levels, at_level = body.levels(), "waist" if top is None else top
-        if isinstance(at_level, str) and at_level not in levels:
-            raise InputError(f"top: level {at_level!r} is unknown: {nearest(at_level, levels)}")
-        level = levels[at_level].height if isinstance(at_level, str) else float(at_level)
+        of_body, at_level = body.levels(), "waist" if top is None else top
+        if isinstance(at_level, str) and at_level not in of_body:
+            raise InputError(f"top: level {at_level!r} is unknown: {nearest(at_level, of_body)}")
+        level = of_body[at_level].height if isinstance(at_level, str) else float(at_level)
     waist = body.line("waist")
     girth = float(np.linalg.norm(np.diff(waist, axis=0, append=waist[:1]), axis=1).sum())
     if width < _LEAST_GIRTH * girth:
         raise InputError(
             f"the pattern goes {1e3 * width:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {UNITS} Is a piece missing?"
         )
+    arms = {name: side.removesuffix(" arm") for name, side in at.items() if side.endswith(" arm")}
+    placed = {name: row for side in ("left", "right") for name, row in _on_arm(meshes, welds, arms, side, body).items()}
+    if hung.keys() >= set(trunk):
+        shift = dict.fromkeys(trunk, 0.0)
+        if hangs_from_shoulder or top is not None:
+            shift = dict.fromkeys(trunk, level - max(float(hung[name][:, 1].max()) for name in trunk))
+        for name, begins in hanging_from.items():
+            to = body.levels()[name].height - begins
+            # With what hangs from the shoulders alone above it, a line at the waist draws what is below to its level.
+            shift = {
+                each: to if hung[each][:, 1].mean() < begins or not (hangs_from_shoulder or top) else by
+                for each, by in shift.items()
+            }
+        for name in trunk:
+            placed[name] = _beside(hung[name] + [0.0, shift[name], 0.0], meshes[name].triangles, body)
+        return placed
     origin = np.array([0.0, level - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
     frame = _Frame(origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-    placed: dict[str, FloatArray] = {}
     # The pieces in tiers above each other: those of one are joined by upright seams.
     tiers = {name: {name} for name in plane}
     for join in joins:
@@ -136,23 +149,6 @@ def wrap_pieces(
             placed |= {name: frame.roll(flat, of_tier, _WIDTH_OVER_DEPTH) for name, flat in centred.items()}
         else:
             placed |= {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in laid.items()}
-    for name, side in at.items():
-        if side.endswith(" arm"):
-            # Roll a sleeve up around an arm: its middle above, its highest point at the armhole's.
-            flat = meshes[name].points
-            side = side.removesuffix(" arm")
-            hole, wrist = body.line(f"armhole {side}"), body.line(f"wrist {side}").mean(axis=0)
-            shoulder = hole[hole[:, 1].argmax()]
-            up = hole.mean(axis=0) - wrist
-            up /= np.linalg.norm(up)
-            front = shoulder - hole.mean(axis=0)
-            front -= (front @ up) * up
-            front /= np.linalg.norm(front)
-            middle = 0.5 * (flat[:, 0].min() + flat[:, 0].max())
-            # The highest point of the cap lies beside the shoulder.
-            beyond = float((shoulder - hole.mean(axis=0)) @ up)
-            frame = _Frame(hole.mean(axis=0) + beyond * up, up, front)
-            placed[name] = frame.roll(flat - [middle, flat[:, 1].max()], float(np.ptp(flat[:, 0])), 1.0)
     return placed
 
 
@@ -166,6 +162,70 @@ class _Join:
     def points(self, points: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the points on both sides (#J by 2)."""
         return points[self.pieces[0]][self.vertices[0]], points[self.pieces[1]][self.vertices[1]]
+
+
+def _joins(welds: Sequence[Sequence[Weld]], names: Sequence[str]) -> list[_Join]:
+    """Return what each seam joins of the named pieces, a piece to itself too."""
+    joins = []
+    for seam in welds:
+        pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
+        for (piece, vertex), *others in seam:
+            for other, its in others:
+                if piece in names and other in names:
+                    pairs.setdefault((piece, other), []).append((vertex, its))
+        for both, rows in pairs.items():
+            if len(rows) > 1:
+                first, second = np.array(rows, dtype=np.int32).T
+                joins.append(_Join(both, (first, second)))
+    return joins
+
+
+def _on_arm(
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    arms: Mapping[str, str],
+    side: str,
+    body: Mannequin,
+) -> dict[str, FloatArray]:
+    """Roll the pieces on an arm up around it, laid beside each other: their highest point above it, at the armhole's."""
+    names = [name for name, its in arms.items() if its == side]
+    if not names:
+        return {}
+    plane = _lay_out(meshes, _joins(welds, names), names, names[:1])
+    points = np.concatenate(list(plane.values()))
+    hole, wrist = body.line(f"armhole {side}"), body.line(f"wrist {side}").mean(axis=0)
+    shoulder = hole[hole[:, 1].argmax()]
+    up = hole.mean(axis=0) - wrist
+    up /= np.linalg.norm(up)
+    front = shoulder - hole.mean(axis=0)
+    front -= (front @ up) * up
+    front /= np.linalg.norm(front)
+    width, high = float(np.ptp(points[:, 0])), float(points[:, 1].max())
+    middle = 0.5 * float(points[:, 0].min() + points[:, 0].max())
+    if len(names) > 1:
+        # Around the arm: the highest points may lie at both ends of what is laid out.
+        cap = points[points[:, 1] >= high - (1.0 - _CAP) * np.ptp(points[:, 1])]
+        middle = float(np.angle(np.exp(2j * np.pi * cap[:, 0] / width).mean())) * width / (2.0 * np.pi)
+    # The highest point of the cap lies beside the shoulder.
+    beyond = float((shoulder - hole.mean(axis=0)) @ up)
+    frame = _Frame(hole.mean(axis=0) + beyond * up, up, front)
+    return {name: frame.roll(flat - [middle, high], width, 1.0) for name, flat in plane.items()}
+
+
+def _beside(points: FloatArray, triangles: IntArray, body: Mannequin) -> FloatArray:
+    """Return a flat piece (#P by 3 [m]) moved out along its normal until no part of the body behind it reaches as far."""
+    corner = points[triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).sum(axis=0)
+    normal /= np.linalg.norm(normal)
+    skin = body.surface().vertices
+    across = np.eye(3) - np.outer(normal, normal)
+    low, high = (points @ across).min(axis=0), (points @ across).max(axis=0)
+    flat = skin @ across
+    behind = skin[((flat >= low - 1e-9) & (flat <= high + 1e-9)).all(axis=1)]
+    if not len(behind):
+        return points
+    lacking = float((behind @ normal).max()) + _BESIDE - float((points @ normal).max())
+    return points + max(lacking, 0.0) * normal
 
 
 def _lay_out(
@@ -191,7 +251,7 @@ def _lay_out(
         else:
             lost = next(name for name in trunk if name not in shift)
             raise InputError(
-                f"piece {lost!r} is sewn to no other around the trunk; join it by a seam, or say in [[pieces]] where it is"
+                f"piece {lost!r} is sewn to no other on the same part of the body; join it by a seam, or say in [[pieces]] where it is"
             )
     plane = {name: points + shift[name] for name, points in flat.items()}
     return _centred(plane, _girth(plane, joins)[1], fronts)

@@ -108,8 +108,9 @@ def write_dxf(
                 for row, text in enumerate(texts):
                     _text(block, text, middle - [0.0, 0.003 * ROW * row], scale, "15", 0.003)
             _line(block, piece.grain, scale, "7")
-            for line in piece.internal_lines.values():
+            for line_name, line in piece.internal_lines.items():
                 _polyline(block, line, scale, "8")
+                _text(block, f"LINE: {line_name}", line[len(line) // 2], scale, "15", 0.003)
             for dart in piece.darts:
                 if dart.fold is not None:
                     _polyline(block, dart.fold, scale, "8")

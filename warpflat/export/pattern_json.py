@@ -38,7 +38,7 @@ from warpflat.pattern.drafted import (
 )
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 
 __all__ = [
     "SCHEMA",
@@ -48,6 +48,7 @@ __all__ = [
     "SideEntry",
     "pattern_from_json",
     "pattern_json",
+    "read_pattern_data",
     "read_pattern_json",
     "write_pattern_json",
 ]
@@ -194,6 +195,9 @@ class PieceEntry(Entry):
     paired: bool
     title: Text = ""
     printed_units: Literal["mm", "cm", "in"] = "cm"
+    at: Literal["", "front", "back", "left arm", "right arm"] = ""
+    placement: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = None
+    levels: dict[Name, Text] = Field(default_factory=dict)
     frame: Annotated[list[Row], Field(min_length=2, max_length=2)]
     edges: Annotated[list[EdgeEntry], Field(min_length=1)]
     cut_line: Ring
@@ -219,6 +223,16 @@ class SideEntry(Entry):
     mirrored: bool = False
 
 
+class OpeningEntry(Entry):
+    """An opening of a seam (see `warpflat.pattern.pieces.SeamOpening`)."""
+
+    kind: Literal["zip", "buttons", "slit", "vent"]
+    length: float
+    begin: float
+    whole: bool
+    style: Text
+
+
 class StitchEntry(Entry):
     """A seam, or a dart that is sewn shut."""
 
@@ -226,6 +240,7 @@ class StitchEntry(Entry):
     kind: Literal["seam", "dart"]
     ease: float
     eased: Shares = Field(default=[0.0, 1.0])
+    openings: list[OpeningEntry] = Field(default_factory=list)
     sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
 
 
@@ -272,6 +287,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
             "ease": seam.ease,
             "eased": list(seam.eased),
             "sides": [[_side(part) for part in side] for side in seam.sides],
+            "openings": [asdict(opening) for opening in seam.openings],
         }
         for seam in garment.garment.seams
     ]
@@ -340,7 +356,10 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
         "title": piece.piece.title,
         "printed_units": piece.piece.units,
         "on_fold": piece.piece.on_fold,
+        "at": piece.piece.at,
+        "placement": None if piece.piece.placement is None else piece.piece.placement.tolist(),
         "frame": piece.frame.tolist(),
+        "levels": dict(piece.piece.levels),
         "edges": [
             {
                 "name": edge.name,
@@ -413,12 +432,20 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
     Raises:
         InputError: the file is missing, no JSON, of another schema, or does not hold together.
     """
-    path = Path(path)
+    data = read_pattern_data(Path(path))
+    with guarded(Path(path), "JSON"):
+        return pattern_from_json(data)
+
+
+def read_pattern_data(path: Path) -> Any:
+    """Return what a pattern's file in JSON holds.
+
+    Raises:
+        InputError: the file is missing, or no JSON.
+    """
     if path.parent.is_file():
         raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies")
-    data = read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
-    with guarded(path, "JSON"):
-        return pattern_from_json(data)
+    return read_json(path, missing="no such file; a run leaves a pattern.json in its folder")
 
 
 def pattern_from_json(data: Any) -> DraftedGarment:
@@ -428,7 +455,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
         InputError: another schema, a missing key, a value of the wrong kind, or lines that are no pattern.
     """
     if not isinstance(data, Mapping) or "sizes" not in data:
-        raise InputError('is no pattern of warpflat: it has no "sizes"')
+        raise InputError('is no pattern of warpflat, which has "sizes", or of GarmentCode, which has "pattern"')
     if data.get("schema") != SCHEMA:
         raise InputError(
             f"has schema {quote_value(data.get('schema'))}; this version reads {SCHEMA}: run the scene again"
@@ -448,6 +475,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
                     sides=(_read_side(stitch.sides[0]), _read_side(stitch.sides[1])),
                     ease=stitch.ease,
                     eased=(stitch.eased[0], stitch.eased[1]),
+                    openings=tuple(SeamOpening(**each.model_dump()) for each in stitch.openings),
                 )
                 for stitch in data.stitches
                 if stitch.kind == "seam"
@@ -510,6 +538,9 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         paired=data.paired,
         title=data.title,
         units=data.printed_units,
+        at=data.at,
+        placement=None if data.placement is None else np.array(data.placement),
+        levels=data.levels,
         edges=[
             Edge(
                 name=edge.name,

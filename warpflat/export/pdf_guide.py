@@ -14,7 +14,7 @@ from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
 from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
-from warpflat.pattern.sewing_order import piece_titles, sewing_steps, sewn_seams
+from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams
 from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
@@ -149,6 +149,10 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
             ]
             page.paragraph(", ".join(cut), indent=0.030, lead=cloth)
     _cloth(page, whole, units)
+    needed = notions(whole, size)
+    if needed:
+        page.heading(translate("Notions"), LINE)
+        page.paragraph(", ".join(needed))
     steps = sewing_steps(whole, size)
     page.heading(translate("Sewing order"), 3 * LINE)
     page.paragraph(

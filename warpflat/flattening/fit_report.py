@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from warpflat.core.arrays import IntArray
+from warpflat.core.short_repr import short_repr
 from warpflat.core.toml_file import tables_as_toml
 from warpflat.model.fit import TOLERATED, WornFit
 from warpflat.model.wear import Wear
@@ -41,6 +42,8 @@ class Remedy:
         outside: share of the cloth beyond the limit once it is made, by trial and unsewn; None if it was not tried.
         table: that makes it as one of a scene's `[[cuts]]`; None where a scene cannot.
     """
+
+    __repr__ = short_repr
 
     words: str
     path: IntArray

@@ -20,6 +20,7 @@ from scipy.sparse.linalg import splu
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
+from warpflat.core.short_repr import short_repr
 from warpflat.flattening.progress import CONTACT
 from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
@@ -54,6 +55,8 @@ class Gradient:
         adjoint: #P by 2, mu: what a force on each vertex changes of the scalar [per N].
         vertex_origin: #P, for each vertex of the pattern the vertex of the surface.
     """
+
+    __repr__ = short_repr
 
     value: float
     positions: FloatArray

@@ -14,7 +14,7 @@ from warpflat.core.text import find_unused_name
 from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand
 from warpflat.garment.openings import Opening, OpeningPart
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Pattern, Piece, Seam
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening
 
 __all__ = ["lines_inside", "mark_openings", "with_notches"]
 
@@ -59,6 +59,12 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
             seam = next((each for each in pattern.seams if each.name == part.seam), None)
             if seam is None:
                 raise InputError(f"openings[{number}]: the pattern has no seam {part.seam!r} of its own")
+            opened = SeamOpening(
+                kind=opening.kind, length=min(opening.length, sum(each.whole for each in placed[pattern.sample][number])),
+                begin=begin, whole=end >= part.whole, style=opening.style if opening.kind == "zip" else "",
+            )  # fmt: skip
+            seam = replace(seam, openings=(*seam.openings, opened))
+            pattern = replace(pattern, seams=[seam if each.name == seam.name else each for each in pattern.seams])
             if opening.kind == "zip":
                 pattern = _with_zip(pattern, seam, opening, end if end < part.whole else None, number, placed)
             elif opening.kind == "buttons":
@@ -207,17 +213,17 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     for number, (sign, end) in enumerate(((-1.0, ring[0]), (1.0, ring[-1]))):
         shapes[f"keyhole side {number + 1}"] = np.array([slit[0] + sign * half * across, end])
     body = shapely.Polygon(piece.outline).buffer(1e-6)
-    lines = {**piece.internal_lines, **lines_inside(shapes, piece)}
+    lines = {**piece.internal_lines, **lines_inside(shapes, piece.outline)}
     button = slit[0] + 0.010 * along + (half + 0.008) * across
     marks = {**piece.marks, "button": button} if body.contains(shapely.Point(button)) else dict(piece.marks)
     return replace(piece, internal_lines=lines, marks=marks)
 
 
-def lines_inside(lines: Mapping[str, FloatArray], piece: Piece) -> dict[str, FloatArray]:
-    """Return of each line the longest part that lies inside a piece; lines with less than 1 mm inside are left out."""
+def lines_inside(lines: Mapping[str, FloatArray], outline: FloatArray) -> dict[str, FloatArray]:
+    """Return of each line the longest part that lies inside an outline; lines with less than 1 mm inside are left out."""
     import shapely
 
-    body, found = shapely.Polygon(piece.outline).buffer(1e-6), {}
+    body, found = shapely.Polygon(outline).buffer(1e-6), {}
     for name, line in lines.items():
         parts = shapely.get_parts(shapely.LineString(line).intersection(body))
         parts = [part for part in parts if part.geom_type == "LineString" and part.length > 1e-3]

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpflat._version import __version__
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import format_count, plain_letters
@@ -34,7 +35,16 @@ __all__ = [
     "surface_files",
 ]
 
-FORMATS = ("dxf", "svg", "pdf", "json")
+#: The formats, and the names of their files; the first four are written if nothing is said.
+FORMATS = {
+    "dxf": "{}.dxf",
+    "svg": "{}.svg",
+    "pdf": "pattern.pdf",
+    "json": "pattern.json",
+    "garmentcode": "{}_specification.json",
+    "plt": "{}.plt",
+}
+_USUAL = ("dxf", "svg", "pdf", "json")
 _MARKER = (".marker.svg", ".marker.json")
 
 
@@ -43,7 +53,7 @@ class PatternOptions:
     """The formats of a pattern, and options of the drawing.
 
     Attributes:
-        formats: some of "dxf", "svg", "pdf", "json".
+        formats: some of "dxf", "svg", "pdf", "json", "garmentcode" and "plt".
         dialect: of the DXF, "aama" or "astm".
         paper: of the PDF, "A4", "Letter" or "A0".
         tolerance: how far [m] a drawn curve may lie from the mesh's border; None takes 0.1 mm, and more only where the
@@ -58,7 +68,7 @@ class PatternOptions:
         lining, interfacing: what these cloths are called; none without a name.
     """
 
-    formats: Sequence[str] = FORMATS
+    formats: Sequence[str] = _USUAL
     dialect: str = "aama"
     paper: str = "A4"
     tolerance: float | None = None
@@ -155,28 +165,35 @@ def surface_files(
 
 
 def export_patterns(
-    folder: Path,
+    source: Path,
     formats: Sequence[str],
     *,
+    out: Path | None = None,
+    allowance: float | None = None,
     dialect: str = "aama",
     paper: str = "A4",
     sizes: Sequence[str] | None = None,
-) -> list[str]:
-    """Write files of a run's pattern again, all or none, from its `pattern.json`, and return their names.
+) -> tuple[list[Path], list[str]]:
+    """Write files of a pattern, all or none, from its `pattern.json` or the JSON of GarmentCode.
 
     Args:
-        folder: of the run.
-        formats: some of "dxf", "svg", "pdf" and "json".
+        source: the folder of a run, its `pattern.json`, or a file of GarmentCode.
+        formats: some of "dxf", "svg", "pdf", "json", "garmentcode" and "plt".
+        out: the folder for the files; that of the run, or out/NAME for a file of another program, if not given.
+        allowance: [m] around pieces of a file that knows of none; that of seams if not given.
         dialect: of a DXF.
         paper: of a PDF.
         sizes: only these; None takes all. Not for "json", from which the others are made.
 
+    Returns:
+        The files, and what their formats leave out, one sentence each.
+
     Raises:
-        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder
-            cannot be written.
+        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
+            has its own, or the folder cannot be written.
     """
-    from warpflat.core.output import file_in, output_folder, record_file
-    from warpflat.export.pattern_json import read_pattern_json
+    from warpflat.core.output import file_in, output_folder, record_file, write_report
+    from warpflat.export.read_pattern import read_drafted
 
     for format in formats:
         if format not in FORMATS:
@@ -185,19 +202,29 @@ def export_patterns(
         raise InputError(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
         )
-    source = folder / "pattern.json"
-    drafted = read_pattern_json(source)
+    file = source if source.suffix.lower() == ".json" and not source.is_dir() else source / "pattern.json"
+    drafted = read_drafted(file, allowance=allowance)
+    folder = out or (file.parent if file.name == "pattern.json" else Path("out") / drafted.name)
     # pattern.json may be written over itself: that is what was asked for.
-    with output_folder(folder, sources=[] if "json" in formats else [source], guard=True):
-        files = [
-            _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
-            for format in formats
-        ]
+    over_itself = "json" in formats and file.name == "pattern.json" and out is None
+    notes = list[str]()
+    with output_folder(folder, sources=[] if over_itself else [file], guard=True):
+        files = list[str]()
+        for format in formats:
+            name, lost = _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
+            files.append(name)
+            notes += lost
         if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
             files.append(file_in(folder, drafted.name, ".rul").name)
-        for file in files:
-            record_file(folder, drafted.name, file)
-    return files
+        # A folder that is new knows its files from here on, so that the next export may replace them.
+        if folder != file.parent and not (folder / "metrics.json").exists():
+            head = {"schema": 1, "warpflat": __version__, "pieces": {}}
+            write_report(folder / "metrics.json", head, name=drafted.name, files=files)
+            files.append("metrics.json")
+        else:
+            for name in files:
+                record_file(folder, drafted.name, name)
+    return [folder / name for name in files], notes
 
 
 def _write_pattern(
@@ -265,11 +292,12 @@ def _write_pattern(
     refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
     notes = (*notes, f"pattern.pdf was left out: {refused}") if refused else notes
     with output_folder(to) as folder:
-        files = [
-            _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
-            for kind in FORMATS
-            if kind in options.formats and not (kind == "pdf" and refused)
-        ]
+        files = list[str]()
+        for kind in FORMATS:
+            if kind in options.formats and not (kind == "pdf" and refused):
+                file, lost = _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
+                files.append(file)
+                notes = (*notes, *lost)
         if "dxf" in options.formats and len(drafted.pieces) > 1:
             files.append(file_in(folder, name, ".rul").name)
         if options.cloth is not None:
@@ -282,7 +310,7 @@ def _write_pattern(
 
 def pattern_names(name: str, formats: Iterable[str], *, marker: bool = False) -> list[str]:
     """Return the names of the files of a pattern, as far as they are known: without rules of sizes, or markers of further cloths."""
-    files = [f"{name if kind in ('dxf', 'svg') else 'pattern'}.{kind}" for kind in FORMATS if kind in formats]
+    files = [FORMATS[kind].format(name) for kind in FORMATS if kind in formats]
     return [*files, *(f"{name}{ending}" for ending in _MARKER if marker)]
 
 
@@ -307,15 +335,19 @@ def _write(
     dialect: str,
     paper: str,
     sizes: Sequence[str] | None = None,
-) -> str:
-    """Write one file and return its name."""
+) -> tuple[str, tuple[str, ...]]:
+    """Write one file and return its name, and what the format leaves out."""
     from warpflat.core.output import file_in
     from warpflat.export.dxf import write_dxf
+    from warpflat.export.garmentcode import write_garmentcode
     from warpflat.export.pattern_json import write_pattern_json
     from warpflat.export.pdf import write_pdf
+    from warpflat.export.plt import write_plt
     from warpflat.export.svg import write_svg
 
-    file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
+    start, _, ending = FORMATS[kind].partition("{}")
+    file = file_in(folder, start or name, ending) if "{}" in FORMATS[kind] else folder / start
+    lost: tuple[str, ...] = ()
     report_activity(f"writing {file.name}")
     if kind == "dxf":
         write_dxf(drafted, file, dialect=dialect, sizes=sizes, rul=file_in(folder, name, ".rul"))
@@ -323,9 +355,15 @@ def _write(
         write_svg(drafted, file, sizes=sizes, nested=True)
     elif kind == "pdf":
         write_pdf(drafted, file, paper=paper, sizes=sizes)
+    elif kind == "plt":
+        write_plt(drafted, file, sizes=sizes)
+    elif kind == "garmentcode":
+        if sizes is not None and len(sizes) > 1:
+            raise InputError(f"a file of GarmentCode holds one size: give one --size, not {', '.join(sizes)}")
+        lost = write_garmentcode(drafted, file, size=None if sizes is None else sizes[0])
     else:
         write_pattern_json(drafted, file)
-    return file.name
+    return file.name, lost
 
 
 def _marker(

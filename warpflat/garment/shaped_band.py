@@ -19,7 +19,7 @@ __all__ = ["with_shaped_waistband", "without_strip"]
 
 
 def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
-    """Return a piece without the strip along one of its borders.
+    """Return a piece without the strip along one of its borders, and with the parts of its lines that lie inside what is left.
 
     Args:
         piece: whole.
@@ -29,6 +29,7 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
     Raises:
         InputError: hardly anything of a neighbouring edge is left.
     """
+
     names = [edge.name for edge in strip]
     at = names.index(INNER)
     covered, after, before = names[: at - 1], strip[at - 1], strip[at + 1]
@@ -49,8 +50,9 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
             edges.append(replace(edge, points=np.vstack([part.points[::turn][-1:], left])[::turn], vertices=None))
         elif edge.name not in covered:
             edges.append(edge)
+    lines = lines_inside(piece.internal_lines, np.concatenate([edge.points[:-1] for edge in edges]))
     try:
-        return replace(piece, edges=edges)
+        return replace(piece, edges=edges, internal_lines=lines)
     except InputError:
         raise InputError(f"{piece.name}: nothing can be drawn beside {covered[0]!r}; take a narrower strip") from None
 
@@ -77,8 +79,7 @@ def with_shaped_waistband(
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == name)
             piece, strip = row[at], facing_edges(row[at], (edge,), width)
-            rest = without_strip(piece, strip, f"{edge} seam")
-            row[at] = replace(rest, internal_lines=lines_inside(rest.internal_lines, rest))
+            row[at] = without_strip(piece, strip, f"{edge} seam")
             edges = [replace(part, kind="seam", allowance=None) if part.name == INNER else part for part in strip]
             middle = np.concatenate([part.points for part in edges]).mean(axis=0)
             grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain

@@ -54,6 +54,8 @@ __all__ = ["check_edge_names", "grain_of", "pattern_of_garment", "pattern_of_sur
 ON_DATUM = 1e-3
 #: Least distance [m] of the grain line from darts and holes, and the steps [m] in which it is moved aside.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
+#: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
+BESIDE, ALIGNED = 0.05, 1e-3
 
 
 def pattern_of_garment(
@@ -232,7 +234,7 @@ def _form_piece(
     ]
     border = [*piece.edges.values(), *(leg for legs in piece.fisheyes.values() for leg in legs)]
     along = _inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
-    return Piece(
+    drawn = Piece(
         name=name,
         size=size,
         fabric=flat.fabric.name,
@@ -247,6 +249,27 @@ def _form_piece(
             max(along.values(), key=len, default=None),
         ),
     )
+    return replace(drawn, placement=_placement(drawn, flat))
+
+
+def _placement(piece: Piece, flat: Flattening) -> FloatArray | None:
+    """Return where a flat piece hangs: as its border lies in space, as rigidly as that goes (Kabsch 1976), and in front of its surface.
+
+    None without a border that is known in space, or one along which the piece lies every way as well.
+    """
+    edges = [edge for edge in piece.edges if edge.vertices is not None]
+    if not edges:
+        return None
+    plane = np.concatenate([edge.points for edge in edges])
+    space = flat.surface.vertices[flat.vertex_origin[np.concatenate([edge.vertices for edge in edges])]]
+    middle = space.mean(axis=0)
+    left, sizes, right = np.linalg.svd((space - middle).T @ (plane - plane.mean(axis=0)), full_matrices=False)
+    if sizes[1] < ALIGNED * sizes[0]:
+        return None
+    turn = left @ right
+    outward = np.cross(turn[:, 0], turn[:, 1])
+    away = float(((flat.surface.vertices - middle) @ outward).max()) + BESIDE
+    return np.column_stack([turn, middle + away * outward - turn @ plane.mean(axis=0)])
 
 
 def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], piece: str) -> list[Edge]:
@@ -443,7 +466,7 @@ def _mesh_piece(result: Flattening, size: str) -> Piece:
     on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
     datum = None if on_border else result.positions[result.datum]
     grain = _clear_of_holes(grain_of(piece.outline, result, datum), piece)
-    return replace(piece, darts=drawn, grain=grain)
+    return replace(piece, darts=drawn, grain=grain, placement=_placement(piece, result))
 
 
 def _closed_cuts(result: Flattening) -> dict[str, Crack]:

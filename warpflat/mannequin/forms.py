@@ -14,6 +14,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_file_name, same_file
+from warpflat.core.short_repr import short_repr
 from warpflat.core.text import quote_value
 from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, is_tight
 from warpflat.mannequin.bricks import select_bricks
@@ -107,6 +108,8 @@ class FormResult:
         ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled or bridged ones.
         recipe, body, half: what it was built from.
     """
+
+    __repr__ = short_repr
 
     name: str
     recipe: Form

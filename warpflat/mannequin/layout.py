@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
 
 __all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
 
@@ -134,6 +135,8 @@ class Layout(Strips):
         face_brick: #F, index of the brick in `bricks`' order.
         on_body: #F, true on the body itself, false on the tube around both legs.
     """
+
+    __repr__ = short_repr
 
     bricks: Mapping[str, IntArray]
     lines: Mapping[str, IntArray]

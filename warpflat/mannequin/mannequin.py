@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
+from warpflat.core.short_repr import short_repr
 from warpflat.mannequin.both_sides import average_sides, sides_note
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_trunk, build_vertices
@@ -66,6 +67,8 @@ class Mannequin:
         scan: for a scan, its vertices (#P by 3 [m]) upright with the legs moved together, and its triangles; else None.
         sources: files from which a scan was read; none of them is ever replaced by what is made of it.
     """
+
+    __repr__ = short_repr
 
     layout: Layout
     vertices: FloatArray

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.short_repr import short_repr
 from warpflat.core.text import find_unused_name
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
@@ -50,6 +51,8 @@ class FormPiece:
             are there in `surface.lines`, too, as "NAME.left" and "NAME.right".
         parts: where darts interrupt an edge, the name of the whole edge by each of its parts.
     """
+
+    __repr__ = short_repr
 
     surface: Surface
     edges: Mapping[str, IntArray]

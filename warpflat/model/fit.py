@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
 from warpflat.core.sorting import counting_sort
 from warpflat.core.sums import weighted_percentiles
 from warpflat.fabric.fabric import Fabric
@@ -89,6 +90,8 @@ class WornFit:
         outside: share of the flat area that is beyond the limit.
         hollow: share of the flat area where the tension would lift the cloth off.
     """
+
+    __repr__ = short_repr
 
     strain_warp: FloatArray
     strain_weft: FloatArray

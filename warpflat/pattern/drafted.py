@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
+from warpflat.core.short_repr import short_repr
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge
@@ -124,6 +125,8 @@ class DraftedPiece:
         enlarged: by what it is drawn larger across and along its grain, for cloth that shrinks.
     """
 
+    __repr__ = short_repr
+
     piece: Piece
     frame: FloatArray
     edges: tuple[DraftedEdge, ...]
@@ -186,6 +189,8 @@ class DraftedGarment:
         seams: how well the two sides of every seam agree.
         corners: where edges run on across seams, darts and folds, before and after truing.
     """
+
+    __repr__ = short_repr
 
     garment: Pattern
     pieces: Mapping[str, tuple[DraftedPiece, ...]]

@@ -12,6 +12,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
+from warpflat.core.short_repr import short_repr
 from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 __all__ = ["Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
 
 
+#: Kinds of :class:`SeamOpening`.
+OPENINGS = ("zip", "buttons", "slit", "vent")
 ROLES = ("shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket")
 
 
@@ -46,7 +49,12 @@ class Piece:
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.
         units: of lengths in printed words, one of :data:`warpflat.pattern.measures.UNITS`.
+        at: where it is worn, "front", "back", "left arm" or "right arm"; "" leaves that to its name and its seams.
+        placement: 3 by 3 [m], where it hangs beside the body: (x, y, 1) on the piece maps to a place; None if unknown.
+        levels: by edge the level of the body where it lies, such as the waist.
     """
+
+    __repr__ = short_repr
 
     name: str
     size: str = ""
@@ -63,6 +71,9 @@ class Piece:
     paired: bool = True
     title: str = ""
     units: str = "cm"
+    at: str = ""
+    placement: FloatArray | None = None
+    levels: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         where = f"piece {self.name!r}" + (f" {size_words(self.size)}" if self.size else "")
@@ -135,6 +146,29 @@ class SeamSide:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SeamOpening:
+    """Where a seam can be opened, or is not closed.
+
+    Attributes:
+        kind: "zip" or "buttons", from the upper end of the seam; "slit" or "vent", from its lower end.
+        length: of the whole opening [m]; it may run on into another seam.
+        begin: how far from that end of the seam it begins [m].
+        whole: whether it reaches from there to the seam's other end.
+        style: of a zip, "invisible" or "lapped".
+    """
+
+    kind: str
+    length: float
+    begin: float = 0.0
+    whole: bool = False
+    style: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind not in OPENINGS:
+            raise InputError(f"unknown kind of opening {self.kind!r}; {nearest(self.kind, OPENINGS)}")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Seam:
     """Two sides that are sewn together, each a chain of one or more edges in the same direction.
 
@@ -146,6 +180,7 @@ class Seam:
         notches: fractions of the first side's length in (0, 1) that get notches on both sides; None places them by length.
         size_notches: by size, fractions instead of `notches`, where a notch stands for a length, as the end of a zip.
         double: double notches; None means double where a back takes part and no front does.
+        openings: where it can be opened, or is not closed.
     """
 
     name: str
@@ -155,6 +190,7 @@ class Seam:
     notches: tuple[float, ...] | None = None
     size_notches: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     double: bool | None = None
+    openings: tuple[SeamOpening, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.sides) != 2 or not all(self.sides):
@@ -190,6 +226,8 @@ class Pattern:
         sample_size: the size that files of one size show; None takes the middle one.
         words: what is printed instead of English words and names (see `warpflat.pattern.words`).
     """
+
+    __repr__ = short_repr
 
     name: str
     pieces: Mapping[str, Sequence[Piece]]

@@ -8,13 +8,14 @@ from string import ascii_uppercase
 
 from warpflat.core.text import other_side, without_side
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
-from warpflat.pattern.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.measures import length_words
+from warpflat.pattern.pieces import Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.words import translate, translate_name
 
-__all__ = ["SewnSeam", "piece_titles", "seam_letters", "sewing_steps", "sewn_seams"]
+__all__ = ["SewnSeam", "notions", "piece_titles", "seam_letters", "sewing_steps", "sewn_seams"]
 
 
-#: Seams in the order in which they are closed, by words of their names; what has none of them comes with the panels.
+#: Seams of the shell in the order in which they are closed, by words of their names; what has none of them comes with the panels.
 _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Join the panels", ("princess", "panel", "yoke", "centre")),
     ("Sew the shoulders", ("shoulder",)),
@@ -25,9 +26,18 @@ _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Join at the waist", ("waist", "hip", "abdomen", "underbust")),
     ("Set the sleeves in", ("armhole",)),
     ("Attach the collar", ("neck", "collar")),
-    ("Join the linings", ("lining",)),
-    ("Join facings, bands and bindings, and sew them to their edges", ("facing", "band", "binding", "waistband")),
 )
+#: Then those of other pieces, by the roles of the pieces on both sides.
+_FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
+    ("Join the facings", ({"facing"},)),
+    ("Sew the facings to their edges, turn them in and press them", ({"facing", "shell"},)),
+    ("Join the linings", ({"lining"},)),
+    ("Sew the lining to the facings", ({"facing", "lining"},)),
+    ("Join the ends of bands and bindings", ({"strip"}, {"waistband"})),
+    ("Sew bands and bindings to their edges", ({"strip", "shell"}, {"waistband", "shell"}, {"strip", "waistband"})),
+)
+# A seam of these stages is mentioned by others.
+_ON_FACINGS, _LININGS, _LAST = (len(_STAGES) + k for k in (1, 2, 5))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,9 +49,11 @@ class SewnSeam:
         name: without left and right, if both are sewn.
         sides: the pieces of both sides, in words.
         length_mm: of both sides.
-        ease: by how much the second side is eased or gathered in, as a share.
-        stage: its place in `_STAGES`.
+        ease: by how much the second side is longer than the first, as a share.
+        stretched: whether the shorter side is a band, which is stretched to the other.
+        stage: its place in `_STAGES` and `_FINISHING`.
         count: how often it is sewn.
+        openings: where it can be opened, or is not closed.
     """
 
     letter: str
@@ -49,8 +61,26 @@ class SewnSeam:
     sides: tuple[str, str]
     length_mm: tuple[float, float]
     ease: float
+    stretched: bool
     stage: int
     count: int
+    openings: tuple[SeamOpening, ...]
+
+    def words(self) -> str:
+        """Return its letter, its name, its pieces, and how its longer or shorter side is held."""
+        first, second = self.sides
+        if first != second:
+            words = translate("{seam}: {first} to {second}", seam=self.name, first=first, second=second)
+        else:
+            words = self.name if first in self.name else translate("{seam} of the {first}", seam=self.name, first=first)
+        if abs(self.ease) >= 5e-4:
+            longer, shorter = (second, first) if self.ease > 0 else (first, second)
+            share = self.ease if self.ease > 0 else 1.0 / (1.0 + self.ease) - 1.0
+            if self.stretched:
+                words += translate(", stretch the {piece}", piece=shorter)
+            else:
+                words += translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
+        return f"{self.letter} ({words})"
 
 
 def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
@@ -71,10 +101,9 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
     pieces = {piece.name: piece.piece for piece in garment.pieces[size]}
     titles = piece_titles(list(pieces.values()))
     lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
-    groups = _mirror_groups(garment.garment.seams)
-    ordered = sorted(groups, key=lambda group: _stage(group[0], pieces))
+    groups = _mirror_groups(garment.garment.seams, pieces)
     found = []
-    for number, group in enumerate(ordered):
+    for number, group in enumerate(groups):
         seam = group[0]
         found.append(
             SewnSeam(
@@ -83,8 +112,10 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
                 sides=(_words(seam.sides[0], titles), _words(seam.sides[1], titles)),
                 length_mm=lengths.get(seam.name, (0.0, 0.0)),
                 ease=seam.ease,
+                stretched=pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece].role == "strip",
                 stage=_stage(seam, pieces),
                 count=len(group),
+                openings=seam.openings,
             )
         )
     return tuple(found)
@@ -94,15 +125,18 @@ def seam_letters(garment: DraftedGarment) -> dict[str, str]:
     """Return the letter of each seam by its name."""
     size = next(iter(garment.pieces))
     pieces = {piece.name: piece.piece for piece in garment.pieces[size]}
-    ordered = sorted(_mirror_groups(garment.garment.seams), key=lambda group: _stage(group[0], pieces))
-    return {seam.name: _letter(number) for number, group in enumerate(ordered) for seam in group}
+    groups = _mirror_groups(garment.garment.seams, pieces)
+    return {seam.name: _letter(number) for number, group in enumerate(groups) for seam in group}
 
 
 def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     """Return the steps of making the garment, a sentence each."""
     pieces = garment.pieces[size]
     titles = piece_titles([piece.piece for piece in pieces])
-    steps = []
+    units, steps = garment.garment.units, list[str]()
+    fused = [titles[piece.name] for piece in pieces if piece.piece.also or piece.piece.role == "interfacing"]
+    if fused:
+        steps.append(translate("Fuse the interfacing: {pieces}.", pieces=", ".join(fused)))
     pleats = [
         f"{titles[piece.name]}: {_listed(names)}" for piece in pieces if (names := _dart_names(piece, pleats=True))
     ]
@@ -128,54 +162,165 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
             translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=", ".join(patches))
         )
     seams = sewn_seams(garment, size)
-    for stage in sorted({seam.stage for seam in seams}):
-        what = translate(_STAGES[stage][0] if stage < len(_STAGES) else "Sew")
-        parts = []
-        for seam in (seam for seam in seams if seam.stage == stage):
-            first, second = seam.sides
-            words = translate("{seam}: {first} to {second}", seam=seam.name, first=first, second=second)
-            if first == second:
-                words = translate("{seam} of the {first}", seam=seam.name, first=first)
-            if abs(seam.ease) >= 5e-4:
-                longer, share = (second, seam.ease) if seam.ease > 0 else (first, 1.0 / (1.0 + seam.ease) - 1.0)
-                words += translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
-            parts.append(f"{seam.letter} ({words})")
-        steps.append(translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(parts)))
+    # Edges of linings and facings that no seam takes: they end at a zip, are caught in a binding, or are finished by themselves.
     free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
-    if free:
-        steps.append(translate("Finish the raw edges with a facing, a band or binding: {edges}.", edges=free))
-    hems = _free_edges(pieces, garment.garment.seams, titles, ("hem",))
+    shell = {piece.name: piece.piece for piece in pieces if piece.piece.role == "shell"}
+    zipped = {side.edge for seam in garment.garment.seams for row in seam.sides for side in row if seam.openings}
+    bound = {
+        without_side(side.edge)
+        for seam in garment.garment.seams
+        if _stage(seam, {piece.name: piece.piece for piece in pieces}) == _LAST
+        for row in seam.sides
+        for side in row
+        if side.piece in shell
+    }
+    inside = {titles[piece.name] for piece in pieces if piece.piece.role in ("lining", "facing")}
+    at_zip = [
+        title for edge, rows in free.items() if edge in map(without_side, zipped) for title in rows if title in inside
+    ]
+    basted = {edge: [t for t in rows if t in inside] for edge, rows in free.items() if edge in bound}
+    for stage in sorted({seam.stage for seam in seams}):
+        what = translate([*_STAGES, *_FINISHING][stage][0])
+        here = [seam for seam in seams if seam.stage == stage]
+        if stage == _LAST and any(basted.values()):
+            steps.append(
+                translate(
+                    "Baste the lining to the shell, wrong sides together: {edges}.",
+                    edges=", ".join(translate_name(edge) for edge, rows in basted.items() if rows),
+                )
+            )
+        plain = [seam for seam in here if not seam.openings or stage == _LININGS]
+        for seam in (seam for seam in here if seam not in plain):
+            steps += _opened_steps(seam, units)
+        if plain:
+            words = [seam.words() + (translate(", open beside the zip") if _zips(seam) else "") for seam in plain]
+            steps.append(translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(words)))
+        if stage == _LININGS:
+            at_zip += [side for seam in here if _zips(seam) for side in seam.sides]
+        if (
+            stage in (_LININGS + 1, _ON_FACINGS)
+            and at_zip
+            and stage == max(each.stage for each in seams if each.stage in (_LININGS + 1, _ON_FACINGS))
+        ):
+            steps.append(
+                translate(
+                    "At the zip, turn in the edges and sew them to its tape by hand: {pieces}.",
+                    pieces=", ".join(dict.fromkeys(at_zip)),
+                )
+            )
+    left = {
+        edge: [title for title in rows if not (title in at_zip or title in basted.get(edge, ()))]
+        for edge, rows in free.items()
+    }
+    if any(left.values()):
+        words = [f"{translate_name(edge)} ({', '.join(rows)})" for edge, rows in left.items() if rows]
+        steps.append(
+            translate("Finish the raw edges with a facing, a band or binding: {edges}.", edges="; ".join(words))
+        )
+    # Slits and vents are hems of their own, which the steps of their seams have turned in.
+    hems: dict[float, list[str]] = {}
+    opened = {"slit", "vent"}
+    for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
+        for edge in piece.edges:
+            if edge.kind == "hem" and not opened & set(edge.name.split(" ")):
+                hems.setdefault(round(edge.width, 4), []).append(titles[piece.name])
     if hems:
-        steps.append(translate("Turn up and sew the hems: {edges}.", edges=hems))
-    buttons = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
-    return (
-        *steps,
-        *[
+        words = [f"{length_words(width, units)} ({', '.join(dict.fromkeys(rows))})" for width, rows in hems.items()]
+        steps.append(translate("Turn up and sew the hems: {edges}.", edges=", ".join(words)))
+    for title, count in _buttons(pieces).items():
+        steps.append(
             translate(
                 "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
                 count=count,
                 title=title,
             )
-            for title, count in buttons.items()
-            if count > 1
-        ],
-    )
+        )
+    return tuple(steps)
 
 
-def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
-    """Return seams that are each other's mirror images together."""
+def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
+    """Return what is needed beside the cloth: zips and buttons."""
+    units = garment.garment.units
+    zips = [
+        translate(
+            f"{{count}} {opening.style} zip of {{length}}", count=seam.count, length=length_words(opening.length, units)
+        )
+        for seam in sewn_seams(garment, size)
+        for opening in _zips(seam)
+        if seam.stage < len(_STAGES)
+    ]
+    return (*zips, *(translate("{count} buttons", count=count) for count in _buttons(garment.pieces[size]).values()))
+
+
+def _buttons(pieces: Sequence[DraftedPiece]) -> dict[str, int]:
+    """Return the number of buttons by the printed name of the piece that has them."""
+    titles = piece_titles([piece.piece for piece in pieces])
+    counts = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
+    return {title: count for title, count in counts.items() if count > 1}
+
+
+def _zips(seam: SewnSeam) -> list[SeamOpening]:
+    return [opening for opening in seam.openings if opening.kind == "zip"]
+
+
+def _opened_steps(seam: SewnSeam, units: str) -> list[str]:
+    """Return the steps of a seam with openings: its zip and what is closed beside it, then its slit or vent."""
+    steps = []
+    below = [opening.kind for opening in seam.openings if opening.kind in ("slit", "vent")]
+    for opening in seam.openings:
+        length = length_words(opening.length, units)
+        if opening.kind == "zip":
+            where = translate("from the upper edge down to its notch")
+            if opening.begin > 0.0:
+                where = translate(
+                    "from {begin} below the upper edge down to its notch", begin=length_words(opening.begin, units)
+                )
+            if opening.whole:
+                where = translate("all along")
+            words = translate(
+                f"Sew the {opening.style} zip of {{length}} to both edges of {{seam}}, {{where}}".replace("  ", " "),
+                length=length, seam=seam.words(), where=where,
+            )  # fmt: skip
+            if not opening.whole:
+                words += translate(f", then close the seam below it{', down to the ' + below[0] if below else ''}")
+        elif opening.kind == "buttons":
+            words = translate("Close {seam} below the buttons", seam=seam.words())
+        else:
+            if not _zips(seam):
+                steps.append(translate(f"Close {{seam}} down to the {opening.kind}.", seam=seam.words()))
+            words = translate(
+                "Fold the vent of {length} below {seam} to one side, and sew across its top"
+                if opening.kind == "vent"
+                else "Turn in the edges of the slit of {length} below {seam} and sew them down",
+                length=length,
+                seam=seam.letter,
+            )
+        steps.append(f"{words}.")
+    return steps
+
+
+def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[list[Seam]]:
+    """Return seams that are each other's mirror images together, in the order in which they are sewn: those with openings first."""
     groups: dict[object, list[Seam]] = {}
     for seam in seams:
         sides = sorted(
             tuple(sorted((without_side(s.piece), without_side(s.edge)) for s in side)) for side in seam.sides
         )
         groups.setdefault((without_side(seam.name), tuple(sides)), []).append(seam)
-    return list(groups.values())
+    return sorted(groups.values(), key=lambda group: (_stage(group[0], pieces), not group[0].openings))
 
 
 def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
-    """Return when a seam is sewn: by the words of its name, or with the panels."""
+    """Return when a seam is sewn: by the roles of its pieces and, in the shell, by the words of its name, or with the panels."""
     words = seam.name.lower().replace("_", " ").split(" ")
+    roles = {pieces[side.piece].role for row in seam.sides for side in row}
+    if "facing" in words and "shoulder" in words:
+        return len(_STAGES)
+    for number, (_, known) in enumerate(_FINISHING):
+        if roles in known:
+            return len(_STAGES) + number
+    if "facing" in words:
+        return _ON_FACINGS
     for number, (_, keys) in reversed(list(enumerate(_STAGES))):
         if any(key in words for key in keys) and not (number == 3 and "shoulder" in words):
             return number
@@ -204,18 +349,18 @@ def _dart_names(piece: DraftedPiece, *, pleats: bool = False) -> list[str]:
 
 def _free_edges(
     pieces: Sequence[DraftedPiece], seams: Sequence[Seam], titles: Mapping[str, str], kinds: Sequence[str]
-) -> str:
-    """Return the edges of some kinds that are in no seam, by name, with their pieces."""
+) -> dict[str, list[str]]:
+    """Return the pieces of the edges of some kinds that are in no seam, by the edges' names without side and number."""
     sewn = {(part.piece, part.edge) for seam in seams for side in seam.sides for part in side}
     # A strip that is cut twice is drawn for one side.
-    sewn |= {(piece, other_side(edge)) for piece, edge in sewn}
+    sewn |= {(of, other_side(edge)) for piece, edge in sewn for of in (piece, other_side(piece))}
     found: dict[str, list[str]] = {}
     for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
         for edge in piece.piece.edges:
             if edge.kind in kinds and (piece.name, edge.name) not in sewn:
-                of_edge = found.setdefault(translate_name(without_side(edge.name)), [])
+                of_edge = found.setdefault(without_side(edge.name).rstrip(" 0123456789"), [])
                 of_edge += [] if titles[piece.name] in of_edge else [titles[piece.name]]
-    return "; ".join(f"{name} ({', '.join(of_edge)})" for name, of_edge in found.items())
+    return found
 
 
 def _listed(names: Sequence[str]) -> str:

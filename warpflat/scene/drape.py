@@ -36,7 +36,7 @@ def drape_names(scene: Scene) -> list[str]:
 
 def _corrected_formats(scene: Scene) -> list[str]:
     """Return the formats of the corrected pattern: the PDF and the JSON have one name in a folder, which is the first pattern's."""
-    return [each for each in scene.settings.pattern.formats if each in ("dxf", "svg")]
+    return [each for each in scene.settings.pattern.formats if each not in ("pdf", "json")]
 
 
 def write_drape(

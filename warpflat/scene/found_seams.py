@@ -18,6 +18,7 @@ from warpflat.core.text import quote_value
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.scene.schema import FileSurface, SeamCutTable
+from warpflat.scene.surface import scene_surface
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from warpflat.seams.options import SeamCut
     from warpflat.surface.mesh import Surface
 
-__all__ = ["found_seams", "read_edges", "seams_entry"]
+__all__ = ["found_seams", "plain_panel", "read_edges", "seams_entry"]
 
 # More than this share of the cloth beyond its limit is no pattern yet.
 _NO_PATTERN = 0.1
@@ -173,22 +174,31 @@ def read_edges(path: Path) -> list[list[int]]:
     return rows
 
 
+def plain_panel(scene: Scene) -> Surface | None:
+    """Return the surface of a scene that asks for nothing of seams, where it can lie flat in one piece; None else."""
+    settings, table = scene.settings, scene.settings.surface
+    if not isinstance(table, FileSurface) or table.component is not None or settings.find_seams or settings.seams_cut:
+        return None
+    try:
+        surface = scene_surface(scene)
+    except InputError:
+        return None
+    return None if _is_whole_garment(surface) else surface
+
+
 def _is_whole_garment(surface: Surface) -> bool:
     """Return whether a surface cannot lie flat in one piece: closed, with handles, forked, or a cap."""
-    from warpflat.seams.anatomy import HOLE
-    from warpflat.seams.find import cloth_of
-    from warpflat.seams.solid import is_panel
+    from warpflat.seams.cloth import Cloth
+    from warpflat.seams.solid import is_panel, wide_borders
     from warpflat.surface.connectivity import border_loops, euler_characteristic
+    from warpflat.surface.triangles import triangulate
 
     if len(surface.faces) < _FEWEST:
         return False
-    loops = border_loops(surface.faces, surface.vertices)
-    cloth = cloth_of(surface)
-    least = HOLE * np.sqrt(float(cloth.face_areas.sum()))
-    rings = [surface.vertices[np.append(loop, loop[0])] for loop in loops]
-    wide = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) > least for ring in rings)
-    handles = (2 - len(loops) - euler_characteristic(surface.faces)) // 2
-    return wide > 2 or wide == 0 or handles > 0 or (wide == 1 and not is_panel(cloth))
+    cloth = Cloth(vertices=surface.vertices, faces=triangulate(surface.faces)[0].astype(np.int64))
+    wide = wide_borders(cloth)
+    handles = (2 - len(border_loops(surface.faces, surface.vertices)) - euler_characteristic(surface.faces)) // 2
+    return len(wide) not in (1, 2) or handles > 0 or (len(wide) == 1 and not is_panel(cloth))
 
 
 def seams_entry(found: FoundSeams, pieces: Sequence[Flattening]) -> Mapping[str, Any]:

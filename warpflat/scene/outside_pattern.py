@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
 
-_ENDINGS = (".json", ".dxf", ".svg")
-
 
 class SewnSeamTable(Table):
     """A seam: two sides that are sewn together, each an edge "piece.edge", or several, "piece.edge + piece.edge".
@@ -137,7 +135,9 @@ class OutsideJob:
 
 def is_pattern_file(path: Path) -> bool:
     """Return whether a path is that of a pattern rather than of a scene: a folder, or a JSON, DXF or SVG file."""
-    return path.is_dir() or path.suffix.lower() in _ENDINGS
+    from warpflat.export.read_pattern import PATTERN_ENDINGS
+
+    return path.is_dir() or path.suffix.lower() in PATTERN_ENDINGS
 
 
 def edge_table(path: Path, *, sewing: Path | None = None) -> str:
@@ -161,17 +161,11 @@ def edge_table(path: Path, *, sewing: Path | None = None) -> str:
 def _read(path: Path, table: SewingTable) -> tuple[Pattern, dict[str, Lift], dict[str, Any] | None]:
     """Return the pattern, the ways to its designed surface, and the run's table of its body."""
     from warpflat.draping.lift import read_lift
-    from warpflat.export.pattern_json import read_pattern_json
-    from warpflat.export.read_dxf import read_dxf
-    from warpflat.export.read_svg import read_svg
+    from warpflat.export.read_pattern import read_pattern
 
     allowance = None if table.allowance_mm is None else 1e-3 * table.allowance_mm
-    if path.suffix.lower() == ".dxf" and not path.is_dir():
-        return read_dxf(path, allowance=allowance), {}, None
-    if path.suffix.lower() == ".svg" and not path.is_dir():
-        return read_svg(path, allowance=allowance), {}, None
     folder = path if path.is_dir() else None
-    pattern = read_pattern_json(path / "pattern.json" if folder else path).garment
+    pattern = read_pattern(path / "pattern.json" if folder else path, allowance=allowance)
     if folder is None:
         return pattern, {}, None
     lifts = {
@@ -194,12 +188,12 @@ def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:
     if entry.fold is not None:
         place = edges.index(piece.edge(entry.fold))
         edges[place] = replace(edges[place], kind="fold", allowance=None)
-    return replace(piece, edges=edges, quantity=entry.quantity or piece.quantity)
+    return replace(piece, edges=edges, quantity=entry.quantity or piece.quantity, at=entry.at or piece.at)
 
 
 def _side(text: str, *, reversed: bool) -> Any:
-    from warpflat.draping.whole_pieces import MIRRORED
     from warpflat.pattern.pieces import SeamSide
+    from warpflat.pattern.whole_pieces import MIRRORED
 
     piece, _, edge = text.partition(".")
     if not edge:
@@ -273,7 +267,6 @@ def drape_outside(
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
     options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
-    at = {entry.name: entry.at for entry in job.sewing.pieces if entry.at is not None}
     names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc"]
     with output_folder(out, names, sources=job.sources, guard=True) as folder:
         require_own_metrics(folder)
@@ -281,7 +274,7 @@ def drape_outside(
         with errors_named(job.name):
             lifts = job.lifts if size in (None, pattern.sample) else {}
             placement = Placement(
-                at=at, top=job.sewing.top, lifts=lifts, size=size, spacing=1e-3 * job.sewing.spacing_mm, hold=table.hold
+                top=job.sewing.top, lifts=lifts, size=size, spacing=1e-3 * job.sewing.spacing_mm, hold=table.hold
             )
             draped, more = drape_pattern(
                 pattern, job.body, fabric=cloth, placement=placement, options=options, device=device

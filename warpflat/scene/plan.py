@@ -34,7 +34,7 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.scene.form import scene_form, scene_recipe
-from warpflat.scene.found_seams import found_seams
+from warpflat.scene.found_seams import found_seams, plain_panel
 from warpflat.scene.frames import FrameRecorder
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
@@ -271,10 +271,11 @@ def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | No
     with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         seams = scene_surface_seams(settings.seams, scene.name)
-    found = None if cuts is not None else found_seams(scene)
+    surface = None if cuts is not None else plain_panel(scene)
+    found = None if cuts is not None or surface is not None else found_seams(scene)
     parts = found.pieces if found is not None else None if cuts is not None else scene_pieces(scene)
     if parts is None:
-        sequences = [cuts or scene_cuts(scene, device=device)]
+        sequences = [cuts or scene_cuts(scene, device=device, surface=surface)]
     else:
         if settings.drape is not None:
             raise InputError(

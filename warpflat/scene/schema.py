@@ -432,7 +432,7 @@ class OutputTable(Table):
 class PatternTable(Table):
     """The pattern files: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`."""
 
-    formats: list[Literal["dxf", "svg", "pdf", "json"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
+    formats: list[Literal["dxf", "svg", "pdf", "json", "garmentcode", "plt"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
     """Formats that are written; an empty list writes none."""
     dialect: Literal["aama", "astm"] = "aama"
     paper: Literal["A4", "Letter", "A0", "Projector"] = "A4"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, expect
 from warpflat.core.polyline import polyline_length
+from warpflat.core.short_repr import short_repr
 from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
@@ -79,6 +80,8 @@ class FoundSeams:
         up, front: the axes of space that are nearest to its own, as "+y" and "+z".
         notes: what was chosen or left out, one sentence each, the most important first.
     """
+
+    __repr__ = short_repr
 
     pieces: tuple[Surface, ...]
     seams: tuple[FoundSeam, ...]

@@ -21,7 +21,7 @@ from warpflat.seams.fields import Operators
 from warpflat.seams.tailor import tidied
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 
-__all__ = ["is_open", "is_panel", "part_solids"]
+__all__ = ["is_open", "is_panel", "part_solids", "wide_borders"]
 
 Ids = NDArray[np.int64]
 
@@ -55,13 +55,17 @@ def is_open(mesh: PieceMesh) -> bool:
     return loops in (1, 2) and euler_characteristic(mesh.faces.astype(np.int32)) == 2 - loops
 
 
+def wide_borders(cloth: Cloth) -> list[float]:
+    """Return the lengths of the borders of a cloth that are no holes [m]."""
+    rings = [cloth.vertices[np.append(loop, loop[0])] for loop in cloth.borders()]
+    length = [float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in rings]
+    return [one for one in length if one > HOLE * np.sqrt(float(cloth.face_areas.sum()))]
+
+
 def is_panel(cloth: Cloth) -> bool:
     """Return whether a cloth is one panel: with one border that is about as long as that of a flat disk of its area, or longer."""
-    loops = [cloth.vertices[np.append(loop, loop[0])] for loop in cloth.borders()]
-    length = [float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in loops]
-    area = float(cloth.face_areas.sum())
-    wide = [one for one in length if one > HOLE * np.sqrt(area)]
-    return len(wide) == 1 and wide[0] ** 2 >= _PANEL * 4.0 * np.pi * area
+    wide = wide_borders(cloth)
+    return len(wide) == 1 and wide[0] ** 2 >= _PANEL * 4.0 * np.pi * float(cloth.face_areas.sum())
 
 
 def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[Cloth, list[str]]:

@@ -17,14 +17,18 @@ __all__ = ["MIRRORED", "hole_edges", "whole_pieces"]
 
 #: Ends the name of a piece that is cut turned over, and of an edge beyond the fold.
 MIRRORED = " mirrored"
+_OTHER_SIDE = {"left arm": "right arm", "right arm": "left arm"}
 
 
-def whole_pieces(pieces: Iterable[Piece], seams: Sequence[Seam]) -> tuple[dict[str, Piece], list[Seam], list[str]]:
+def whole_pieces(
+    pieces: Iterable[Piece], seams: Sequence[Seam], *, unsewn: bool = False
+) -> tuple[dict[str, Piece], list[Seam], list[str]]:
     """Unfold halves on the fold, cut pairs twice, and repeat their seams on the other side.
 
     Args:
         pieces: of one size.
         seams: between them.
+        unsewn: whether pieces that no seam joins are kept.
 
     Returns:
         The whole pieces by name; their seams, without flags for mirrored sides, those of darts among them; notes.
@@ -35,7 +39,7 @@ def whole_pieces(pieces: Iterable[Piece], seams: Sequence[Seam]) -> tuple[dict[s
     given = {piece.name: piece for piece in pieces}
     sides = [side for seam in seams for chain in seam.sides for side in chain]
     asked = {side.piece for side in sides if side.mirrored}
-    sewn = {side.piece for side in sides}
+    sewn = set(given) if unsewn else {side.piece for side in sides}
     halves = {name for name, piece in given.items() if piece.on_fold}
     twice = {
         name for name, p in given.items() if name not in halves and (name in asked or (p.quantity == 2 and p.paired))
@@ -130,13 +134,14 @@ def _unfolded(piece: Piece) -> Piece:
 
 def _turned(piece: Piece) -> Piece:
     """Return a piece cut turned over."""
-    across = np.array([-1.0, 1.0])
+    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
     edges = [replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]]
     return replace(
         piece, name=piece.name + MIRRORED, edges=edges, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
         holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
         internal_lines={name: line * across for name, line in piece.internal_lines.items()},
-        grain=None if piece.grain is None else piece.grain * across,
+        grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
+        placement=None if piece.placement is None else flip @ piece.placement @ flip,
     )  # fmt: skip
 
 

@@ -1,0 +1,139 @@
+"""Steps of making a garment, the seams in their order, and what is needed beside the cloth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from warpflat.core.errors import InputError
+from warpflat.export.pattern_json import pattern_from_json, pattern_json
+from warpflat.garment.finishing import Finishing, finish_edges
+from warpflat.garment.linings import add_interfacing, add_lining
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.sewing_order import notions, seam_letters, sewing_steps
+from warpflat.pattern.words import language_words, printed_in
+
+
+def top(*openings: SeamOpening) -> Pattern:
+    """A front and the two halves of a back, with a neck, and armholes 20 cm long above the side seams."""
+    neck = np.array([[0.1, 0.5], [0.05, 0.46], [0.0, 0.45], [-0.05, 0.46], [-0.1, 0.5]])
+    right = {
+        "hem": [[0.0, 0.0], [0.2, 0.0]],
+        "side right": [[0.2, 0.0], [0.2, 0.3]],
+        "armhole right": [[0.2, 0.3], [0.2, 0.5]],
+        "shoulder right": [[0.2, 0.5], [0.1, 0.5]],
+    }
+    half = {**right, "neck right": neck[:3], "centre back": [[0.0, 0.45], [0.0, 0.0]]}
+    mirrored = {
+        name.replace("right", "left"): np.array(points)[::-1] * [-1.0, 1.0] for name, points in reversed(half.items())
+    }
+    front = {
+        "hem": [[-0.2, 0.0], [0.2, 0.0]],
+        **{k: v for k, v in right.items() if k != "hem"},
+        "neck": neck,
+        **{k: v for k, v in mirrored.items() if k.split(" ")[0] in ("side", "armhole", "shoulder")},
+    }
+
+    def piece(name: str, lines: dict[str, Sequence[Sequence[float]]]) -> Piece:
+        edges = [Edge(name=k, points=np.array(v), kind="hem" if k == "hem" else "seam") for k, v in lines.items()]
+        first = next(i for i, edge in enumerate(edges) if edge.name == "hem")
+        return Piece(name=name, fabric="wool", edges=[*edges[first:], *edges[:first]])
+
+    pieces = [piece("front", front), piece("back_right", half), piece("back_left", mirrored)]
+    seams = [
+        Seam(
+            name=f"{name} {side}",
+            sides=((SeamSide(piece="front", edge=f"{name} {side}"),), (SeamSide(piece=f"back_{side}", edge=f"{name} {side}"),)),
+        )
+        for name in ("side", "shoulder")
+        for side in ("left", "right")
+    ]  # fmt: skip
+    back = (
+        (SeamSide(piece="back_right", edge="centre back"),),
+        (SeamSide(piece="back_left", edge="centre back", reversed=True),),
+    )
+    centre = Seam(name="centre back", sides=back, openings=openings)
+    return Pattern(name="top", pieces={"": pieces}, seams=[*seams, centre])
+
+
+ZIP = SeamOpening(kind="zip", length=0.3, style="invisible")
+
+
+def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
+    facing, binding = (
+        Finishing(kind="facing", edge="neck", width=0.05),
+        Finishing(kind="binding", edge="armhole", width=0.035),
+    )
+    pattern = finish_edges(top(ZIP), [facing, binding], gaps=["centre back"])
+    drafted = draft_garment(add_lining(add_interfacing(pattern, "interfacing"), "lining"))
+    steps = sewing_steps(drafted, "")
+    places = {
+        name: next(i for i, step in enumerate(steps) if text in step)
+        for name, text in {
+            "fuse": "Fuse the interfacing: front neck facing",
+            "zip": "Sew the invisible zip of 30 cm to both edges of A (centre back: back right to back left), from the upper edge",
+            "shoulders": "Sew the shoulders",
+            "facings": "Sew the facings to their edges",
+            "linings": "(centre back of the lining: back right lining to back left lining), open beside the zip",
+            "at the zip": "At the zip, turn in the edges and sew them to its tape by hand: back right neck right facing",
+            "ends": "Join the ends of bands and bindings",
+            "baste": "Baste the lining to the shell, wrong sides together: armhole.",
+            "bind": "Sew bands and bindings to their edges",
+            "hems": "Turn up and sew the hems: 3 cm (front, back right, back left)",
+        }.items()
+    }
+    assert list(places.values()) == sorted(places.values())
+    assert "then close the seam below it" in steps[places["zip"]]
+    # Nothing is finished twice, and no armhole is left raw.
+    assert not any("Finish the raw edges" in step for step in steps)
+    assert notions(drafted, "") == ("1 invisible zip of 30 cm",)
+    # The letters follow the steps.
+    assert seam_letters(drafted)["centre back"] == "A"
+    # A pattern that was written and read again is sewn alike.
+    again = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
+    assert sewing_steps(again, "") == steps
+    with printed_in(language_words("de")):
+        german = " ".join(sewing_steps(drafted, ""))
+    assert "Reißverschluss, 30 cm, an beide Kanten von A (hintere Mitte" in german
+    assert "Säume umschlagen und nähen: 3 cm (Vorderteil" in german
+
+
+@pytest.mark.parametrize(
+    ("opening", "expected"),
+    [
+        (SeamOpening(kind="vent", length=0.1), "Fold the vent of 10 cm below A to one side"),
+        (SeamOpening(kind="slit", length=0.1), "Turn in the edges of the slit of 10 cm below A"),
+        (SeamOpening(kind="buttons", length=0.2), "Close A (centre back: back right to back left) below the buttons"),
+        (
+            SeamOpening(kind="zip", length=0.2, begin=0.045, style="lapped"),
+            "Sew the lapped zip of 20 cm to both edges of A (centre back: back right to back left), from 4.5 cm below the upper edge",
+        ),
+        (SeamOpening(kind="zip", length=0.45, whole=True, style="lapped"), "all along."),
+    ],
+)
+def test_every_opening_has_a_step(opening: SeamOpening, expected: str):
+    steps = sewing_steps(draft_garment(top(opening)), "")
+    assert any(expected in step for step in steps)
+
+
+def test_a_zip_above_a_vent_is_closed_down_to_the_vent():
+    steps = sewing_steps(draft_garment(top(ZIP, SeamOpening(kind="vent", length=0.1))), "")
+    assert "then close the seam below it, down to the vent." in steps[0]
+    assert steps[1].startswith("Fold the vent of 10 cm")
+    with pytest.raises(InputError, match=r"unknown kind of opening 'zipp'; did you mean 'zip'\?"):
+        SeamOpening(kind="zipp", length=0.1)
+
+
+def test_a_band_that_is_shorter_than_its_edge_is_stretched():
+    band = Finishing(kind="band", edge="neck", width=0.02, share=0.85)
+    (step,) = [
+        step
+        for step in sewing_steps(draft_garment(finish_edges(top(), [band])), "")
+        if "bands" in step and "edges" in step
+    ]
+    assert step.endswith("stretch the neck band).")

@@ -1,0 +1,79 @@
+"""Patterns read from whichever file: pattern.json, the JSON of GarmentCode, DXF and SVG."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import make_file_name
+from warpflat.core.input_files import guarded
+from warpflat.export.pattern_json import pattern_from_json, read_pattern_data
+from warpflat.export.read_dxf import read_dxf
+from warpflat.export.read_garmentcode import garmentcode_pattern
+from warpflat.export.read_svg import read_svg
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.drafted import DraftedGarment
+from warpflat.pattern.pieces import Pattern
+
+__all__ = ["PATTERN_ENDINGS", "read_drafted", "read_pattern"]
+
+#: How the names of files of patterns end.
+PATTERN_ENDINGS = (".json", ".dxf", ".svg")
+
+
+def read_pattern(path: str | os.PathLike[str], *, allowance: float | None = None) -> Pattern:
+    """Read the pieces and seams of a pattern.
+
+    Args:
+        path: a pattern.json of the package, the JSON of GarmentCode, a DXF, or an SVG in true size.
+        allowance: from the cutting line to the sewing line [m], where a DXF or an SVG has no sewing line.
+
+    Raises:
+        InputError: the file cannot be read, or is no pattern.
+    """
+    ending = Path(path).suffix.lower()
+    if ending in (".dxf", ".svg"):
+        return (read_dxf if ending == ".dxf" else read_svg)(path, allowance=allowance)
+    found = _read_json(Path(path))
+    return found.garment if isinstance(found, DraftedGarment) else found
+
+
+def read_drafted(path: str | os.PathLike[str], *, allowance: float | None = None) -> DraftedGarment:
+    """Read a pattern that is ready to be written: a pattern.json, or the JSON of GarmentCode, whose lines stay as they are.
+
+    Args:
+        path: of the file.
+        allowance: [m] around the panels of GarmentCode, which has none; that of seams if not given.
+
+    Raises:
+        InputError: the file cannot be read, is no such pattern, or has allowances of its own.
+    """
+    found = _read_json(Path(path))
+    if isinstance(found, DraftedGarment):
+        if allowance is not None:
+            raise InputError(f"{path}: has allowances of its own; --allowance is for a pattern without")
+        return found
+    with guarded(Path(path), "pattern"):
+        wide = {
+            size: [
+                replace(
+                    piece,
+                    edges=[each if each.kind == "dart" else replace(each, allowance=allowance) for each in piece.edges],
+                )
+                for piece in row
+            ]
+            for size, row in found.pieces.items()
+        }
+        return draft_garment(replace(found, pieces=wide), true=False)
+
+
+def _read_json(path: Path) -> Pattern | DraftedGarment:
+    data = read_pattern_data(path)
+    if isinstance(data, Mapping) and "pattern" in data and "sizes" not in data:
+        with guarded(path, "pattern"):
+            return garmentcode_pattern(data, make_file_name(path.stem.removesuffix("_specification")))
+    with guarded(path, "JSON"):
+        return pattern_from_json(data)
