@@ -207,6 +207,10 @@ def sew(
             else:
                 note += ", and contact could not part it: cut it apart there"
             sewn[name] = replace(piece, notes=(*piece.notes, note))
+    offsets = dict[tuple[str, str], FloatArray]()
+    if state.network.seams is not None:
+        offset = state.network.seams.offset.numpy()
+        offsets = {key: offset[numbers] for key, numbers in _held(equations, kinds)}
     return Sewn(
         pieces=sewn,
         converged=converged,
@@ -219,7 +223,7 @@ def sew(
             *_fold_results(state, joined, folds, unsewn),
         ),
         seconds=seconds,
-        offsets=_offsets(state.network, equations, kinds),
+        offsets=offsets,
     )
 
 
@@ -230,16 +234,6 @@ def _held(
     lasting = (equations.soft == 0) | (equations.share > 0)
     for number, (name, kind) in enumerate(kinds):
         yield (kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32)
-
-
-def _offsets(
-    network: SpringNetwork, equations: ConstraintEquations, kinds: Sequence[tuple[str, str]]
-) -> dict[tuple[str, str], FloatArray]:
-    """Return the offsets of every group."""
-    if network.seams is None:
-        return {}
-    offset = network.seams.offset.numpy()
-    return {key: offset[own] for key, own in _held(equations, kinds)}
 
 
 def _constraint_equations(
