@@ -92,10 +92,10 @@ def add_lining(pattern: Pattern, cloth: str) -> Pattern:
         for piece in row:
             if piece.role == "facing":
                 # Its inner edge is a seam now.
-                own = [
+                outline = [
                     replace(each, kind="seam", allowance=None) if each.name == INNER else each for each in piece.edges
                 ]
-                piece = replace(piece, edges=own)
+                piece = replace(piece, edges=outline)
             lined.append(piece)
         for name in shell:
             piece = by_name[name]

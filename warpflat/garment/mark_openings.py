@@ -148,8 +148,8 @@ def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[flo
         whole: length of the seam [m].
     """
     count = max(1, round(whole / _SPACING))
-    own = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
-    kept = [each for each in own if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
+    spaced = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
+    kept = [each for each in spaced if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
     return tuple(sorted([*shares, *kept]))
 
 
@@ -182,10 +182,10 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, p
         length = min(opening.length, whole)
         depths = button_depths(opening.buttons, length, None if bust is None else part.before + bust, *counts)
         counts = [len(depths)]
-        own = depths[(depths >= part.before) & (depths < part.before + part.whole)] - part.before
+        here = depths[(depths >= part.before) & (depths < part.before + part.whole)] - part.before
         for name, edge in sides:
             pieces[size] = [
-                with_button_stand(each, edge, opening, length - part.before, own) if each.name == name else each
+                with_button_stand(each, edge, opening, length - part.before, here) if each.name == name else each
                 for each in pieces[size]
             ]
     at = pattern.piece(*(next(iter(sides))[0], pattern.sample)).edge(next(iter(sides))[1]).length

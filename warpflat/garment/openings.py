@@ -183,9 +183,9 @@ def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
 
 def one_sided(openings: Sequence[Opening]) -> bool:
     """Return whether some seam of one side of the body has an opening that its mirror image has not."""
-    own = {replace(opening, line=re.sub(r"\b(left|right)\b", "side", opening.line)) for opening in openings}
+    both_sides = {replace(opening, line=re.sub(r"\b(left|right)\b", "side", opening.line)) for opening in openings}
     sided = [opening for opening in openings if re.search(r"\b(left|right)\b", opening.line)]
-    return 2 * len([opening for opening in own if opening not in openings]) != len(set(sided))
+    return 2 * len([opening for opening in both_sides if opening not in openings]) != len(set(sided))
 
 
 def opened_rings(
