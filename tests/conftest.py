@@ -1,5 +1,6 @@
 """Tests run in two processes; each then keeps to one thread, so that they do not wait for each other."""
 
+import gc
 import os
 import signal
 import sys
@@ -12,6 +13,8 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("WARPFLAT_THREADS", "1")
 # As the command has it: threads of BLAS that wait for each other on a busy machine take several times the processor's time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# As the program has it: libraries make a million objects that stay, and Python's own numbers search them time and again.
+gc.set_threshold(50_000, 20, 100)
 # Processes that tests start would each compile the package anew, for a second or two, if none kept what it has compiled.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

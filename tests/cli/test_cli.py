@@ -176,7 +176,9 @@ def test_output_that_cannot_be_written_is_one_line(command: list[str]):
 @pytest.mark.skipif(os.name != "posix", reason="a shell closes standard error")
 @pytest.mark.parametrize("closed", ["2>&-", "2</dev/null"], ids=["closed", "read only"])
 def test_a_good_run_is_one_with_standard_error_closed_too(tmp_path: Path, closed: str):
-    (tmp_path / "cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 5\n" + BARE)
+    (tmp_path / "cap.toml").write_text(
+        "[surface]\nshape = 'dome'\nresolution = 5\n" + BARE + "[pattern]\nformats = []\n"
+    )
     command = f"{sys.executable} -m warpflat run {tmp_path / 'cap.toml'} --out {tmp_path / 'out'}"
     assert subprocess.run(["/bin/sh", "-c", f"{command} > {tmp_path / 'told'} {closed}"], check=False).returncode == 0
     assert "converged" in (tmp_path / "told").read_text()
@@ -263,9 +265,7 @@ def test_a_tube_is_cut_open_with_a_note_and_a_line_of_ones_own_is_checked(comman
 
 
 @pytest.mark.parametrize("suffix", ["ply", "stl", "glb", "usd", "usda", "usdc", "obj"])
-@pytest.mark.parametrize(
-    "content", [b"", os.urandom(64), bytes(range(255, -1, -1)) * 64], ids=["empty", "short", "long"]
-)
+@pytest.mark.parametrize("content", [b"", bytes(range(255, -1, -1)) * 64], ids=["empty", "long"])
 def test_noise_in_any_format_is_refused(command: Command, suffix: str, content: bytes):
     Path(f"noise.{suffix}").write_bytes(content)
     assert f"noise.{suffix}" in command("flatten", f"noise.{suffix}", "--units", "m").refusal

@@ -30,7 +30,8 @@ def test_activities_are_reported_to_the_innermost_listener():
 def test_a_run_reports_what_it_does_besides_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     Path("block.toml").write_text(
-        "form = 'a_line_skirt'\n[mannequin]\nsize = 'EU 38'\nresolution_mm = 40\n[marker]\nwidth = 1.5\nseconds = 1\n[output]\nframes = 0\n"
+        "form = 'a_line_skirt'\nhalf = true\n[mannequin]\nsize = 'EU 38'\nresolution_mm = 40\n"
+        "[marker]\nwidth = 1.5\nseconds = 1\n[output]\nframes = 0\n"
     )
     monkeypatch.setattr(
         "warpflat.core.beside.thread_count", lambda: 1

@@ -46,16 +46,16 @@ def test_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def steps_of(threads: int, *, triangles: bool) -> dict[str, np.ndarray]:
-    """Twenty steps of a bodice, on so many threads."""
+    """Twenty steps of a bodice, on so many threads, and the ranges that a launch has."""
     os.environ["WARPFLAT_THREADS"] = str(threads)
     surface = bodice(resolution=24, triangles=triangles)
     start = develop(surface, surface.lines["centre"]).positions
     network = SpringNetwork.build(surface, find_fabric("denim"), start, device="cpu")
     state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
-    assert len(state._advance.commands) == threads
     for _ in range(20):
         state.step()
     return {
+        "ranges": np.array(len(state._advance.commands)),
         "position": state.position.numpy().copy(),
         "velocity": state.velocity.numpy().copy(),
         "force": state.force.numpy().copy(),
@@ -72,11 +72,14 @@ def test_results_are_those_of_one_thread_bit_for_bit(triangles: bool, monkeypatc
     monkeypatch.setenv("WARPFLAT_THREADS", "1")
     monkeypatch.setattr("warpflat.core.launch._LEAST_RANGE", 64)
     expected = steps_of(1, triangles=triangles)
+    assert expected.pop("ranges") == 1
     assert np.ptp(expected["position"]) > 0.1
     assert np.abs(expected["face force"]).max() > 0
     for threads in (2, 3, 5):
-        for name, values in steps_of(threads, triangles=triangles).items():
-            np.testing.assert_array_equal(values, expected[name], err_msg=f"{name}, {threads} threads")
+        found = steps_of(threads, triangles=triangles)
+        assert found.pop("ranges") == threads
+        for name, values in expected.items():
+            np.testing.assert_array_equal(found[name], values, err_msg=f"{name}, {threads} threads")
 
 
 @wp.kernel

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import body_of_size
 from PIL import Image
 from pxr import Sdf, Usd, UsdGeom
 
@@ -22,7 +23,7 @@ from warpflat.draping.sewn_cloth import sew_cloth
 @pytest.fixture(scope="module")
 def bodice() -> warpflat.Garment:
     # 20 mm cells are too stiff at the armhole: it gapes by 14 mm there, by 20 mm on cells of 10 mm.
-    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=14.0)
+    body = body_of_size(14.0)
     return warpflat.flatten_form(body, body.form("bodice"), fabric="woven")
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import pytest
+from bodies import body_of_size
 from devices import DEVICE
 
 import warpflat
@@ -232,7 +233,7 @@ def test_an_open_outline_is_refused_beside_a_closed_one(tmp_path: Path):
 
 
 def test_a_pattern_in_the_wrong_units_is_refused():
-    body, fabric = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0), warpflat.find_fabric("woven")
+    body, fabric = body_of_size(30.0), warpflat.find_fabric("woven")
     with pytest.raises(InputError, match=r"the largest, is 0.5 by 0.2 mm; .* are its units right"):
         drape_pattern(tube(0.475e-3, 0.25e-3), body, fabric=fabric)
     with pytest.raises(InputError, match=r"goes 242 mm around the body, whose waist has 7\d\d mm: are its units right"):
@@ -240,7 +241,7 @@ def test_a_pattern_in_the_wrong_units_is_refused():
 
 
 def test_a_tube_is_put_around_the_body():
-    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    body = body_of_size(30.0)
     pattern = tube(0.475, 0.25)  # a little tight, so that it stays on the hips
     worn, _ = drape_pattern(
         pattern,
@@ -266,7 +267,7 @@ def test_a_tube_is_put_around_the_body():
 
 def test_a_gathered_skirt_goes_around_the_body_by_its_own_width():
     """Front and back lie before and behind the body, above each other, though the skirt is 1.6 times as wide as its top."""
-    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    body = body_of_size(30.0)
     top, skirt = tube(0.45, 0.2), tube(0.72, 0.5)
     names = {"front": "front skirt", "back": "back skirt"}
     lower = [replace(piece, name=names[piece.name]) for piece in skirt.pieces[""]]
@@ -309,7 +310,7 @@ def test_trousers_hang_from_the_waist_with_each_leg_on_its_side():
     # From the front's middle over the left side: with the mirrored edges, against the others.
     chain = tuple(side(piece, edge, mirrored=k, reversed=not k) for piece, edge, k in waist)
     seams.append(Seam(name="waist", sides=((side("band", "e1"),), chain)))
-    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    body = body_of_size(30.0)
     pieces, seams, _ = whole_pieces([*legs, band], seams)
     meshes, welds = mesh_pieces(pieces, seams, 0.03)
     placed = wrap_pieces(meshes, welds, body)
@@ -322,7 +323,7 @@ def test_trousers_hang_from_the_waist_with_each_leg_on_its_side():
 
 
 def test_a_tube_that_nothing_holds_falls_off():
-    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    body = body_of_size(30.0)
     with pytest.raises(InputError, match=r"falls off: nothing on the body holds the garment"):
         drape_pattern(
             tube(0.6, 0.25),

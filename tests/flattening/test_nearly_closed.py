@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.flattening.flatten_piece import flatten
-from warpflat.flattening.nearly_closed import nearly_closed_notes
+from warpflat.flattening.flatten_piece import flatten, nearly_closed_notes
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import bodice, dome

@@ -26,7 +26,8 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.output import write_mannequin
 from warpflat.surface.shapes import make_shape
 
-SCENE = "[surface]\nshape = 'dome'\nresolution = 13\n[output]\nframes = 4\n"
+# A bodice has four cuts to compare, a dome thirty-one.
+SCENE = "[surface]\nshape = 'bodice'\nresolution = 9\n[output]\nframes = 4\n"
 CUT = "[lines.across]\nplane = { point = [0, 0, 0], normal = [1, 0, 0] }\n"
 
 Files = dict[str, bytes]
@@ -91,7 +92,7 @@ def times(folder: Path) -> dict[Path, int]:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-@pytest.mark.parametrize("share", [0.0, 0.5, 0.95])
+@pytest.mark.parametrize("share", [0.0, 0.95])
 def test_a_full_disk_leaves_the_folder_as_it_was(
     name: str,
     share: float,

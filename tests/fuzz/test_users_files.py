@@ -26,7 +26,10 @@ from warpflat.scene.run import run_scene
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.shapes import make_shape
 
-SCENE = "[surface]\nshape = 'dome'\nresolution = 9\n[output]\nframes = 4\n[pattern]\nformats = ['svg', 'dxf', 'json']\n"
+# A bodice has four cuts to compare, a dome thirty-one.
+SCENE = (
+    "[surface]\nshape = 'bodice'\nresolution = 9\n[output]\nframes = 4\n[pattern]\nformats = ['svg', 'dxf', 'json']\n"
+)
 CUT = "[lines.across]\nplane = { point = [0, 0, 0], normal = [1, 0, 0] }\n"
 BATCH = (
     "scenes = ['cap.toml']\noverrides = [{ output = { picture = false, frames = 0 }, pattern = { formats = [] } }]\n"
@@ -153,12 +156,9 @@ resolution_mm = 40
 [wear]
 stretch_warp = 0.01
 [pattern]
-sizes = ["EU 38", "EU 40"]
 formats = ["dxf", "svg", "pdf", "json"]
 [output]
 frames = 4
-
-
 [marker]
 width = 1.5
 seconds = 1

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from bodies import body_of_size
 
 from warpflat.core.errors import InputError
 from warpflat.garment.button_stand import button_depths
@@ -17,7 +18,6 @@ from warpflat.garment.linings import add_interfacing
 from warpflat.garment.openings import Buttons, Opening, part_at_centres
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form
-from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.pieces import Pattern
 
@@ -28,17 +28,17 @@ FACING = Finishing(kind="facing", edge="neck", width=0.055)
 @pytest.fixture(scope="module")
 def bodice() -> Garment:
     """A bodice parted at centre front."""
-    mannequin = Mannequin.from_size("EU 38", resolution_mm=30.0)
+    mannequin = body_of_size(30.0)
     form = mannequin.form(part_at_centres(mannequin.layout, shipped_form("bodice"), [BUTTONED]))
     straight = [Straight(piece=name, line="centre front", along="warp") for name in ("front_left", "front_right")]
-    return flatten_form(mannequin, form, fabric="woven", constraints=straight)
+    return flatten_form(mannequin, form, fabric="woven", constraints=straight, curves_mm=0.0)
 
 
 @pytest.fixture(scope="module")
 def whole() -> Garment:
     """A bodice in two pieces."""
-    mannequin = Mannequin.from_size("EU 38", resolution_mm=30.0)
-    return flatten_form(mannequin, mannequin.form("bodice"), fabric="woven", sewn=True)
+    mannequin = body_of_size(30.0)
+    return flatten_form(mannequin, mannequin.form("bodice"), fabric="woven", sewn=True, curves_mm=0.0)
 
 
 def pattern_of(garment: Garment, *openings: Opening, finishing: tuple[Finishing, ...] = ()) -> Pattern:

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from bodies import body_of_size
 
 from warpflat.core.polyline import turning_angles
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.mannequin.mannequin import Mannequin
 
 
 @pytest.fixture(scope="module")
 def dress() -> Garment:
-    mannequin = Mannequin.from_size("EU 38", resolution_mm=30.0)
+    mannequin = body_of_size(30.0)
     return flatten_form(mannequin, mannequin.form("dress"), fabric="woven")
 
 

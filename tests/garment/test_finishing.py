@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
+from bodies import body_of_size
 
 from warpflat.core.errors import InputError
 from warpflat.garment.finishing import Finishing
@@ -13,7 +14,6 @@ from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.openings import Opening, part_at_centres
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form
-from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.pieces import Pattern
 
@@ -22,11 +22,11 @@ FACING = Finishing(kind="facing", edge="neck", width=0.055)
 
 
 def bodice(half: bool) -> Garment:
-    mannequin = Mannequin.from_size("EU 38", resolution_mm=30.0)
+    mannequin = body_of_size(30.0)
     form = shipped_form("bodice")
     if not half:
         form = part_at_centres(mannequin.layout, form, [ZIP])
-    return flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True)
+    return flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True, curves_mm=0.0)
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import body_of_size
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
@@ -13,7 +14,6 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.darts import FormDart
 from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
-from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.half_pieces import halved
@@ -25,7 +25,7 @@ from warpflat.surface.overlap import OVERLAP
 
 @pytest.fixture(scope="module")
 def body():
-    return Mannequin.from_size("EU 38", resolution_mm=20.0)
+    return body_of_size(20.0)
 
 
 @pytest.fixture(scope="module")
@@ -193,8 +193,7 @@ def test_a_dress_has_darts_with_two_tips(body):
             assert heights[0] < form.vertices[bust, 1].mean() - 0.01
             assert form.vertices[waist, 1].mean() - heights[-1] == pytest.approx(0.12, abs=0.03)
 
-    sewn = flatten_form(body, form)
-    plain = flatten_form(body, body.form(eased))
+    sewn, plain = (flatten_form(body, each, curves_mm=0.0) for each in (form, body.form(eased)))
     energy = [sum(p.stages[-1].model_energy_j for p in garment.pieces.values()) for garment in (sewn, plain)]
     assert energy[0] < 0.4 * energy[1]
     for name, piece in form.pieces.items():

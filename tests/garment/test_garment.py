@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bodies import body_of_size
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
@@ -33,7 +34,7 @@ from warpflat.surface.shapes import make_shape
 
 @pytest.fixture(scope="module")
 def mannequin() -> Mannequin:
-    return Mannequin.from_size("EU 38", resolution_mm=25.0)
+    return body_of_size(25.0)
 
 
 @pytest.fixture(scope="module")
@@ -84,12 +85,12 @@ def test_seams_match_and_say_what_that_costs(block: Garment, mannequin: Mannequi
 
 def test_mirrored_pieces_are_recognised_as_pairs(mannequin: Mannequin, block: Garment):
     assert block.pairs == ()
-    shirt = flatten_form(mannequin, mannequin.form("tshirt"), fabric="interlock")
+    shirt = flatten_form(mannequin, mannequin.form("tshirt"), fabric="interlock", curves_mm=0.0)
     assert shirt.pairs == (("sleeve_left", "sleeve_right"),)
     assert shirt.metrics()["pairs"] == [["sleeve_left", "sleeve_right"]]
     # Ease on one side only, and they are two patterns.
     wishes = [SeamWish(name="armhole left", factor=1.05)]
-    odd = flatten_form(mannequin, mannequin.form("tshirt"), fabric="interlock", wishes=wishes)
+    odd = flatten_form(mannequin, mannequin.form("tshirt"), fabric="interlock", wishes=wishes, curves_mm=0.0)
     assert odd.pairs == ()
 
 
@@ -116,7 +117,8 @@ def test_a_length_is_that_of_the_whole_line_on_a_half_piece_too(mannequin: Manne
     asked = [FixedLength(piece="front", line=line, length=length) for line, length in wanted.items()]
     lengths = []
     for half in (False, True):
-        made = flatten_form(mannequin, mannequin.form("skirt", half=half), fabric="woven", constraints=asked)
+        form = mannequin.form("skirt", half=half)
+        made = flatten_form(mannequin, form, fabric="woven", constraints=asked, curves_mm=0.0)
         piece = made.pieces["front"]
         lengths.append({line: polyline_length(piece.positions[piece.surface.lines[line]]) for line in wanted})
     assert lengths[0] == pytest.approx(wanted, abs=2e-4)
@@ -128,7 +130,7 @@ def test_a_half_with_a_low_neck_is_half_of_the_whole(top: str):
     """Alone it bends its fold by 17 and 20 mm: moved to a line, these vertices alone pressed faces at the neck until they mirrored."""
     bricks = [f"{top}-hip/front-*-centre", "shoulder-hip/front-*-side"]
     form = form_from_mapping("straps", {"pieces": {"front": {"bricks": bricks, "datum": "centre front"}}})
-    body = Mannequin.from_size("EU 38")
+    body = body_of_size(20.0)
     half, whole = (flatten_form(body, body.form(form, half=h), fabric="woven", curves_mm=0.0) for h in (True, False))
     assert half.sewn is not None
     assert half.sewn.converged
@@ -144,7 +146,7 @@ def test_a_half_with_a_low_neck_is_half_of_the_whole(top: str):
 
 @pytest.mark.parametrize("size", ["EU 36", "EU 44"])
 def test_seams_of_every_size_match_at_the_usual_resolution(size: str):
-    mannequin = Mannequin.from_size(size)
+    mannequin = body_of_size(20.0, size)
     garment = flatten_form(mannequin, mannequin.form("basic_block", half=True), fabric="woven")
     assert garment.sewn is not None
     assert garment.sewn.converged
@@ -204,7 +206,7 @@ def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):
         assert (tmp_path / f"{name}.obj").read_text().count("\nvt ") == len(block.pieces[name].positions)
 
 
-DRESS = "form = 'dress'\n[mannequin]\nsize = 'EU 38'\n"
+DRESS = "form = 'dress'\n[mannequin]\nsize = 'EU 38'\nresolution_mm = 40\n"
 
 
 @pytest.mark.parametrize(
@@ -279,7 +281,7 @@ def test_arguments_of_a_wrong_type_are_one_line(block: Garment, wrong: dict[str,
 def test_a_sewn_piece_is_not_edited_as_if_it_were_not(block: Garment, mannequin: Mannequin):
     """Its fullness, its folds and the other sides of its seams would be lost without a word."""
     wish = SeamWish(name="front waist", factor=1.5, gathered=True)
-    full = flatten_form(mannequin, block.form, fabric="woven", wishes=[wish]).pieces["front_skirt"]
+    full = flatten_form(mannequin, block.form, fabric="woven", wishes=[wish], curves_mm=0.0).pieces["front_skirt"]
     line = full.surface.lines["hip"]
     plan = CutPlan(name="hip", paths=(line,))
     for edit in (
@@ -299,7 +301,7 @@ def test_a_sewn_piece_is_not_edited_as_if_it_were_not(block: Garment, mannequin:
 
 def test_a_cut_is_offered_for_what_it_wins_and_not_for_what_sewing_does():
     """What is gathered here strains the back skirt's waist; the same skirt with a tiny dart, unsewn, fits, and so it does without."""
-    body = Mannequin.from_size("EU 38", resolution_mm=35.0)
+    body = body_of_size(35.0)
     wishes = [
         SeamWish(name="front waist", factor=1.5, gathered=True),
         SeamWish(name="back waist", factor=1.5, gathered=True),
@@ -353,7 +355,7 @@ def test_cuts_are_tried_with_the_options_of_the_run(monkeypatch: pytest.MonkeyPa
 def test_a_garment_on_own_measures_says_so(tmp_path: Path, size: str, title: str):
     path = tmp_path / "skirt.toml"
     path.write_text(
-        f"form = 'skirt'\nhalf = true\n[mannequin]\n{size}resolution_mm = 25\nmeasurements = {{ waist = 0.76, hip = 0.98 }}\n"
+        f"form = 'skirt'\nhalf = true\n[mannequin]\n{size}resolution_mm = 40\nmeasurements = {{ waist = 0.76, hip = 0.98 }}\n"
         "[output]\nframes = 0\npicture = false\n[pattern]\nformats = ['dxf', 'svg']\n"
     )
     run_scene(load_scene(path), tmp_path / "out")

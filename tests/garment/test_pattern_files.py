@@ -473,7 +473,7 @@ def test_another_size_that_went_wrong_is_a_warning(
         return replace(garment, pieces={"front": front, "back": back})
 
     monkeypatch.setattr("warpflat.scene.plan.flatten_form", flattened)
-    (tmp_path / "scene.toml").write_text(NEST.replace("[pattern]", "[pattern]\nformats = ['svg']"))
+    (tmp_path / "scene.toml").write_text("curves_mm = 0\n" + NEST.replace("[pattern]", "[pattern]\nformats = ['svg']"))
     assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), "--quiet"]) == 1
     warnings = capsys.readouterr().err.splitlines()
     assert len(warnings) == 3

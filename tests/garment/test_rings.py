@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import body_of_size
 
 from warpflat.core.arrays import FloatArray
 from warpflat.garment.girths import pattern_girths
@@ -17,7 +18,7 @@ from warpflat.mannequin.mannequin import Mannequin
 
 @pytest.fixture(scope="module")
 def mannequin() -> Mannequin:
-    return Mannequin.from_size("EU 38", resolution_mm=25.0)
+    return body_of_size(25.0)
 
 
 def on_body(form: FormResult) -> dict[str, FloatArray]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import body_of_size
 
 from warpflat.core.polyline import segment_lengths
 from warpflat.garment.constraints import Straight, straight_hems
@@ -17,7 +18,7 @@ from warpflat.mannequin.shapes import shaped_form
 
 @pytest.fixture(scope="module")
 def body() -> Mannequin:
-    return Mannequin.from_size("EU 38", resolution_mm=25.0)
+    return body_of_size(25.0)
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from bodies import body_of_size
 
-from warpflat import Mannequin
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.fit_report import fit_lines
 from warpflat.garment.tapes import stretch_tape
@@ -28,7 +28,7 @@ def test_a_tape_spans_hollows_and_turns_once() -> None:
 
 def test_ease_where_the_cloth_is_larger_and_strain_where_it_is_smaller() -> None:
     """A T-shirt without ease whose cloth is 4 % smaller than the body's own surface, but for a wider front at the hip."""
-    body = Mannequin.from_size("EU 38", resolution_mm=20)
+    body = body_of_size(20.0)
     form = body.form(form_from_mapping("tshirt", {"like": "tshirt", "ease": "moulage"}))
     knit, woven = find_fabric("interlock"), find_fabric("denim")
     positions = {name: piece.surface.vertices / 1.04 for name, piece in form.pieces.items()}

@@ -150,9 +150,9 @@ def test_values_are_carried_along_the_ways():
     assert 3.5 < both[6, 0] < 4.9
 
 
-def around_the_middle(turns: list[float], *, closed: bool) -> list[tuple[int, float, float, float]]:
-    """What is visited around vertex 0 on the line 5, 0, 2: vertices 1 to 6 lie around it anticlockwise, with these angles between them,
-    k m away, the last angle from 6 to 1 only if it is closed."""
+def around_the_middle(turns: list[float], *, closed: bool) -> list[tuple[int, int, float, float, float]]:
+    """What is visited around vertex 0 on the line 5, 0, 2, and from which place of the line: vertices 1 to 6 lie around it
+    anticlockwise, with these angles between them, k m away, the last angle from 6 to 1 only if it is closed."""
     count = 6 if closed else 5
     sides = np.array([[k + 1, (k + 1) % 6 + 1] for k in range(count)], dtype=np.int32)
     path, offset = np.array([5, 0, 2], dtype=np.int32), np.array([0, 0, count, count], dtype=np.int32)
@@ -166,8 +166,8 @@ def around_the_middle(turns: list[float], *, closed: bool) -> list[tuple[int, fl
         outputs=[visited, at, lies, number],
         device="cpu",
     )
-    assert (at[: number[0]] == 1).all()
-    return [(int(v), *row) for v, row in zip(visited[: number[0]], lies[: number[0]].tolist(), strict=True)]
+    count = number[0]
+    return [(v, a, *row) for v, a, row in zip(*(each[:count].tolist() for each in (visited, at, lies)), strict=True)]
 
 
 def test_vertices_beside_a_line_are_right_or_left_of_it_by_the_angles_between() -> None:
@@ -175,11 +175,11 @@ def test_vertices_beside_a_line_are_right_or_left_of_it_by_the_angles_between() 
     full = 2 * np.pi / sum(turns)
     expected = [
         # From 5 on, anticlockwise until 2, which is on the line, and clockwise.
-        *[(6, 1.0, 0.5 * full, 6.0), (1, 1.0, 1.5 * full, 1.0)],
-        *[(4, -1.0, 0.75 * full, 4.0), (3, -1.0, 1.75 * full, 3.0)],
+        *[(6, 1, 1.0, 0.5 * full, 6.0), (1, 1, 1.0, 1.5 * full, 1.0)],
+        *[(4, 1, -1.0, 0.75 * full, 4.0), (3, 1, -1.0, 1.75 * full, 3.0)],
         # From 2 on.
-        *[(3, -1.0, 0.25 * full, 3.0), (4, -1.0, 1.25 * full, 4.0)],
-        *[(1, 1.0, 0.5 * full, 1.0), (6, 1.0, 1.5 * full, 6.0)],
+        *[(3, 1, -1.0, 0.25 * full, 3.0), (4, 1, -1.0, 1.25 * full, 4.0)],
+        *[(1, 1, 1.0, 0.5 * full, 1.0), (6, 1, 1.0, 1.5 * full, 6.0)],
     ]
     np.testing.assert_allclose(around_the_middle(turns, closed=True), expected, rtol=1e-14)
 
@@ -188,9 +188,9 @@ def test_what_lies_beyond_a_border_or_half_a_turn_is_not_beside_a_line() -> None
     seen = around_the_middle([0.5, 2.0, 2.0, 0.75, 0.5, 0.0], closed=False)
     assert seen == [
         # On the left 4 is more than half a turn away from 2; on the right both are the last before the border.
-        (6, 1.0, 0.5, 6.0),
-        (4, -1.0, 0.75, 4.0),
-        (3, -1.0, 2.75, 3.0),
-        (3, -1.0, 2.0, 3.0),
-        (1, 1.0, 0.5, 1.0),
+        (6, 1, 1.0, 0.5, 6.0),
+        (4, 1, -1.0, 0.75, 4.0),
+        (3, 1, -1.0, 2.75, 3.0),
+        (3, 1, -1.0, 2.0, 3.0),
+        (1, 1, 1.0, 0.5, 1.0),
     ]

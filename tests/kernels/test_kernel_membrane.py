@@ -251,8 +251,8 @@ def test_the_grain_may_lie_at_any_angle(grain_angle: float):
     assert energies(network, points).sum() == pytest.approx(0.12 * density(CLOTH, F, grain_angle), rel=1e-9)
 
 
-def one_cell(F: FloatArray, fabric: Fabric) -> tuple[float, FloatArray]:
-    """Energy density and stresses of one triangle under F, with nothing meant."""
+def one_cell(F: FloatArray, fabric: Fabric) -> tuple[FloatArray, FloatArray]:
+    """Energy density of one triangle under F, with nothing meant, by either kernel that computes it; and stresses."""
     points = np.array([[0.0, 0.0], [0.1, 0.01], [0.03, 0.08]])
     surface = make_surface(worn(points, F, fold=False), [[0, 1, 2]])
     network = network_of(surface, fabric, points)
@@ -270,14 +270,15 @@ def one_cell(F: FloatArray, fabric: Fabric) -> tuple[float, FloatArray]:
         outputs=[strain, stress, energy, area],
         device=DEVICE,
     )
-    assert energies(network, points).sum() == pytest.approx(energy.numpy()[0], rel=1e-12, abs=1e-18)
-    return energy.numpy()[0] / area.numpy()[0], stress.numpy()[0]
+    both = np.array([energy.numpy()[0], energies(network, points).sum()])
+    return both / area.numpy()[0], stress.numpy()[0]
 
 
 @pytest.mark.parametrize("e", [-0.04, 0.005, 0.02, 0.035, 0.07, 0.15])
 def test_a_curve_is_followed_and_integrated(e: float):
     fabric = replace(CURVED, poisson_ratio=0.0)
     psi, stress = one_cell(np.diag([1.0, 1.0 + e]), fabric)
+    assert psi[1] == pytest.approx(psi[0], rel=1e-12)
     assert stress[0] == pytest.approx(float(fabric.tension(e, "warp")), rel=1e-9)
     path = np.linspace(0.0, e, 200_001)
     assert psi == pytest.approx(float(np.trapezoid(fabric.tension(path, "warp"), path)), rel=1e-8)
@@ -308,7 +309,7 @@ def test_threads_lock_once_they_are_sheared_by_45_degrees():
     assert locked == pytest.approx(free + 0.5 * 300.0 * beyond**2, rel=1e-9)
     assert stress[2] == pytest.approx(CLOTH.shear_stiffness * np.sin(np.radians(80.0)) + 300.0 * beyond, rel=1e-9)
     other, back = one_cell(sheared(-80.0), CLOTH)
-    assert (other, back[2]) == pytest.approx((locked, -stress[2]), rel=1e-9)
+    np.testing.assert_allclose([*other, back[2]], [*locked, -stress[2]], rtol=1e-9)
 
 
 def test_pressed_cloth_wrinkles():

@@ -25,7 +25,7 @@ def dress():
 
 @pytest.fixture(scope="module", params=[False, True], ids=["two_way", "one_way"])
 def marker(dress, request):
-    return make_marker(dress, Cloth(width=1.4, one_way=request.param), sizes={"38": 1}, seconds=2), request.param
+    return make_marker(dress, Cloth(width=1.4, one_way=request.param), sizes={"38": 1}, seconds=1), request.param
 
 
 def test_every_copy_lies_on_the_cloth_and_none_on_another(marker):
@@ -117,7 +117,7 @@ def test_a_half_on_the_fold_is_cut_whole(dress):
 
 
 def test_reversible_cloth_may_cut_both_of_a_pair_one_way_up(dress):
-    plan = make_marker(dress, Cloth(width=1.4, reversible=True), sizes={"38": 1}, seconds=2)
+    plan = make_marker(dress, Cloth(width=1.4, reversible=True), sizes={"38": 1}, seconds=1)
     assert len(plan.placements) == 8
     assert plan.utilisation > 0.6
 

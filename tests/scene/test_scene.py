@@ -288,8 +288,10 @@ def made_light(scene: Scene) -> Scene:
     settings = scene.settings
     if settings.mannequin is not None and settings.mannequin.size is not None:
         settings = settings.model_copy(
-            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 25.0})}
+            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 40.0})}
         )
+    if settings.marker is not None:
+        settings = settings.model_copy(update={"marker": settings.marker.model_copy(update={"seconds": 1})})
     if scene.name in DRAWN:
         return replace(scene, settings=settings)
     output = settings.output.model_copy(update={"frames": 0, "picture": False})

@@ -292,7 +292,7 @@ def test_the_command_compares_cuts_and_applies_one(
 ):
     monkeypatch.chdir(tmp_path)
     Path("b.toml").write_text(
-        'datum = "centre"\nfabric = "woven"\n[surface]\nshape = "bodice"\nresolution = 17\n'
+        'datum = "centre"\nfabric = "woven"\n[surface]\nshape = "bodice"\nresolution = 9\n'
         "[output]\nframes = 0\npicture = false\n"
     )
     assert main(["cuts", "b.toml"]) == 0

@@ -126,9 +126,7 @@ def run(
 
 
 @pytest.mark.parametrize("shear", [200.0, 20.0])
-@pytest.mark.parametrize(
-    ("shape", "resolution"), [("dome", 17), ("saddle", 17), ("hemisphere", 17), ("dome", 33), ("hemisphere", 33)]
-)
+@pytest.mark.parametrize(("shape", "resolution"), [("saddle", 17), ("hemisphere", 17), ("dome", 33)])
 def test_any_time_step_reaches_the_same_minimum_and_never_more_energy_than_at_the_start(shape, resolution, shear):
     """The paper's Fig. 4."""
     network, start = developed(make_shape(shape, resolution=resolution), shear)
@@ -140,8 +138,7 @@ def test_any_time_step_reaches_the_same_minimum_and_never_more_energy_than_at_th
         assert last_step_off(potential, least) < steps, f"h = {time_step:g} s"
 
 
-@pytest.mark.parametrize("shear", [200.0, 20.0])
-@pytest.mark.parametrize("shape", ["dome", "saddle", "hemisphere"])
+@pytest.mark.parametrize(("shape", "shear"), [("dome", 200.0), ("saddle", 20.0), ("hemisphere", 20.0)])
 def test_so_does_the_plain_iteration_in_more_steps(shape, shear):
     network, start = developed(make_shape(shape, resolution=17), shear)
     least = relax_by_steps(Relaxation(network, TIGHT, start=start)).energies.potential

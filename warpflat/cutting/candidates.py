@@ -18,7 +18,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import points_at_lengths
 from warpflat.flattening.result import Flattening
 from warpflat.surface.curvature import curvature_tensors
-from warpflat.surface.energy_map import EnergyMap, energy_map, smooth_to_vertices
+from warpflat.surface.energy_map import EnergyMap, energy_map, energy_peak, smooth_to_vertices
 from warpflat.surface.half_edges import border_edges, edge_faces
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, path_length
@@ -100,7 +100,9 @@ def find_peaks(result: Flattening, *, landmarks: Mapping[str, int] | None = None
     whole = energy_map(
         surface, result.face_energy_density, smoothing_length=_SMOOTHING * size, landmarks=dict(landmarks or {})
     )
-    words = tuple(_place_in_words(surface, vertex, landmarks) for vertex in chosen)
+    spikes = np.zeros((len(chosen), len(surface.vertices)))
+    spikes[np.arange(len(chosen)), chosen] = 1.0
+    words = tuple(energy_peak(surface, spike, landmarks=dict(landmarks or {})).words for spike in spikes)
     return Peaks(map=whole, vertices=tuple(chosen), words=words)
 
 
@@ -143,11 +145,15 @@ def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Can
             continue
         lengths = _cut_length(result.surface, a), _cut_length(result.surface, b)
         shared = {int(v) for path in a.paths for v in path} & {int(v) for path in b.paths for v in path}
-        if (
-            shared
-            or abs(lengths[0] - lengths[1]) > _ALIKE * max(lengths)
-            or not _mirror_each_other(result.surface, a, b)
-        ):
+        if shared or abs(lengths[0] - lengths[1]) > _ALIKE * max(lengths):
+            continue
+        # Two cuts that mirror each other have ends at equal distances across.
+        (begin, tip), (other_begin, other_tip) = (
+            result.surface.vertices[one.paths[0][[0, -1]]] if one.paths else one.drawn[0].points[[0, -1]]
+            for one in (a, b)
+        )
+        across = np.linalg.norm(begin - other_tip) - np.linalg.norm(tip - other_begin)
+        if abs(across) > _ALIKE * _diagonal(result.surface):
             continue
         along = a.name.rpartition(" from ")[0]
         same = along and b.name.startswith(f"{along} from ")
@@ -174,18 +180,11 @@ def _border(result: Flattening) -> BoolArray:
     return flags
 
 
-def _place_in_words(surface: Surface, vertex: int, landmarks: Mapping[str, int] | None) -> str:
-    from warpflat.surface.energy_map import energy_peak
-
-    spike = np.zeros(len(surface.vertices))
-    spike[vertex] = 1.0
-    return energy_peak(surface, spike, landmarks=dict(landmarks or {})).words
-
-
 def _along_line(result: Flattening, name: str, line: IntArray, peaks: Peaks) -> list[Candidate]:
     """Return the parts of an uncut line from the border to the peaks near it, and the whole line."""
-    surface = result.surface
+    surface, size = result.surface, _diagonal(result.surface)
     on_border = _border(result)
+    rim = {int(v) for v in border_edges(surface.faces).ravel()}
     if line[0] == line[-1] or np.count_nonzero(on_border[line[1:-1]]) > 0.5 * (len(line) - 2):
         return []
     points = surface.vertices[line]
@@ -194,59 +193,36 @@ def _along_line(result: Flattening, name: str, line: IntArray, peaks: Peaks) -> 
     for number, peak in enumerate(peaks.vertices):
         distance = np.linalg.norm(points - surface.vertices[peak], axis=1)
         station = int(np.argmin(distance))
-        if distance[station] > _REACH * _diagonal(surface) or on_border[line[station]]:
+        if distance[station] > _REACH * size or on_border[line[station]]:
             continue
         passes_peak = True
         for part, end in ((line[: station + 1], "its start"), (line[station:][::-1], "its end")):
-            path = _path_to_peak(result, part, on_border, peaks, number)
-            if path is not None:
-                begin = _border_line(surface, name, int(path[0])) or end
-                found.append(Candidate(name=f"{name} from {begin}", paths=(path,), peaks=(number,)))
+            # The cut begins at the vertex of a border or a crack that is nearest to the peak.
+            outwards = np.flatnonzero(on_border[part[::-1]])
+            if not len(outwards):
+                continue
+            path = part[len(part) - 1 - int(outwards[0]) :]
+            if path_length(surface, [path]) <= _SHORTEST * size or not _is_free(result, path):
+                continue
+            others = [other for k, other in enumerate(peaks.vertices) if k != number]
+            if any(_distance(surface, path, other) < _REACH * size for other in others):
+                # It would run through another peak to this one; the part up to that is a candidate of its own.
+                continue
+            # It is named after the border line that it begins on.
+            begins = (
+                border
+                for border, row in surface.lines.items()
+                if border != name and path[0] in row and all(int(v) in rim for v in row)
+            )
+            found.append(Candidate(name=f"{name} from {next(begins, end)}", paths=(path,), peaks=(number,)))
     crosses = on_border[line[[0, -1]]].all() and not on_border[line[1:-1]].any()
     if passes_peak and crosses and _is_free(result, line):
         found.append(Candidate(name=f"{name}, whole", paths=(line,)))
     return found
 
 
-def _path_to_peak(
-    result: Flattening, part: IntArray, on_border: BoolArray, peaks: Peaks, number: int
-) -> IntArray | None:
-    """Return the path from the border to a peak along a part of a line that ends there; None if there is no such cut.
-
-    Args:
-        result: the piece.
-        part: vertices of the line, the last one at the peak.
-        on_border: #V, whether a vertex is on the border or on a crack.
-        peaks: of the piece.
-        number: of the peak.
-    """
-    surface = result.surface
-    size = _diagonal(surface)
-    # The cut begins at the vertex of a border or a crack that is nearest to the peak.
-    outwards = np.flatnonzero(on_border[part[::-1]])
-    if not len(outwards):
-        return None
-    path = part[len(part) - 1 - int(outwards[0]) :]
-    if path_length(surface, [path]) <= _SHORTEST * size or not _is_free(result, path):
-        return None
-    others = [other for k, other in enumerate(peaks.vertices) if k != number]
-    if any(_distance(surface, path, other) < _REACH * size for other in others):
-        # It would run through another peak to this one; the part up to that is a candidate of its own.
-        return None
-    return path
-
-
 def _distance(surface: Surface, path: IntArray, vertex: int) -> float:
     return float(np.linalg.norm(surface.vertices[path] - surface.vertices[vertex], axis=1).min())
-
-
-def _border_line(surface: Surface, own: str, vertex: int) -> str | None:
-    """Return the name of another line along the border that holds this vertex."""
-    border = {int(v) for v in border_edges(surface.faces).ravel()}
-    for name, line in surface.lines.items():
-        if name != own and vertex in line and all(int(v) in border for v in line):
-            return name
-    return None
 
 
 def _is_free(result: Flattening, path: IntArray) -> bool:
@@ -303,49 +279,45 @@ def _cuts_inwards(result: Flattening, number: int, peaks: Peaks) -> list[Candida
 
     The cloth along a border is too long or too short because of the curvature behind it; that is what a cut has to reach.
     """
-    surface = result.surface
+    surface, size = result.surface, _diagonal(result.surface)
     outside = np.unique(border_edges(surface.faces))
     start = int(
         outside[np.argmin(np.linalg.norm(surface.vertices[outside] - surface.vertices[peaks.vertices[number]], axis=1))]
     )
     made = [path for one in result.cuts for path in one.paths]
-    if any(_distance(surface, path, start) < _REACH * _diagonal(surface) for path in made):
+    if any(_distance(surface, path, start) < _REACH * size for path in made):
         # It would leave a strip between itself and that cut.
         return []
-    curved = _curved_places(surface)
+    # The curved part: where the Gaussian curvature times the distance to the border peaks.
+    tensor = curvature_tensors(surface)
+    trace = np.trace(tensor, axis1=1, axis2=2)
+    gauss = np.abs(0.5 * (trace**2 - np.einsum("vij,vji->v", tensor, tensor)))
+    used = surface.faces >= 0
+    of_faces = np.where(used, gauss[surface.faces], 0.0).sum(axis=1) / used.sum(axis=1)
+    value = smooth_to_vertices(surface, of_faces, smoothing_length=2 * _SMOOTHING * size) * distance_from(
+        surface, outside
+    )
+    # Only what is higher than its neighbours, not what lies high on the flank of a peak.
+    a, b = EdgeGraph(surface).edges.T
+    is_peak = np.ones(len(value), dtype=bool)
+    is_peak[a[value[a] < value[b]]] = is_peak[b[value[b] < value[a]]] = False
+    curved = _highest(surface, np.where(is_peak, value, 0.0), apart=_APART * size)
     if not curved:
         return []
     nearest = np.argmin(np.linalg.norm(surface.vertices[curved] - surface.vertices[start], axis=1))
     found = []
     for kind, share in _INWARDS.items():
         try:
-            way = polyline_path(surface, [start, curved[nearest]])
-            point = points_at_lengths(way.points, share * way.length)
+            whole = polyline_path(surface, [start, curved[nearest]])
+            point = points_at_lengths(whole.points, share * whole.length)
             tip = int(np.argmin(np.linalg.norm(surface.vertices - point, axis=1)))
             drawn = polyline_path(surface, [start, tip])
         except InputError:
             continue
-        if drawn.length > _SHORTEST * _diagonal(surface):
+        if drawn.length > _SHORTEST * size:
             name = f"{kind} {_last_number(result, 'inward') + number + 1}"
             found.append(Candidate(name=name, drawn=(drawn,), peaks=(number,)))
     return found
-
-
-def _curved_places(surface: Surface) -> list[int]:
-    """Return the vertices where curvature times the distance to the border peaks, highest first."""
-    size = _diagonal(surface)
-    tensor = curvature_tensors(surface)
-    trace = np.trace(tensor, axis1=1, axis2=2)
-    gauss = np.abs(0.5 * (trace**2 - np.einsum("vij,vji->v", tensor, tensor)))
-    used = surface.faces >= 0
-    of_faces = np.where(used, gauss[surface.faces], 0.0).sum(axis=1) / used.sum(axis=1)
-    curved = smooth_to_vertices(surface, of_faces, smoothing_length=2 * _SMOOTHING * size)
-    value = curved * distance_from(surface, np.unique(border_edges(surface.faces)))
-    # Only what is higher than its neighbours, not what lies high on the flank of a peak.
-    a, b = EdgeGraph(surface).edges.T
-    is_peak = np.ones(len(value), dtype=bool)
-    is_peak[a[value[a] < value[b]]] = is_peak[b[value[b] < value[a]]] = False
-    return _highest(surface, np.where(is_peak, value, 0.0), apart=_APART * size)
 
 
 def _highest(surface: Surface, height: FloatArray, *, apart: float) -> list[int]:
@@ -392,10 +364,3 @@ def _corners(points: FloatArray, stray: float) -> list[int]:
 
 def _cut_length(surface: Surface, one: Candidate) -> float:
     return path_length(surface, one.paths) + sum(path.length for path in one.drawn)
-
-
-def _mirror_each_other(surface: Surface, a: Candidate, b: Candidate) -> bool:
-    """Return whether two cuts mirror each other in a plane, by the distances between their ends."""
-    ends = [(surface.vertices[one.paths[0][[0, -1]]] if one.paths else one.drawn[0].points[[0, -1]]) for one in (a, b)]
-    across = np.linalg.norm(ends[0][0] - ends[1][1]) - np.linalg.norm(ends[0][1] - ends[1][0])
-    return bool(abs(across) <= _ALIKE * _diagonal(surface))

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import polyline_length
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.progress import CONTACT
@@ -19,7 +19,6 @@ from warpflat.solver.contact import Barrier
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.injective import border_edges_of
-from warpflat.surface.mesh import Surface
 
 __all__ = ["TRIAL_TOLERANCE", "contact_note", "cut_between_contacts"]
 
@@ -70,8 +69,8 @@ def contact_note(result: Flattening) -> str | None:
 def cut_between_contacts(result: Flattening) -> IntArray | None:
     """Return a cut across a piece between the two places of its border that press on each other; None if none do.
 
-    They part their border loop into two ways. The cut is the shortest path along edges between the middle halves of both; where they lie
-    on two loops, between these.
+    They part their border loop into two arcs. The cut is the shortest path along edges inside between the middle halves of both; where
+    they lie on two loops, between these.
 
     Returns:
         Vertices of the uncut surface.
@@ -86,28 +85,19 @@ def cut_between_contacts(result: Flattening) -> IntArray | None:
     a, b = at[touch[:, 0]], at[touch[:, 1]]
     one_loop = edges.first[a] == edges.first[b]
     apart = np.abs(a - b)
-    way = np.where(one_loop, np.minimum(apart, edges.count[a] - apart), np.iinfo(np.int32).max)
-    low, high = sorted(int(end[way.argmax()]) for end in (a, b))
+    around = np.where(one_loop, np.minimum(apart, edges.count[a] - apart), np.iinfo(np.int32).max)
+    low, high = sorted(int(end[around.argmax()]) for end in (a, b))
     loops = [np.arange(edges.first[end], edges.first[end] + edges.count[end]) for end in (low, high)]
     if edges.first[low] == edges.first[high]:
         turn = np.roll(loops[0], -(low - loops[0][0]))
-        ways = [_middle_half(surface, edges.tail[part]) for part in (turn[: high - low], turn[high - low :])]
+        halves = []
+        for arc in (edges.tail[turn[: high - low]], edges.tail[turn[high - low :]]):
+            station = arc_lengths(surface.vertices[arc])
+            middle = np.abs(station - 0.5 * station[-1]) <= 0.25 * station[-1]
+            halves.append(arc[middle] if middle.any() else arc[len(arc) // 2 : len(arc) // 2 + 1])
     else:
-        ways = [edges.tail[loop] for loop in loops]
-    path = _path_between(surface, *ways)
-    return None if path is None else result.vertex_origin[path]
-
-
-def _middle_half(surface: Surface, vertices: IntArray) -> IntArray:
-    """Return the vertices on the middle half of a way along the border."""
-    step = np.linalg.norm(np.diff(surface.vertices[vertices], axis=0), axis=1)
-    station = np.concatenate([[0.0], np.cumsum(step)])
-    middle = np.abs(station - 0.5 * station[-1]) <= 0.25 * station[-1]
-    return vertices[middle] if middle.any() else vertices[len(vertices) // 2 : len(vertices) // 2 + 1]
-
-
-def _path_between(surface: Surface, sources: IntArray, targets: IntArray) -> IntArray | None:
-    """Return the shortest path from one set of border vertices to another along edges inside; None if there is none."""
+        halves = [edges.tail[loop] for loop in loops]
+    sources, targets = halves
     he = half_edges_of(surface)
     on_border = np.zeros(len(surface.vertices), dtype=bool)
     on_border[border_of(surface)] = True
@@ -116,13 +106,13 @@ def _path_between(surface: Surface, sources: IntArray, targets: IntArray) -> Int
     inside = he.edges[(~on_border | ends)[he.edges].all(axis=1) & ~on_border[he.edges].all(axis=1)]
     length = np.linalg.norm(surface.vertices[inside[:, 1]] - surface.vertices[inside[:, 0]], axis=1)
     graph = csr_array((length, inside.T), shape=(len(on_border), len(on_border)))
-    way, before, _ = dijkstra(graph, directed=False, indices=sources, min_only=True, return_predecessors=True)
-    end = int(targets[way[targets].argmin()])
-    if not np.isfinite(way[end]):
+    far, before, _ = dijkstra(graph, directed=False, indices=sources, min_only=True, return_predecessors=True)
+    end = int(targets[far[targets].argmin()])
+    if not np.isfinite(far[end]):
         return None
     path = [end]
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
     # A path through an end of the same side would touch the border twice.
     row = np.array(path, dtype=np.int32)
-    return row if not on_border[row[1:-1]].any() else None
+    return None if on_border[row[1:-1]].any() else result.vertex_origin[row]

@@ -121,11 +121,11 @@ def make_cuts(surface: Surface, plans: Sequence[CutPlan]) -> CutSurface:
         AppliedCut(
             name=plan.name,
             paths=tuple(np.asarray(path, dtype=np.int32) for path in plan.paths),
-            seams=tuple(own),
+            seams=tuple(cracks),
             length=path_length(surface, plan.paths),
             tip_back=plan.tip_back,
         )
-        for plan, own in zip(plans, seams, strict=True)
+        for plan, cracks in zip(plans, seams, strict=True)
     ]
     # The relaxation uses what the cut has found out of the new faces.
     cut_surface = replace(apply_cut(surface, topology), of_faces=topology.of_faces)

@@ -103,14 +103,14 @@ def without_overlaps(plans: Sequence[CutPlan]) -> tuple[list[CutPlan], list[str]
     taken: set[tuple[int, ...]] = set()
     left, shorter = list[CutPlan](), list[str]()
     for plan in plans:
-        own = [tuple(sorted(edge)) for path in plan.paths for edge in pairwise(path.tolist())]
-        if taken.isdisjoint(own):
+        edges = [tuple(sorted(edge)) for path in plan.paths for edge in pairwise(path.tolist())]
+        if taken.isdisjoint(edges):
             left.append(plan)
         else:
             shorter.append(plan.name)
             if paths := [run for path in plan.paths for run in _without_edges(path, taken)]:
                 left.append(replace(plan, paths=tuple(paths)))
-        taken.update(own)
+        taken.update(edges)
     return left, shorter
 
 

@@ -68,8 +68,8 @@ def _part(result: Flattening, piece: CutPart) -> Flattening:
     )
     # The cut surface keeps the numbers of the uncut one first, then the copies.
     first = {int(v): i for i, v in reversed(list(enumerate(origin.tolist())))}
-    own = [first[v] for v in range(len(used))]
-    order = np.array(own + sorted(set(range(len(origin))) - set(own)), dtype=np.int64)
+    originals = [first[v] for v in range(len(used))]
+    order = np.array(originals + sorted(set(range(len(origin))) - set(originals)), dtype=np.int64)
     place = np.empty(len(order), dtype=np.int32)
     place[order] = np.arange(len(order), dtype=np.int32)
     cut_surface = replace(

@@ -15,7 +15,6 @@ from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.flattening.result import Flattening
 from warpflat.garment.darts import dart_pairs
 from warpflat.garment.garment import Garment
-from warpflat.mannequin.forms import FormResult
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.triangles import corner_triangles
 
@@ -117,7 +116,14 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
     """
     if isinstance(garment, Garment):
         pieces = dict(garment.pieces)
-        seams = [*([] if garment.form is None else _seams_of_form(garment.form)), *seams]
+        if garment.form is not None:
+            folded = [name for name, piece in garment.form.pieces.items() if piece.fold]
+            if folded:
+                raise InputError(
+                    f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
+                )
+            runs = [(seam.pieces, run.vertices) for seam in garment.form.seams for run in seam.runs]
+            seams = [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(garment.form)), *seams]
     else:
         given = [garment] if isinstance(garment, Flattening) else list(garment)
         pieces = {piece.surface.name: piece for piece in given}
@@ -172,14 +178,3 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
             for line, ids in piece.network.surface.lines.items()
         },
     )
-
-
-def _seams_of_form(form: FormResult) -> list[Seam]:
-    """Return the seams of a form's pieces, the legs of their darts among them."""
-    folded = [name for name, piece in form.pieces.items() if piece.fold]
-    if folded:
-        raise InputError(
-            f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
-        )
-    runs = [(seam.pieces, run.vertices) for seam in form.seams for run in seam.runs]
-    return [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(form))]

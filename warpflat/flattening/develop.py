@@ -100,16 +100,16 @@ def develop(surface: Surface, datum: IntArray) -> Development:
     flat = flat_layout(surface, datum)
     if flat is not None and len(_mirrored(cells, flat)) == 0:
         return Development(positions=flat, method="flat")
-    ways = (("profiles", profile_layout), ("geodesic", geodesic_layout))
+    methods = (("profiles", profile_layout), ("geodesic", geodesic_layout))
     closed = close_cracks(surface, datum)
     if closed is not None:
         whole, index = closed
-        for method, layout in ways:
+        for method, layout in methods:
             positions = layout(whole, index[datum])
             if positions is not None and len(_mirrored(cells, positions[index])) == 0:
                 notes.append("developed with its cracks closed")
                 return Development(positions=positions[index], method=method, notes=tuple(notes))
-    for method, layout in ways:
+    for method, layout in methods:
         positions = layout(surface, datum)
         if positions is None:
             continue

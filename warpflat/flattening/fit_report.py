@@ -187,8 +187,15 @@ def wearer_words(wearer: Mapping[str, Any], *, draped: bool = False) -> str:
 
     Whether a garment fits that was draped is said by its drape.
     """
+    # Levels of a left and a right limb are one where they are equal within 0.5 mm and 0.05 %.
+    levels, found = wearer["levels"], dict[str, Mapping[str, Any]]()
+    for name, level in levels.items():
+        both, _, side = name.rpartition(" ")
+        other = levels.get(f"{both} {'left' if side == 'right' else 'right'}")
+        same = other is not None and all(abs(level[key] - other[key]) < 5e-4 for key in ("ease_m", "strain"))
+        found[both if same else name] = level
     tight, loose = [], []
-    for name, level in _once_a_pair(wearer["levels"]).items():
+    for name, level in found.items():
         ease = f"{name} {100 * level['ease_m']:+.1f} cm"
         if level["strain"] == 0.0:
             loose.append(ease)
@@ -197,17 +204,6 @@ def wearer_words(wearer: Mapping[str, Any], *, draped: bool = False) -> str:
         tight.append(f"{ease} ({100 * level['strain']:.1f} %, {pressure:,.0f} Pa)")
     words = "; ".join(f"{word} at {', '.join(row)}" for word, row in (("stretched", tight), ("ease", loose)) if row)
     return f"wearer: {words}" if draped else f"wearer: fits: {'yes' if wearer['fits'] else 'no'} ({words})"
-
-
-def _once_a_pair(levels: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
-    """Return levels by name, those of left and right limbs as one where they are equal within 0.5 mm and 0.05 %."""
-    found = {}
-    for name, level in levels.items():
-        both, _, side = name.rpartition(" ")
-        other = levels.get(f"{both} {'left' if side == 'right' else 'right'}")
-        same = other is not None and all(abs(level[key] - other[key]) < 5e-4 for key in ("ease_m", "strain"))
-        found[both if same else name] = level
-    return found
 
 
 def wearer_places(wearer: Mapping[str, Any]) -> str:

@@ -66,11 +66,13 @@ def flatten_all(
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
 
     def develop(number: int, surface: Surface | str | Path) -> DevelopedPiece:
-        own = as_surface(surface, units)
+        piece = as_surface(surface, units)
         try:
-            return develop_piece(own, datums[number], settings, None if callback is None else partial(callback, number))
+            return develop_piece(
+                piece, datums[number], settings, None if callback is None else partial(callback, number)
+            )
         except InputError as error:
-            named = repr(own.name) in str(error)
-            raise InputError(str(error) if named else f"piece {own.name!r} (surface {number}): {error}") from None
+            named = repr(piece.name) in str(error)
+            raise InputError(str(error) if named else f"piece {piece.name!r} (surface {number}): {error}") from None
 
     return [relax_developed(piece) for piece in [develop(number, surface) for number, surface in enumerate(surfaces)]]

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, expect, expect_callback, nearest
@@ -19,7 +21,6 @@ from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
 from warpflat.flattening.develop import Development
 from warpflat.flattening.keep_apart import keep_apart
-from warpflat.flattening.nearly_closed import nearly_closed_notes
 from warpflat.flattening.progress import Progress, Stage
 from warpflat.flattening.relax_piece import relax_piece
 from warpflat.flattening.relaxation_task import RelaxationTask
@@ -30,10 +31,16 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, unused_stretch
 from warpflat.solver.options import RelaxOptions, given_options
+from warpflat.surface.connectivity import border_of
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface
+from warpflat.surface.triangles import triangulate
 
-__all__ = ["flatten"]
+__all__ = ["flatten", "nearly_closed_notes"]
+
+# A border that lies flat around an area has a square of at least 4 pi times that; of half as much it is a hemisphere's.
+_LEAST_SHARE = 0.5
 
 
 def flatten(
@@ -247,3 +254,30 @@ def _device(name: str | None) -> wp.Device:
     except Exception as error:
         devices: Sequence[str] = [d.alias for d in wp.get_devices()]
         raise InputError(f"device {name!r} is not available; {nearest(str(name), devices)}") from error
+
+
+def nearly_closed_notes(surface: Surface) -> list[str]:
+    """Return a note on a piece whose border is too short for its area, naming the cut that would make a pattern of it.
+
+    The cut runs along edges from the border to the vertex farthest from it. Without it the piece is flattened all the same, but
+    the cloth would have to stretch by a multiple.
+    """
+    he = half_edges_of(surface)
+    length = np.linalg.norm(surface.vertices[he.edges[:, 1]] - surface.vertices[he.edges[:, 0]], axis=1)
+    border = float(length[he.count == 1].sum())
+    a, b, c = surface.vertices[triangulate(surface.faces)[0]].transpose(1, 0, 2)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    if border == 0.0 or border**2 >= _LEAST_SHARE * 4.0 * np.pi * area:
+        return []
+    count = len(surface.vertices)
+    graph = csr_array((length, he.edges.T), shape=(count, count))
+    away, _, source = dijkstra(
+        graph, directed=False, indices=border_of(surface), min_only=True, return_predecessors=True
+    )
+    away = np.where(np.isfinite(away), away, -1.0)
+    tip = int(away.argmax())
+    first, last = (int(surface.input_index[vertex]) for vertex in (source[tip], tip))
+    return [
+        f"the piece is nearly closed: its border of {100 * border:.1f} cm is too short to lie flat around {1e4 * area:.0f} cm2; a cut "
+        f"of {100 * away[tip]:.1f} cm from vertex {first} to vertex {last} would make a pattern of it"
+    ]

@@ -108,7 +108,8 @@ class Gradient:
                 for side in (step, -step):
                     vertices = self.network.surface.vertices.copy()
                     vertices[group, axis] += side
-                    force = _forces(_with_vertices(self.network, vertices, self.positions), self.positions)
+                    moved = _with_vertices(self.network, vertices, self.positions)
+                    force = np.array(Relaxation(moved, RelaxOptions(), start=self.positions).forces())
                     change += np.einsum("ij,ij->i", self.adjoint, force) / (2.0 * side)
                 np.add.at(found[:, axis], self.vertex_origin[group], (around.matrix @ change)[group])
         return found
@@ -153,10 +154,26 @@ def gradient(pattern: Flattening, of: str | Sequence[int] | Scalar) -> Gradient:
 
 
 def _scalar(pattern: Flattening, of: str | Sequence[int] | Scalar) -> Scalar:
+    """Return what gives an area, a length or a user's scalar with its derivative."""
     if callable(of):
         return of
+
+    def area(positions: FloatArray) -> tuple[float, FloatArray]:
+        faces = np.where(pattern.faces >= 0, pattern.faces, pattern.faces[:, [2]])
+        slope, corners = np.zeros_like(positions), positions[faces]
+        across = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1)
+        np.add.at(slope, faces, 0.5 * np.stack([across[..., 1], -across[..., 0]], axis=-1))
+        return 0.5 * float(np.einsum("ij,ij->", slope, positions)), slope
+
+    def length(positions: FloatArray) -> tuple[float, FloatArray]:
+        slope, edge = np.zeros_like(positions), np.diff(positions[line], axis=0)
+        unit = edge / np.linalg.norm(edge, axis=1)[:, None]
+        np.add.at(slope, line[1:], unit)
+        np.add.at(slope, line[:-1], -unit)
+        return polyline_length(positions[line]), slope
+
     if isinstance(of, str) and of == "area":
-        return lambda positions: _area(pattern, positions)
+        return area
     if isinstance(of, str):
         lines = pattern.network.surface.lines
         if of not in lines:
@@ -165,23 +182,7 @@ def _scalar(pattern: Flattening, of: str | Sequence[int] | Scalar) -> Scalar:
     line = np.asarray(of, dtype=np.int32)
     if line.ndim != 1 or len(line) < 2 or line.min() < 0 or line.max() >= len(pattern.positions):
         raise InputError(f"a polyline needs at least two vertices from 0 to {len(pattern.positions) - 1}")
-    return lambda positions: _length(line, positions)
-
-
-def _length(line: IntArray, positions: FloatArray) -> tuple[float, FloatArray]:
-    slope, edge = np.zeros_like(positions), np.diff(positions[line], axis=0)
-    unit = edge / np.linalg.norm(edge, axis=1)[:, None]
-    np.add.at(slope, line[1:], unit)
-    np.add.at(slope, line[:-1], -unit)
-    return polyline_length(positions[line]), slope
-
-
-def _area(pattern: Flattening, positions: FloatArray) -> tuple[float, FloatArray]:
-    faces = np.where(pattern.faces >= 0, pattern.faces, pattern.faces[:, [2]])
-    slope, corners = np.zeros_like(positions), positions[faces]
-    across = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1)
-    np.add.at(slope, faces, 0.5 * np.stack([across[..., 1], -across[..., 0]], axis=-1))
-    return 0.5 * float(np.einsum("ij,ij->", slope, positions)), slope
+    return length
 
 
 class _Neighbours:
@@ -199,24 +200,16 @@ class _Neighbours:
         matrix = csr_array(coo_array((np.ones(len(near)), (near, far)), shape=(count, count)))
         matrix.data[:] = 1.0
         self.matrix = matrix
-        self.groups = _groups(csr_array(matrix @ matrix))
-
-
-def _groups(conflicts: csr_array) -> list[IntArray]:
-    """Colour a graph greedily; return the vertices of each colour."""
-    colour = np.full(conflicts.shape[0], -1)
-    for vertex, (begin, end) in enumerate(zip(conflicts.indptr, conflicts.indptr[1:], strict=False)):
-        taken = set(colour[conflicts.indices[begin:end]].tolist())
-        colour[vertex] = next(number for number in range(len(taken) + 1) if number not in taken)
-    return [np.flatnonzero(colour == number).astype(np.int32) for number in range(int(colour.max()) + 1)]
+        # A greedy colouring of the graph of vertices that share a neighbour; a group is a colour.
+        conflicts, colour = csr_array(matrix @ matrix), np.full(count, -1)
+        for vertex, (begin, end) in enumerate(zip(conflicts.indptr, conflicts.indptr[1:], strict=False)):
+            taken = set(colour[conflicts.indices[begin:end]].tolist())
+            colour[vertex] = next(number for number in range(len(taken) + 1) if number not in taken)
+        self.groups = [np.flatnonzero(colour == number).astype(np.int32) for number in range(int(colour.max()) + 1)]
 
 
 def _difference(network: SpringNetwork) -> float:
     return _DIFFERENCE * float(network.spring_arrays.rest_length.mean())
-
-
-def _forces(network: SpringNetwork, positions: FloatArray) -> FloatArray:
-    return np.array(Relaxation(network, RelaxOptions(), start=positions).forces())
 
 
 def _with_vertices(network: SpringNetwork, vertices: FloatArray, positions: FloatArray) -> SpringNetwork:

@@ -72,7 +72,12 @@ def relax_piece(
     outcome = replace(outcome, seconds=time.perf_counter() - started - before)
     state = piece.state
     task.notes += [note for note in outcome.notes if note not in task.notes]
-    task.notes += _grain_notes(state.network)
+    excess = state.network.spring_arrays.shear_excess
+    if state.network.model == "springs" and excess >= _NOTED_EXCESS:
+        task.notes.append(
+            f"the grain runs aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
+            f'{state.network.fabric.name}; model = "membrane" measures that exactly'
+        )
     return RelaxedPiece(
         network=state.network, positions=state.positions(), begin=begin, outcome=outcome, coarse=piece.coarse
     )
@@ -123,8 +128,17 @@ class _Piece:
         return self._relax(measure=self._measure if follows else None)
 
     def _relax(self, **how: object) -> Outcome:
-        each_step = None if self._task.callback is None else self._each_step
-        return relax(self.state, watch=self._watch, each_step=each_step, **how)  # type: ignore[arg-type]
+        task = self._task
+
+        def watch(state: Relaxation) -> None:
+            energies, residual = state.status.energies, state.status.residual
+            task.history.append((float(state.steps), energies.potential, energies.guard, residual))
+
+        def each_step(state: Relaxation) -> None:
+            self._report(STEPS if state.takes_first_steps else task.stage_name)
+
+        listener = None if task.callback is None else each_step
+        return relax(self.state, watch=watch, each_step=listener, **how)  # type: ignore[arg-type]
 
     def outcome_of_stop(self, started: float) -> Outcome:
         """Return the outcome of a relaxation that was stopped: what its last layout is, which is kept."""
@@ -155,32 +169,13 @@ class _Piece:
         layout = state.positions()
         after = self._measure(layout, layout)
         after.steps, after.restarts, after.work_units = state.steps, state.restarts, state.work_units
-        way = layout - before
-        return float(np.sqrt(np.var(way, axis=0).sum()) / np.linalg.norm(np.ptp(layout, axis=0)))
+        return float(np.sqrt(np.var(layout - before, axis=0).sum()) / np.linalg.norm(np.ptp(layout, axis=0)))
 
     def _measure(self, layout: FloatArray, directions: FloatArray) -> Relaxation:
         """Return the state that goes on from a layout (#V by 2 [m]), with directions measured in another one."""
         return self._put(self._task.build_network(directions), layout)
 
-    def _watch(self, state: Relaxation) -> None:
-        energies, residual = state.status.energies, state.status.residual
-        self._task.history.append((float(state.steps), energies.potential, energies.guard, residual))
-
-    def _each_step(self, state: Relaxation) -> None:
-        self._report(STEPS if state.takes_first_steps else self._task.stage_name)
-
     def _report(self, stage: str) -> None:
         self._task.report_progress(stage, self.state)
         if self._task.stopped:
             raise _Stopped
-
-
-def _grain_notes(network: SpringNetwork) -> list[str]:
-    """Return a note on quads whose edges run across the threads, if they are much too stiff in shear."""
-    excess = network.spring_arrays.shear_excess
-    if network.model != "springs" or excess < _NOTED_EXCESS:
-        return []
-    return [
-        f"the grain runs aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
-        f'{network.fabric.name}; model = "membrane" measures that exactly'
-    ]

@@ -377,13 +377,13 @@ def write_files(
 
 def _lines_in_plane(result: Flattening) -> dict[str, Any]:
     """Return the lines that are drawn in the pattern; cuts show as cracks there."""
-    own, grain = result.surface.lines, result.datum_name
+    lines_there, grain = result.surface.lines, result.datum_name
     lines: dict[str, Any] = {
         name: line
         for name, line in result.network.surface.lines.items()
-        if not result.cuts or name in own or not (".left" in name or ".right" in name)
+        if not result.cuts or name in lines_there or not (".left" in name or ".right" in name)
     }
-    if grain in own and grain not in lines:
+    if grain in lines_there and grain not in lines:
         # A cut has parted the datum: its parts are drawn as one line.
         parts = [name for name in lines if name.startswith(f"{grain}.")]
         lines[grain] = [lines.pop(name) for name in parts] or result.datum

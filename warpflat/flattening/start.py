@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.conformal_layout import conformal_layout
 from warpflat.flattening.develop import (
@@ -45,8 +45,10 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
         or profile_layout(surface, datum) is not None
     ):
         return develop(surface, datum)
-    first = _geodesic(surface, datum)
-    rigid = None if first is None else as_rigid_layout(surface, first)
+    # The geodesic layout, with cracks closed where there are any; it may be folded.
+    whole, index = close_cracks(surface, datum) or (surface, np.arange(len(surface.vertices), dtype=np.int32))
+    first = geodesic_layout(whole, index[datum])
+    rigid = None if first is None else as_rigid_layout(surface, first[index])
     if rigid is not None:
         return Development(positions=turn_upright(rigid, datum), method="geodesic", as_rigid=True, mended=True)
     refuse_tubes(surface)
@@ -58,16 +60,6 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
     if rigid is None:
         return development
     return replace(development, positions=turn_upright(rigid, datum), as_rigid=True, mended=True)
-
-
-def _geodesic(surface: Surface, datum: IntArray) -> FloatArray | None:
-    """Return the geodesic layout, with cracks closed where there are any; it may be folded."""
-    closed = close_cracks(surface, datum)
-    if closed is None:
-        return geodesic_layout(surface, datum)
-    whole, index = closed
-    positions = geodesic_layout(whole, index[datum])
-    return None if positions is None else positions[index]
 
 
 def given_start(surface: Surface, datum: IntArray, start: ArrayLike) -> Development:

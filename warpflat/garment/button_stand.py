@@ -90,7 +90,7 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         corner = top + end * along
         foot = np.array([corner, corner + opening.width * out])
     stand = Edge(name=f"{name} {STAND}", points=_turned([reach[-1], foot[-1]], down))
-    own = {
+    ends = {
         upper.name: replace(
             upper,
             vertices=None,
@@ -99,7 +99,7 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
     }
     new = [stand]
     if whole:
-        own[lower.name] = replace(
+        ends[lower.name] = replace(
             lower, vertices=None, points=np.vstack([foot[::-1], lower.points[1:]] if down else [lower.points, foot[1:]])
         )
     else:
@@ -108,7 +108,7 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         step = Edge(name=f"{name} {STAND_END}", points=_turned(foot[::-1], down))
         new = [stand, step, replace(edge, points=_turned(rest, down), vertices=None)]
     edges[at : at + 1] = new if down else new[::-1]
-    edges = [own.get(each.name, each) for each in edges]
+    edges = [ends.get(each.name, each) for each in edges]
     lines = dict(piece.internal_lines)
     lines = {find_unused_name(name, lines): np.array([top, (top + min(end, edge.length) * along)]), **lines}
     # A mark for each button, and a line for each buttonhole across the stand.

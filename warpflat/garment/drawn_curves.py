@@ -137,18 +137,18 @@ def plan_curves(
             part = piece.parts.get(edge, edge)
             if (name, edge) in ruled or len(vertices) < 4 or part.startswith(SHAPED_EDGES):
                 continue
-            own, grid = positions[name][vertices], piece.grid_vertices[vertices]
+            points, grid = positions[name][vertices], piece.grid_vertices[vertices]
             mirrored = vertices[0] in on_fold, vertices[-1] in on_fold
             book, wanted = _book_line(layout, form, grid, part, free=(name, edge) not in sewn)
-            away = fair_line(own, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
+            away = fair_line(points, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
             straight = bool(wanted.any()) and away <= bound
             kept = wanted if straight else None
             one_way = book == "below hip" and bool(np.isin(grid, layout.rings[: layout.level_row["waist"] + 1]).all())
-            drawn = fairest_line(own, bound, straight=kept, mirrored=mirrored, one_way=one_way)
+            drawn = fairest_line(points, bound, straight=kept, mirrored=mirrored, one_way=one_way)
             if drawn is None:
                 continue
             line = DrawnLine(piece=name, line=edge, vertices=vertices, shape=drawn.points)
-            plans.append(PlannedCurve(line=line, before=own, book=book, straight=straight, away=away))
+            plans.append(PlannedCurve(line=line, before=points, book=book, straight=straight, away=away))
     return plans
 
 

@@ -81,13 +81,13 @@ def with_facings(
         sample = pattern.piece(name, pattern.sample)
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == name)
-            own = facing_edges(
+            strip = facing_edges(
                 row[at], _chain(row[at], edge, stand), width, around=row[at].internal_lines.get("keyhole")
             )
             if stand is not None and grown_on:
-                row[at] = _folded_over(row[at], stand.edge, own)
+                row[at] = _folded_over(row[at], stand.edge, strip)
             else:
-                row.append(_facing_piece(row[at], own, title))
+                row.append(_facing_piece(row[at], strip, title))
         words = find_unused_name(title.replace("_", " "), called)
         called.add(words)
         for each in (edge, *_ends(sample, _chain(sample, edge, stand))):
@@ -111,11 +111,11 @@ def with_stand_facings(pattern: Pattern, stands: Sequence[Stand]) -> Pattern:
         title = f"{stand.piece}_{stand.edge}_facing".replace(" ", "_")
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == stand.piece)
-            own = facing_edges(row[at], (stand.edge,), stand.width)
+            strip = facing_edges(row[at], (stand.edge,), stand.width)
             if stand.grown_on:
-                row[at] = _folded_over(row[at], stand.edge, own, sewn=False)
+                row[at] = _folded_over(row[at], stand.edge, strip, sewn=False)
             else:
-                row.append(_facing_piece(row[at], own, title))
+                row.append(_facing_piece(row[at], strip, title))
         if not stand.grown_on:
             side = SeamSide(piece=stand.piece, edge=stand.edge)
             words = find_unused_name(title.replace("_", " "), called)
@@ -285,8 +285,8 @@ def _folded_over(piece: Piece, fold: str, edges: Sequence[Edge], *, sewn: bool =
     mirrored[0].points[0], mirrored[-1].points[-1] = line[0], line[1]
     for one, other in pairwise(mirrored):
         other.points[0] = one.points[-1]
-    own: list[Edge] = []
+    outline: list[Edge] = []
     for edge in piece.edges:
-        own += mirrored if edge.name == fold else [edge]
+        outline += mirrored if edge.name == fold else [edge]
     name = find_unused_name("fold line", piece.internal_lines)
-    return replace(piece, edges=own, internal_lines={**piece.internal_lines, name: line})
+    return replace(piece, edges=outline, internal_lines={**piece.internal_lines, name: line})

@@ -108,8 +108,8 @@ def _across(pattern: Pattern, corner: _Corner, gaps: Collection[str]) -> _Corner
             for number, row in enumerate(seam.sides):
                 for at_start in (True, False):
                     side, other = row[0 if at_start else -1], seam.sides[1 - number][0 if at_start else -1]
-                    own = (side.piece, side.edge, side.mirrored != turned)
-                    if own != (piece, edge, mirrored) or (end == 0) == (at_start == side.reversed):
+                    reached = (side.piece, side.edge, side.mirrored != turned)
+                    if reached != (piece, edge, mirrored) or (end == 0) == (at_start == side.reversed):
                         continue
                     # Halves that meet in the centre are one edge twice. Of a half's other seams the list has the left one.
                     centre = (side.piece, side.edge) == (other.piece, other.edge)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.fabric.fabric import grain_axes
 from warpflat.flattening.progress import STEPS, Stage
 from warpflat.flattening.result import Flattening
@@ -30,7 +30,6 @@ from warpflat.surface.cells import CellArrays, first_of_faces
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.falloff import falloff_weights
 from warpflat.surface.half_edges import half_edges_of
-from warpflat.surface.mesh import Surface
 
 __all__ = ["FullEdge", "give_fullness", "measure_fullness"]
 
@@ -69,8 +68,16 @@ def give_fullness(
     """
     options = given_options(options)
     full = measure_fullness(piece, edges, plain)
-    network = _widened_network(piece.network, piece.positions, full)
-    warp, weft = grain_axes(piece.grain_angle)
+    warp, weft = axes = grain_axes(piece.grain_angle)
+    # The network at rest where the layout is wider by its fullness.
+    springs = _wider_springs(piece.network, piece.positions, axes, full)
+    cells = _wider_cells(piece.network.cell_arrays, piece.positions, axes, full)
+    network = replace(piece.network, spring_arrays=springs, cell_arrays=cells)
+    if network.model == "membrane":
+        stretch = network.stretch
+        meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
+        weights, held = step_matrix(network.fabric, axes, cells.corner, cells.edges, cells.area, piece.positions, meant)
+        network = replace(network, spring_arrays=with_stiffness(springs, cells, weights), held_stiffness=held)
     mean = full.mean(axis=0)
     widening = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
     alignment = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
@@ -169,21 +176,6 @@ def _lack(
     return np.asarray(0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack)))
 
 
-def _widened_network(network: SpringNetwork, positions: FloatArray, full: FloatArray) -> SpringNetwork:
-    """Return the network at rest where the layout is wider by its fullness."""
-    axes = grain_axes(network.grain_angle)
-    springs = _wider_springs(network, positions, axes, full)
-    cells = _wider_cells(network.cell_arrays, positions, axes, full)
-    if network.model == "springs":
-        return replace(network, spring_arrays=springs, cell_arrays=cells)
-    stretch = network.stretch
-    meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
-    weights, held = step_matrix(network.fabric, axes, cells.corner, cells.edges, cells.area, positions, meant)
-    return replace(
-        network, spring_arrays=with_stiffness(springs, cells, weights), cell_arrays=cells, held_stiffness=held
-    )
-
-
 def _wider_springs(
     network: SpringNetwork, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
 ) -> SpringArrays:
@@ -192,16 +184,21 @@ def _wider_springs(
     before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
     here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
     longer = _stretch_factor(before, here)
-    stiffness, shear_deficit, hourglass = (
-        springs.stiffness * _stretch_factor(before[:, ::-1], here) / longer,
-        None,
-        None,
-    )
+    stiffness = springs.stiffness * _stretch_factor(before[:, ::-1], here) / longer
+    shear_deficit = hourglass = None
     if surface.is_quad.any():
-        wider = _wider_quads(surface, positions, axes, full)
+        # By what factors a quad's first edges and its others become longer; 1 for triangles.
+        wider = np.ones((len(surface.faces), 2))
+        corners = surface.faces[surface.is_quad]
+        of_quad, q = full[corners].mean(axis=1), positions[corners] @ np.column_stack(axes)
+        for k, sides in enumerate((q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0])):
+            wider[surface.is_quad, k] = _stretch_factor(sides, of_quad)
         made = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
-        of_quads = _beside_quads(surface, springs)
-        stiffness[of_quads] = made.stiffness[of_quads]
+        # Sides and diagonals of quads.
+        beside = np.arange(springs.count) >= springs.edge_count
+        halves, first = half_edges_of(surface), first_of_faces(surface, 4, 3)[surface.is_quad]
+        beside[halves.edge[first[:, None] + np.arange(4)]] = True
+        stiffness[beside] = made.stiffness[beside]
         shear_deficit, hourglass = made.shear_deficit, made.hourglass
     return replace(
         springs,
@@ -212,30 +209,10 @@ def _wider_springs(
     )
 
 
-def _beside_quads(surface: Surface, springs: SpringArrays) -> BoolArray:
-    """Return which springs (#S) are a quad's sides or diagonals."""
-    beside = np.arange(springs.count) >= springs.edge_count
-    halves, first = half_edges_of(surface), first_of_faces(surface, 4, 3)[surface.is_quad]
-    beside[halves.edge[first[:, None] + np.arange(4)]] = True
-    return np.asarray(beside)
-
-
-def _wider_quads(
-    surface: Surface, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
-) -> FloatArray:
-    """Return by what factors a quad's first edges and its others become longer (#F by 2); 1 for triangles."""
-    wider = np.ones((len(surface.faces), 2))
-    corners = surface.faces[surface.is_quad]
-    here, q = full[corners].mean(axis=1), positions[corners] @ np.column_stack(axes)
-    for k, sides in enumerate((q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0])):
-        wider[surface.is_quad, k] = _stretch_factor(sides, here)
-    return wider
-
-
-def _stretch_factor(way: FloatArray, full: FloatArray) -> FloatArray:
+def _stretch_factor(vector: FloatArray, full: FloatArray) -> FloatArray:
     """Return by what factor a vector (along warp and weft) becomes longer once each component has its own factor."""
-    length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float64).tiny)
-    return np.asarray(np.linalg.norm(way * full, axis=1) / length)
+    length = np.maximum(np.linalg.norm(vector, axis=1), np.finfo(np.float64).tiny)
+    return np.asarray(np.linalg.norm(vector * full, axis=1) / length)
 
 
 def _wider_cells(

@@ -432,7 +432,7 @@ class _SewAgain:
             if share is None or not strained:
                 break
             bounds |= {name: share * bounds[name] for name in strained}
-        less = [f"{name} {1e3 * own:.3g} mm" for name, own in bounds.items() if own < bound]
+        less = [f"{name} {1e3 * reach:.3g} mm" for name, reach in bounds.items() if reach < bound]
         if not less:
             return drawn
         words = f"borders are drawn within less, or the cloth would be strained beyond its limit: {', '.join(less)}"

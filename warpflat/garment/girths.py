@@ -43,7 +43,10 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
                 level=level,
                 edges=edges.ends,
                 shares=edges.shares,
-                lengths={name: factor * _lengths(positions[name], own) for name, own in edges.ends.items()},
+                lengths={
+                    name: factor * np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
+                    for name, ends in edges.ends.items()
+                },
             )
         )
     return found
@@ -87,8 +90,3 @@ def pattern_girths(
 def _row(layout: Layout, level: str) -> IntArray:
     """Return the grid's vertices around a level."""
     return np.asarray(layout.rings[layout.level_row[level]])
-
-
-def _lengths(positions: FloatArray, edges: IntArray) -> FloatArray:
-    """Return the lengths of edges (#E by 2) [m]."""
-    return np.asarray(np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
 
     A facing that is grown on gets a piece of interfacing of its own, without allowances.
     """
-    pieces = {}
+    pieces: dict[str, Sequence[Piece]] = {}
     for size, row in pattern.pieces.items():
         doubled = [
             replace(piece, also={**piece.also, cloth: piece.quantity})
@@ -33,24 +33,23 @@ def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
             else piece
             for piece in row
         ]
-        grown = [_of_grown_facing(piece, cloth) for piece in row if _has_grown_facing(piece)]
-        pieces[size] = (*doubled, *grown)
+        for piece in row:
+            if _has_grown_facing(piece):
+                facing = [edge for edge in piece.edges if edge.name.startswith("facing ")]
+                fold = Edge(name="fold line", points=np.array([facing[-1].points[-1], facing[0].points[0]]))
+                edges = [replace(edge, kind="cut", allowance=0.0, vertices=None) for edge in (*facing, fold)]
+                doubled.append(
+                    Piece(
+                        name=f"{piece.name}_facing_interfacing", size=piece.size, fabric=cloth,
+                        quantity=piece.quantity, edges=edges, paired=piece.paired, role="interfacing",
+                    )
+                )  # fmt: skip
+        pieces[size] = doubled
     return replace(pattern, pieces=pieces)
 
 
 def _has_grown_facing(piece: Piece) -> bool:
     return any(edge.name == f"facing {INNER}" for edge in piece.edges)
-
-
-def _of_grown_facing(piece: Piece, cloth: str) -> Piece:
-    """Return the interfacing of a facing that is grown on a piece."""
-    own = [edge for edge in piece.edges if edge.name.startswith("facing ")]
-    fold = Edge(name="fold line", points=np.array([own[-1].points[-1], own[0].points[0]]))
-    edges = [replace(edge, kind="cut", allowance=0.0, vertices=None) for edge in (*own, fold)]
-    return Piece(
-        name=f"{piece.name}_facing_interfacing", size=piece.size, fabric=cloth, quantity=piece.quantity, edges=edges,
-        paired=piece.paired, role="interfacing",
-    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,26 +88,50 @@ def add_lining(pattern: Pattern, cloth: str) -> Pattern:
     pieces: dict[str, Sequence[Piece]] = {}
     for size, row in pattern.pieces.items():
         by_name = {piece.name: piece for piece in row}
-        linings = [_lining(by_name[name], faced[name], by_name, names[name], cloth) for name in shell]
-        pieces[size] = (*(_sewn_inside(piece) if piece.role == "facing" else piece for piece in row), *linings)
+        lined = list[Piece]()
+        for piece in row:
+            if piece.role == "facing":
+                # Its inner edge is a seam now.
+                outline = [
+                    replace(each, kind="seam", allowance=None) if each.name == INNER else each for each in piece.edges
+                ]
+                piece = replace(piece, edges=outline)
+            lined.append(piece)
+        for name in shell:
+            piece = by_name[name]
+            for facing in faced[name]:
+                piece = without_strip(piece, by_name[facing.facing].edges, _inner(facing))
+            hems = [
+                replace(edge, allowance=max(edge.width - _SHORTER, _LEAST_HEM)) if edge.kind == "hem" else edge
+                for edge in piece.edges
+            ]
+            kept = {k: line for k, line in piece.internal_lines.items() if "zip" not in k and "pocket" not in k}
+            lined.append(
+                replace(
+                    piece,
+                    name=names[name],
+                    fabric=cloth,
+                    role="lining",
+                    edges=hems,
+                    marks={},
+                    also={},
+                    internal_lines=kept,
+                )
+            )
+        pieces[size] = lined
     edges = {piece.name: {edge.name for edge in piece.edges} for piece in pieces[pattern.sample]}
     seams = list(pattern.seams)
     for seam in pattern.seams:
-        sides = [tuple(_on_lining(side, names) for side in row) for row in seam.sides]
-        known = all(side is not None and side.edge in edges[side.piece] for row in sides for side in row)
-        if known:
-            kept = tuple(tuple(side for side in row if side is not None) for row in sides)
-            seams.append(replace(seam, name=f"{seam.name} of the lining", sides=(kept[0], kept[1]), notches=None))
-    for name, own in faced.items():
-        for each in own:
-            first, second = (
-                SeamSide(piece=each.facing, edge=INNER),
-                SeamSide(piece=names[name], edge=_inner(each), reversed=True),
-            )
+        if all(side.edge in edges.get(names.get(side.piece, ""), ()) for row in seam.sides for side in row):
+            first, second = (tuple(replace(side, piece=names[side.piece]) for side in row) for row in seam.sides)
+            seams.append(replace(seam, name=f"{seam.name} of the lining", sides=(first, second), notches=None))
+    for name, facings in faced.items():
+        for each in facings:
             notches = centre_notch(pattern.piece(name, pattern.sample))
-            seams.append(
-                Seam(name=f"lining to {each.facing}".replace("_", " "), sides=((first,), (second,)), notches=notches)
-            )
+            inner = SeamSide(piece=each.facing, edge=INNER)
+            lining = SeamSide(piece=names[name], edge=_inner(each), reversed=True)
+            words = f"lining to {each.facing}".replace("_", " ")
+            seams.append(Seam(name=words, sides=((inner,), (lining,)), notches=notches))
     return replace(pattern, pieces=pieces, seams=seams)
 
 
@@ -128,8 +151,8 @@ def _facings_of(pattern: Pattern, name: str) -> list[_Faced]:
         other = pattern.piece(second.piece, pattern.sample)
         if first.piece != name or other.role != "facing" or any(each.facing == other.name for each in found):
             continue
-        own = [edge.name for edge in other.edges]
-        covered = tuple(own[: own.index(INNER) - 1])
+        outline = [edge.name for edge in other.edges]
+        covered = tuple(outline[: outline.index(INNER) - 1])
         before, after = names[names.index(covered[0]) - 1], names[(names.index(covered[-1]) + 1) % len(names)]
         found.append(_Faced(facing=other.name, edges=covered, before=before, after=after))
     return found
@@ -138,27 +161,3 @@ def _facings_of(pattern: Pattern, name: str) -> list[_Faced]:
 def _inner(faced: _Faced) -> str:
     """Return the name of the edge that takes the place of what a facing covers."""
     return f"{faced.edges[0]} {INNER}"
-
-
-def _on_lining(side: SeamSide, names: Mapping[str, str]) -> SeamSide | None:
-    return replace(side, piece=names[side.piece]) if side.piece in names else None
-
-
-def _sewn_inside(facing: Piece) -> Piece:
-    """Return a facing whose inner edge is a seam."""
-    edges = [replace(edge, kind="seam", allowance=None) if edge.name == INNER else edge for edge in facing.edges]
-    return replace(facing, edges=edges)
-
-
-def _lining(piece: Piece, faced: Sequence[_Faced], pieces: Mapping[str, Piece], title: str, cloth: str) -> Piece:
-    """Return the lining of a piece."""
-    for each in faced:
-        piece = without_strip(piece, pieces[each.facing].edges, _inner(each))
-    edges = [
-        replace(edge, allowance=max(edge.width - _SHORTER, _LEAST_HEM)) if edge.kind == "hem" else edge
-        for edge in piece.edges
-    ]
-    return replace(
-        piece, name=title, fabric=cloth, role="lining", edges=edges, marks={}, also={},
-        internal_lines={k: line for k, line in piece.internal_lines.items() if "zip" not in k and "pocket" not in k},
-    )  # fmt: skip

@@ -14,9 +14,9 @@ from warpflat.core.text import find_unused_name
 from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand
 from warpflat.garment.openings import Opening, OpeningPart
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening
 
-__all__ = ["mark_openings", "with_notches"]
+__all__ = ["lines_inside", "mark_openings", "with_notches"]
 
 # How far inside the sewing line the line of a zip is drawn [m].
 _INSIDE = 0.004
@@ -105,14 +105,22 @@ def _part_of(placed: Placed, size: str, number: int, seam: str) -> OpeningPart:
 def _with_zip(
     pattern: Pattern, seam: Seam, opening: Opening, end: float | None, number: int, placed: Placed
 ) -> Pattern:
+    """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends."""
+    import shapely
+
     pieces = dict(pattern.pieces)
     for size in pieces:
         begin, stop = _reach(opening, _part_of(placed, size, number, seam.name))
         for side in (side for row in seam.sides for side in row if not side.mirrored):
-            pieces[size] = [
-                _with_line(piece, side, begin, stop, opening) if piece.name == side.piece else piece
-                for piece in pieces[size]
-            ]
+            row = list(pieces[size])
+            at = next(k for k, piece in enumerate(row) if piece.name == side.piece)
+            line = np.asarray(shapely.LineString(row[at].edge(side.edge).points).offset_curve(_INSIDE).coords)
+            if not _runs_down(row[at], line):
+                line = line[::-1]
+            drawn = dict(row[at].internal_lines)
+            drawn[find_unused_name(opening.title, drawn)] = _between(line, begin, min(stop, polyline_length(line)))
+            row[at] = replace(row[at], internal_lines=drawn)
+            pieces[size] = row
     if end is None:
         return replace(pattern, pieces=pieces)
     by_size = {}
@@ -126,8 +134,9 @@ def _with_zip(
             [share if (_runs_down(piece, piece.edge(side.edge).points) != side.reversed) else 1.0 - share],
             part.whole,
         )
-    own = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
-    return replace(pattern, pieces=pieces, seams=[own if each.name == seam.name else each for each in pattern.seams])
+    notched = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
+    seams = [notched if each.name == seam.name else each for each in pattern.seams]
+    return replace(pattern, pieces=pieces, seams=seams)
 
 
 def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[float, ...]:
@@ -139,8 +148,8 @@ def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[flo
         whole: length of the seam [m].
     """
     count = max(1, round(whole / _SPACING))
-    own = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
-    kept = [each for each in own if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
+    spaced = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
+    kept = [each for each in spaced if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
     return tuple(sorted([*shares, *kept]))
 
 
@@ -148,20 +157,6 @@ def _runs_down(piece: Piece, points: FloatArray) -> bool:
     """Return whether a line of a piece runs against the grain."""
     grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
     return bool((points[-1] - points[0]) @ grain < 0.0)
-
-
-def _with_line(piece: Piece, side: SeamSide, begin: float, end: float, opening: Opening) -> Piece:
-    """Return a piece with the line of an opening beside one of its edges."""
-    import shapely
-
-    edge = piece.edge(side.edge)
-    inside = shapely.LineString(edge.points).offset_curve(_INSIDE)
-    line = np.asarray(inside.coords)
-    if not _runs_down(piece, line):
-        line = line[::-1]
-    stretch = _between(line, begin, min(end, polyline_length(line)))
-    name = find_unused_name(opening.title, piece.internal_lines)
-    return replace(piece, internal_lines={**piece.internal_lines, name: stretch})
 
 
 def _between(line: FloatArray, begin: float, end: float) -> FloatArray:
@@ -187,10 +182,10 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, p
         length = min(opening.length, whole)
         depths = button_depths(opening.buttons, length, None if bust is None else part.before + bust, *counts)
         counts = [len(depths)]
-        own = depths[(depths >= part.before) & (depths < part.before + part.whole)] - part.before
+        here = depths[(depths >= part.before) & (depths < part.before + part.whole)] - part.before
         for name, edge in sides:
             pieces[size] = [
-                with_button_stand(each, edge, opening, length - part.before, own) if each.name == name else each
+                with_button_stand(each, edge, opening, length - part.before, here) if each.name == name else each
                 for each in pieces[size]
             ]
     at = pattern.piece(*(next(iter(sides))[0], pattern.sample)).edge(next(iter(sides))[1]).length
@@ -218,16 +213,23 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     for number, (sign, end) in enumerate(((-1.0, ring[0]), (1.0, ring[-1]))):
         shapes[f"keyhole side {number + 1}"] = np.array([slit[0] + sign * half * across, end])
     body = shapely.Polygon(piece.outline).buffer(1e-6)
-    lines = dict(piece.internal_lines)
-    for key, points in shapes.items():
-        inside = [
-            part for part in shapely.get_parts(shapely.LineString(points).intersection(body)) if part.length > 1e-3
-        ]
-        if inside:
-            lines[key] = np.asarray(max(inside, key=lambda part: part.length).coords)
+    lines = {**piece.internal_lines, **lines_inside(shapes, piece.outline)}
     button = slit[0] + 0.010 * along + (half + 0.008) * across
     marks = {**piece.marks, "button": button} if body.contains(shapely.Point(button)) else dict(piece.marks)
     return replace(piece, internal_lines=lines, marks=marks)
+
+
+def lines_inside(lines: Mapping[str, FloatArray], outline: FloatArray) -> dict[str, FloatArray]:
+    """Return of each line the longest part that lies inside an outline; lines with less than 1 mm inside are left out."""
+    import shapely
+
+    body, found = shapely.Polygon(outline).buffer(1e-6), {}
+    for name, line in lines.items():
+        parts = shapely.get_parts(shapely.LineString(line).intersection(body))
+        parts = [part for part in parts if part.geom_type == "LineString" and part.length > 1e-3]
+        if parts:
+            found[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
+    return found
 
 
 def _with_free_end(piece: Piece, name: str, opening: Opening) -> Piece:

@@ -68,19 +68,19 @@ def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) 
     sewn = []
     for seam in seams:
         sides = (_replaced(seam.sides[0], by_name), _replaced(seam.sides[1], by_name))
-        own = [side for row in sides for side in row if side.mirrored]
-        if not own:
+        mirrored = [side for row in sides for side in row if side.mirrored]
+        if not mirrored:
             sewn.append(seam)
             continue
-        image = _mirror_seam(own[0], seams, by_name)
+        image = _mirror_seam(mirrored[0], seams, by_name)
         assert image is not None  # find_mirror_pairs sees to it
         other, place = image
         ease, (first, last) = seam.ease, seam.eased
-        if next(number for number in (0, 1) if own[0] in sides[number]) != place:
+        if next(number for number in (0, 1) if mirrored[0] in sides[number]) != place:
             first, last = (seam.reach(share, 1.0) / (1.0 + ease) for share in (first, last))
             sides, ease = (sides[1], sides[0]), 1.0 / (1.0 + ease) - 1.0
-        there = next(side for side in other.sides[place] if _key(side) == _key(own[0]))
-        if there.reversed != own[0].reversed:
+        there = next(side for side in other.sides[place] if _key(side) == _key(mirrored[0]))
+        if there.reversed != mirrored[0].reversed:
             sides = (_reversed_side(sides[0]), _reversed_side(sides[1]))
             first, last = 1.0 - last, 1.0 - first
         notches = None if seam.notches is None else (first, last)

@@ -129,17 +129,14 @@ def part_at_centres(layout: Layout, form: Form, openings: Sequence[Opening]) -> 
         for name, recipe in pieces.items():
             bricks = select_bricks(layout, recipe.bricks)
             sides = {side: tuple(b for b in bricks if is_side(b, side)) for side in ("left", "right")}
-            if all(sides.values()) and _touches(layout, bricks, line) and line not in recipe.open:
-                for side, own in sides.items():
-                    parted[f"{name}_{side}"] = replace(recipe, bricks=own)
+            on_line = np.isin(layout.faces[layout.faces_of(bricks)], layout.lines[line]).sum() > 1
+            if all(sides.values()) and on_line and line not in recipe.open:
+                for side, half in sides.items():
+                    parted[f"{name}_{side}"] = replace(recipe, bricks=half)
             else:
                 parted[name] = recipe
         pieces = parted
     return replace(form, pieces=pieces)
-
-
-def _touches(layout: Layout, bricks: Sequence[str], line: str) -> bool:
-    return bool(np.isin(layout.faces[layout.faces_of(bricks)], layout.lines[line]).sum() > 1)
 
 
 def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, FloatArray]) -> list[OpeningPart]:
@@ -186,9 +183,9 @@ def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
 
 def one_sided(openings: Sequence[Opening]) -> bool:
     """Return whether some seam of one side of the body has an opening that its mirror image has not."""
-    own = {replace(opening, line=re.sub(r"\b(left|right)\b", "side", opening.line)) for opening in openings}
+    both_sides = {replace(opening, line=re.sub(r"\b(left|right)\b", "side", opening.line)) for opening in openings}
     sided = [opening for opening in openings if re.search(r"\b(left|right)\b", opening.line)]
-    return 2 * len([opening for opening in own if opening not in openings]) != len(set(sided))
+    return 2 * len([opening for opening in both_sides if opening not in openings]) != len(set(sided))
 
 
 def opened_rings(

@@ -76,9 +76,26 @@ def _with_patch(pattern: Pattern, pocket: Pocket) -> Pattern:
             if piece.name != pocket.where:
                 made.append(piece)
                 continue
+            grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
+            up = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+            across = np.array([up[1], -up[0]])
+            known = {**{edge.name: edge.points for edge in piece.edges}, **piece.internal_lines}
+            centre = next((points for name, points in known.items() if name.startswith("centre")), None)
+            if centre is None:
+                raise InputError(f"piece {piece.name!r} has no centre line to place a pocket from")
+            if pocket.line not in known:
+                raise InputError(f"piece {piece.name!r} has no line {pocket.line!r}; {nearest(pocket.line, known)}")
+            x0, level = float((centre @ across).mean()), known[pocket.line]
+            order = np.argsort(level @ across)
             lines, marks = dict(piece.internal_lines), dict(piece.marks)
             body = shapely.Polygon(piece.outline)
-            for place in _places(piece, pocket):
+            for side in (1.0, -1.0):
+                # The patch on this side of the centre line, from its upper right corner leftwards.
+                middle = x0 + side * (pocket.from_centre + 0.5 * pocket.width)
+                top = float(np.interp(middle, (level @ across)[order], (level @ up)[order])) - pocket.below
+                half, low = 0.5 * pocket.width, top - pocket.height
+                corners = [(half, top), (-half, top), (-half, low), (0.0, low - _POINT), (half, low)]
+                place = np.array([(middle + x) * across + y * up for x, y in corners])
                 if not body.contains(shapely.Polygon(place)):
                     continue
                 count += 1
@@ -96,11 +113,11 @@ def _with_patch(pattern: Pattern, pocket: Pocket) -> Pattern:
         # The piece of a patch pocket.
         like = next(p for p in row if p.name == pocket.where)
         half, low = 0.5 * pocket.width, -pocket.height
-        corners = np.array([(half, 0.0), (-half, 0.0), (-half, low), (0.0, low - _POINT), (half, low)])
+        patch = np.array([(half, 0.0), (-half, 0.0), (-half, low), (0.0, low - _POINT), (half, low)])
         names = ["upper", "left side", "lower left", "lower right", "right side"]
         edges = [
             Edge(
-                name=name, points=corners[[k, (k + 1) % 5]], kind="hem" if k == 0 else "cut",
+                name=name, points=patch[[k, (k + 1) % 5]], kind="hem" if k == 0 else "cut",
                 allowance=_HEM if k == 0 else 0.010,
             )
             for k, name in enumerate(names)
@@ -114,49 +131,38 @@ def _with_patch(pattern: Pattern, pocket: Pocket) -> Pattern:
     return replace(pattern, pieces=pieces)
 
 
-def _places(piece: Piece, pocket: Pocket) -> list[FloatArray]:
-    """Return the outlines of a patch on both sides of a piece's centre line, from the upper right corner leftwards.
-
-    Raises:
-        InputError: the piece has no centre line, or no such line across it.
-    """
-    grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
-    up = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
-    across = np.array([up[1], -up[0]])
-    lines = {**{edge.name: edge.points for edge in piece.edges}, **piece.internal_lines}
-    centre = next((points for name, points in lines.items() if name.startswith("centre")), None)
-    if centre is None:
-        raise InputError(f"piece {piece.name!r} has no centre line to place a pocket from")
-    if pocket.line not in lines:
-        raise InputError(f"piece {piece.name!r} has no line {pocket.line!r}; {nearest(pocket.line, lines)}")
-    x0, level = float((centre @ across).mean()), lines[pocket.line]
-    found = []
-    for side in (1.0, -1.0):
-        middle = x0 + side * (pocket.from_centre + 0.5 * pocket.width)
-        order = np.argsort(level @ across)
-        top = float(np.interp(middle, (level @ across)[order], (level @ up)[order])) - pocket.below
-        half, low = 0.5 * pocket.width, top - pocket.height
-        corners = [(half, top), (-half, top), (-half, low), (0.0, low - _POINT), (half, low)]
-        found.append(np.array([(middle + x) * across + y * up for x, y in corners]))
-    return found
-
-
 def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
     """Return a pattern with the bags of a pocket in a seam, and on the other side's too, and notches where they open."""
     names = {pocket.where, other_side(pocket.where)}
-    own = [seam for seam in pattern.seams if seam.name in names]
-    if not own or any(len(row) > 1 for seam in own for row in seam.sides):
+    opened = [seam for seam in pattern.seams if seam.name in names]
+    if not opened or any(len(row) > 1 for seam in opened for row in seam.sides):
         raise InputError(
             f"no seam {pocket.where!r} between two edges; {nearest(pocket.where, [seam.name for seam in pattern.seams])}"
         )
     # Of halves, and of pieces that are cut in pairs, one seam is listed for both sides.
-    sewn = [pattern.piece(side.piece, pattern.sample) for row in own[0].sides for side in row]
-    both = 4 if len(own) == 2 or any(piece.on_fold or piece.quantity % 2 == 0 for piece in sewn) else 2
+    sewn = [pattern.piece(side.piece, pattern.sample) for row in opened[0].sides for side in row]
+    both = 4 if len(opened) == 2 or any(piece.on_fold or piece.quantity % 2 == 0 for piece in sewn) else 2
     title = find_unused_name("pocket_bag", {piece.name for piece in pattern.pieces[pattern.sample]})
-    seams = [_with_opening(pattern, seam, pocket) if seam.name in names else seam for seam in pattern.seams]
+    seams = list(pattern.seams)
+    for number, seam in enumerate(seams):
+        if seam.name not in names:
+            continue
+        # Notches at both ends of the opening.
+        side, by_size = seam.sides[0][0], {}
+        for size in pattern.pieces:
+            points, with_seam = _downwards(pattern.piece(side.piece, size), side)
+            whole = float(arc_lengths(points)[-1])
+            stretch = np.array([pocket.below, pocket.below + pocket.height])
+            if stretch[1] > whole - _CLEAR:
+                raise InputError(
+                    f"the pocket ends {1e3 * stretch[1]:.0f} mm along {seam.name!r}, which is {1e3 * whole:.0f} mm long"
+                )
+            shares = stretch / whole if with_seam else 1.0 - stretch / whole
+            by_size[size] = with_notches(seam.of_size(size), shares.tolist(), whole)
+        seams[number] = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
     pieces = {}
     for size, row in pattern.pieces.items():
-        side = own[0].sides[0][0]
+        side = opened[0].sides[0][0]
         piece = next(each for each in row if each.name == side.piece)
         # A bag: its straight edge along the seam, its rim deeper below the opening than above.
         points, _ = _downwards(piece, side)
@@ -164,7 +170,7 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
         edge = points_at_lengths(points, np.array([start, pocket.below + pocket.height + _PAST]))
         length = float(np.linalg.norm(edge[1] - edge[0]))
         deep = pocket.width
-        # In the bag's own frame the seam runs upwards along x = 0, the cloth lies to its left.
+        # In the frame of the bag the seam runs upwards along x = 0, the cloth lies to its left.
         turn = np.linspace(0.0, np.pi / 2, 9)
         low = -0.35 * length
         radius = min(0.4 * deep, 0.4 * length)
@@ -201,23 +207,3 @@ def _downwards(piece: Piece, side: SeamSide) -> tuple[FloatArray, bool]:
     grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
     down = bool((points[-1] - points[0]) @ grain < 0.0)
     return (points if down else points[::-1]), down != side.reversed
-
-
-def _with_opening(pattern: Pattern, seam: Seam, pocket: Pocket) -> Seam:
-    """Return a seam with notches at both ends of a pocket's opening.
-
-    Raises:
-        InputError: the seam is too short.
-    """
-    side, by_size = seam.sides[0][0], {}
-    for size in pattern.pieces:
-        points, with_seam = _downwards(pattern.piece(side.piece, size), side)
-        whole = float(arc_lengths(points)[-1])
-        ends = np.array([pocket.below, pocket.below + pocket.height])
-        if ends[1] > whole - _CLEAR:
-            raise InputError(
-                f"the pocket ends {1e3 * ends[1]:.0f} mm along {seam.name!r}, which is {1e3 * whole:.0f} mm long"
-            )
-        shares = ends / whole if with_seam else 1.0 - ends / whole
-        by_size[size] = with_notches(seam.of_size(size), shares.tolist(), whole)
-    return replace(seam, notches=by_size[pattern.sample], size_notches=by_size)

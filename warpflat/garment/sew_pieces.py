@@ -86,10 +86,10 @@ def sew_pieces(
         flat[first] = give_fullness(flat[first], full, plain, options=options)
     pairs = [
         Stitching(
-            name=title, pieces=(own, own), vertices=(seam.left, seam.right),
-            sides=(f"{own}.{title}.left", f"{own}.{title}.right"),
+            name=title, pieces=(name, name), vertices=(seam.left, seam.right),
+            sides=(f"{name}.{title}.left", f"{name}.{title}.right"),
         )
-        for own, piece in flat.items()
+        for name, piece in flat.items()
         for title, _, seam in seams_of_cuts(piece)
     ]  # fmt: skip
     pairs += [
@@ -100,12 +100,12 @@ def sew_pieces(
         for seam in found
     ]  # fmt: skip
     sewn_edges = {
-        (own, min(edge), max(edge))
+        (name, min(edge), max(edge))
         for pair in pairs
-        for own, row in zip(pair.pieces, pair.vertices, strict=True)
+        for name, row in zip(pair.pieces, pair.vertices, strict=True)
         for edge in pairwise(row.tolist())
     }
-    for pair in meeting_borders({own: piece.network.surface for own, piece in flat.items()}, without=sewn_edges):
+    for pair in meeting_borders({name: piece.network.surface for name, piece in flat.items()}, without=sewn_edges):
         if len(flat) > 1:
             pairs.append(replace(pair, sides=pair.pieces, eased=eased and pair.pieces[0] != pair.pieces[1]))
             continue
@@ -123,20 +123,20 @@ def sew_pieces(
     if not pairs and not constraints:
         return garment
     # One pattern serves for both pieces of a pair only where both are the same: they are sewn from the same layout.
-    images = mirror_images({own: piece.network.surface for own, piece in flat.items()}) if len(flat) > 1 else {}
+    images = mirror_images({name: piece.network.surface for name, piece in flat.items()}) if len(flat) > 1 else {}
     if any(piece.grain_angle for piece in flat.values()):
         images = {}
-    for own, (mate, partners) in images.items():
-        first_of_two = list(flat).index(own) < list(flat).index(mate)
+    for one, (mate, partners) in images.items():
+        first_of_two = list(flat).index(one) < list(flat).index(mate)
         if first_of_two and len(flat[mate].positions) == len(partners):
             laid = flat[mate].positions.copy()
-            laid[partners] = flat[own].positions * [-1.0, 1.0]
+            laid[partners] = flat[one].positions * [-1.0, 1.0]
             laid += flat[mate].positions.mean(axis=0) - laid.mean(axis=0)
             if np.abs(laid - flat[mate].positions).max() < _ALIKE:
                 flat[mate] = replace(flat[mate], positions=laid)
     sewn = sew(flat, pairs, constraints=constraints, options=options)
-    even = even_sides({own: sewn.pieces[own].positions for own in flat}, images)
-    sewn_pieces = {own: replace(sewn.pieces[own], positions=even[own]) for own in flat}
+    even = even_sides({name: sewn.pieces[name].positions for name in flat}, images)
+    sewn_pieces = {name: replace(sewn.pieces[name], positions=even[name]) for name in flat}
     return replace(garment, pieces=sewn_pieces, sewn=replace(sewn, pieces=sewn_pieces))
 
 
@@ -148,11 +148,11 @@ def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:
     named = {surface.name: dict(surface.lines) for surface in surfaces}
     for pair in meeting_borders({surface.name: surface for surface in surfaces}):
         if pair.pieces[0] != pair.pieces[1]:
-            for own, other, row in zip(pair.pieces, pair.pieces[::-1], pair.vertices, strict=True):
+            for name, other, row in zip(pair.pieces, pair.pieces[::-1], pair.vertices, strict=True):
                 ends = {frozenset(row[:2].tolist()), frozenset(row[-2:].tolist())}
-                known = (map(frozenset, pairwise(line.tolist())) for line in named[own].values())
+                known = (map(frozenset, pairwise(line.tolist())) for line in named[name].values())
                 if not any(ends <= set(line) for line in known):
-                    named[own][find_unused_name(f"to {other}", named[own])] = row
+                    named[name][find_unused_name(f"to {other}", named[name])] = row
     return [replace(surface, lines=named[surface.name]) for surface in surfaces]
 
 
@@ -213,13 +213,13 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
     free = np.flatnonzero(edges.are_free())
     if len(free) == 0:
         return []
-    start, way = edges.ends[free, 0], edges.ends[free, 1] - edges.ends[free, 0]
-    length = np.linalg.norm(way, axis=1)
+    start, edge = edges.ends[free, 0], edges.ends[free, 1] - edges.ends[free, 0]
+    length = np.linalg.norm(edge, axis=1)
     spacing = max(_SAMPLES, float(length.sum()) / _MOST_SAMPLES)
     count = np.maximum(np.ceil(length / spacing), 1).astype(np.int64)
     of = np.repeat(np.arange(len(free)), count)
     share = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
-    points = start[of] + share[:, None] * way[of]
+    points = start[of] + share[:, None] * edge[of]
     loop, piece = edges.loop[free][of], edges.piece[free][of]
     arc, around = edges.arc[free][of] + share * length[of], edges.around[free][of]
     here, there = cKDTree(points).query_pairs(BESIDE + 0.5 * spacing, output_type="ndarray").T
@@ -230,7 +230,7 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
     here, there = here[other], there[other]
     turned = piece[here] > piece[there]
     here, there = np.where(turned, there, here), np.where(turned, here, there)
-    to, along = points[here] - start[of[there]], way[of[there]]
+    to, along = points[here] - start[of[there]], edge[of[there]]
     foot = np.clip((to * along).sum(axis=1) / np.maximum(length[of[there]] ** 2, np.finfo(float).tiny), 0.0, 1.0)
     gap = np.linalg.norm(to - foot[:, None] * along, axis=1)
     order = np.lexsort((gap, here))

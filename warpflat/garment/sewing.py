@@ -92,9 +92,9 @@ class SewingNetwork:
     def overlaps(self, layout: FloatArray) -> dict[str, float]:
         """Return by name the area that each piece that lies over itself in a layout (#V by 2 [m]) covers more than once [m2]."""
         areas = {
-            name: overlap_area(piece.network.surface, layout[own], cut_sides(piece.cuts))
+            name: overlap_area(piece.network.surface, layout[rows], cut_sides(piece.cuts))
             for name, piece in self.pieces.items()
-            for own in [slice(self.first[name], self.first[name] + len(piece.positions))]
+            for rows in [slice(self.first[name], self.first[name] + len(piece.positions))]
         }
         return {name: area for name, area in areas.items() if area}
 
@@ -105,16 +105,16 @@ class SewingNetwork:
         if first is not None and outcome.first_layout is not None:
             ends.insert(0, (STEPS, outcome.first_layout, first))
         for name, piece in self.pieces.items():
-            own = slice(self.first[name], self.first[name] + len(piece.positions))
+            rows = slice(self.first[name], self.first[name] + len(piece.positions))
             stages = list(piece.stages)
             for stage, place, end in ends:
-                energies = Relaxation(piece.network, state.options, start=place[own]).energies()
+                energies = Relaxation(piece.network, state.options, start=place[rows]).energies()
                 stages.append(
                     Stage(
                         name=stage,
                         model_energy_j=energies.potential,
                         guard_energy_j=energies.guard,
-                        strain_energy_j=strain_energy(piece.network, place[own]),
+                        strain_energy_j=strain_energy(piece.network, place[rows]),
                         steps=end.steps,
                         work_units=end.work_units,
                         seconds=end.seconds,
@@ -122,7 +122,7 @@ class SewingNetwork:
                         residual=None if np.isnan(end.residual) else end.residual,
                     )
                 )
-            sewn[name] = replace(piece, positions=layout[own], stages=tuple(stages), unsewn=piece.unsewn or piece)
+            sewn[name] = replace(piece, positions=layout[rows], stages=tuple(stages), unsewn=piece.unsewn or piece)
         return sewn
 
 
@@ -175,9 +175,9 @@ def sew(
         known = offsets or {}
         assert network.seams is not None
         offset = network.seams.offset.numpy().copy()
-        for key, own in _held(equations, kinds):
-            if len(known.get(key, ())) == len(own):
-                offset[own] = known[key]
+        for key, numbers in _held(equations, kinds):
+            if len(known.get(key, ())) == len(numbers):
+                offset[numbers] = known[key]
         network.seams.offset.assign(offset)
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
     alignments = [
@@ -207,6 +207,10 @@ def sew(
             else:
                 note += ", and contact could not part it: cut it apart there"
             sewn[name] = replace(piece, notes=(*piece.notes, note))
+    offsets = dict[tuple[str, str], FloatArray]()
+    if state.network.seams is not None:
+        offset = state.network.seams.offset.numpy()
+        offsets = {key: offset[numbers] for key, numbers in _held(equations, kinds)}
     return Sewn(
         pieces=sewn,
         converged=converged,
@@ -219,7 +223,7 @@ def sew(
             *_fold_results(state, joined, folds, unsewn),
         ),
         seconds=seconds,
-        offsets=_offsets(state.network, equations, kinds),
+        offsets=offsets,
     )
 
 
@@ -230,16 +234,6 @@ def _held(
     lasting = (equations.soft == 0) | (equations.share > 0)
     for number, (name, kind) in enumerate(kinds):
         yield (kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32)
-
-
-def _offsets(
-    network: SpringNetwork, equations: ConstraintEquations, kinds: Sequence[tuple[str, str]]
-) -> dict[tuple[str, str], FloatArray]:
-    """Return the offsets of every group."""
-    if network.seams is None:
-        return {}
-    offset = network.seams.offset.numpy()
-    return {key: offset[own] for key, own in _held(equations, kinds)}
 
 
 def _constraint_equations(

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import INNER, centre_notch, facing_edges
+from warpflat.garment.mark_openings import lines_inside
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
@@ -28,7 +29,6 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
     Raises:
         InputError: hardly anything of a neighbouring edge is left.
     """
-    import shapely
 
     names = [edge.name for edge in strip]
     at = names.index(INNER)
@@ -43,27 +43,18 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
                 raise InputError(
                     f"{piece.name}: strips meet at {edge.name!r}; make them narrower, or bind one of the edges"
                 )
-            edges.append(replace(edge, points=_rest(edge, part, at_start=edge.name == after.name), vertices=None))
+            # What the strip leaves of it: the strip lies at the start of the edge after it, at the end of the one before.
+            turn = 1 if edge.name == after.name else -1
+            points = edge.points[::turn]
+            left = points[arc_lengths(points) > part.length + 1e-9]
+            edges.append(replace(edge, points=np.vstack([part.points[::turn][-1:], left])[::turn], vertices=None))
         elif edge.name not in covered:
             edges.append(edge)
-    body, lines = shapely.Polygon(np.concatenate([edge.points[:-1] for edge in edges])).buffer(1e-6), {}
-    for name, line in piece.internal_lines.items():
-        parts = shapely.get_parts(shapely.LineString(line).intersection(body))
-        parts = [part for part in parts if part.geom_type == "LineString" and part.length > 1e-3]
-        if parts:
-            lines[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
+    lines = lines_inside(piece.internal_lines, np.concatenate([edge.points[:-1] for edge in edges]))
     try:
         return replace(piece, edges=edges, internal_lines=lines)
     except InputError:
         raise InputError(f"{piece.name}: nothing can be drawn beside {covered[0]!r}; take a narrower strip") from None
-
-
-def _rest(edge: Edge, part: Edge, *, at_start: bool) -> FloatArray:
-    """Return the points of an edge without the part that a strip has of it."""
-    points, other = (edge.points, part.points) if at_start else (edge.points[::-1], part.points[::-1])
-    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    rest = np.vstack([other[-1:], points[at > part.length + 1e-9]])
-    return rest if at_start else rest[::-1]
 
 
 def with_shaped_waistband(
@@ -87,10 +78,24 @@ def with_shaped_waistband(
     for name, edge in places:
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == name)
-            strip = facing_edges(row[at], (edge,), width)
-            rest = without_strip(row[at], strip, f"{edge} seam")
-            row.append(_band(row[at], strip, names[name]))
-            row[at] = rest
+            piece, strip = row[at], facing_edges(row[at], (edge,), width)
+            row[at] = without_strip(piece, strip, f"{edge} seam")
+            edges = [replace(part, kind="seam", allowance=None) if part.name == INNER else part for part in strip]
+            middle = np.concatenate([part.points for part in edges]).mean(axis=0)
+            grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
+            along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+            try:
+                # Twice as often as its piece: the outside and its facing.
+                band = Piece(
+                    name=names[name], size=piece.size, fabric=piece.fabric, quantity=2 * piece.quantity, edges=edges,
+                    paired=piece.paired and piece.quantity % 2 == 0, role="waistband",
+                    grain=middle + np.outer([-0.015, 0.015], along),
+                )  # fmt: skip
+            except InputError:
+                raise InputError(
+                    f"no waistband can be drawn along {piece.name}.{strip[0].name}: make it narrower"
+                ) from None
+            row.append(band)
         whole = pattern.piece(name, pattern.sample)
         order = [each.name for each in whole.edges]
         place = order.index(edge)
@@ -115,21 +120,6 @@ def with_shaped_waistband(
         seams.append(Seam(name=words, sides=((sides[0],), (sides[1],))))
     kept = [_with_moved_notches(pattern, seam, cut, width) for seam in pattern.seams]
     return replace(pattern, pieces=pieces, seams=[*kept, *seams])
-
-
-def _band(piece: Piece, strip: Sequence[Edge], title: str) -> Piece:
-    """Return a part of the band, cut twice as often as its piece: the outside and its facing."""
-    edges = [replace(edge, kind="seam", allowance=None) if edge.name == INNER else edge for edge in strip]
-    middle = np.concatenate([edge.points for edge in edges]).mean(axis=0)
-    grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
-    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
-    try:
-        return Piece(
-            name=title, size=piece.size, fabric=piece.fabric, quantity=2 * piece.quantity, edges=edges, role="waistband",
-            paired=piece.paired and piece.quantity % 2 == 0, grain=middle + np.outer([-0.015, 0.015], along),
-        )  # fmt: skip
-    except InputError:
-        raise InputError(f"no waistband can be drawn along {piece.name}.{strip[0].name}: make it narrower") from None
 
 
 def _with_moved_notches(

@@ -46,8 +46,8 @@ class RowEdges:
         """
         found = np.zeros(columns)
         for name, ends in self.ends.items():
-            own = np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
-            np.add.at(found, self.column[name], own * self.shares[name])
+            lengths = np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
+            np.add.at(found, self.column[name], lengths * self.shares[name])
         return found
 
 
@@ -58,11 +58,11 @@ class PieceEdges:
         self._form, self._mirror, self._count = form, layout.mirror, layout.vertex_count
         self._names = list(form.pieces)
         ends = [half_edges_of(piece.surface).edges for piece in form.pieces.values()]
-        keys = [self._keys(piece.grid_vertices[own]) for piece, own in zip(form.pieces.values(), ends, strict=True)]
+        keys = [self._keys(piece.grid_vertices[edges]) for piece, edges in zip(form.pieces.values(), ends, strict=True)]
         order = np.argsort(np.concatenate(keys), kind="stable")
         self._sorted = np.concatenate(keys)[order]
         self._ends = np.concatenate(ends)[order]
-        self._piece = np.repeat(np.arange(len(ends)), [len(own) for own in ends])[order]
+        self._piece = np.repeat(np.arange(len(ends)), [len(edges) for edges in ends])[order]
 
     def along(self, row: IntArray, axis: FloatArray = UPRIGHT) -> RowEdges | None:
         """Return the edges of pieces along a closed row; None where the pieces do not go all around.
@@ -77,8 +77,8 @@ class PieceEdges:
         edges = np.column_stack([row, np.roll(row, -1)])
         side = self._form.vertices[edges[:, 1]] - self._form.vertices[edges[:, 0]]
         level_share = np.linalg.norm(side - np.outer(side @ axis, axis), axis=1) / np.linalg.norm(side, axis=1)
-        own, image = self._keys(edges), self._keys(self._mirror[edges])
-        keys = np.where(self._copies(own) > 0, own, image)
+        keys_here, image = self._keys(edges), self._keys(self._mirror[edges])
+        keys = np.where(self._copies(keys_here) > 0, keys_here, image)
         copies = self._copies(keys)
         if not copies.all():
             return None

@@ -507,12 +507,14 @@ def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piec
         ids = result.network.surface.lines.get(line)
         if ids is None:
             continue
-        own = [e for e in piece.edges if e.vertices is not None and e.kind != "dart" and np.isin(e.vertices, ids).all()]
-        if sum(len(edge.points) - 1 for edge in own) != len(ids) - 1:
+        along = [
+            e for e in piece.edges if e.vertices is not None and e.kind != "dart" and np.isin(e.vertices, ids).all()
+        ]
+        if sum(len(edge.points) - 1 for edge in along) != len(ids) - 1:
             continue
-        ends = {int(edge.vertices[-1]) for edge in own if edge.vertices is not None}
-        start = next((k for k, e in enumerate(own) if e.vertices is not None and int(e.vertices[0]) not in ends), 0)
-        return tuple(SeamSide(piece=piece.name, edge=edge.name) for edge in own[start:] + own[:start])
+        ends = {int(edge.vertices[-1]) for edge in along if edge.vertices is not None}
+        start = next((k for k, e in enumerate(along) if e.vertices is not None and int(e.vertices[0]) not in ends), 0)
+        return tuple(SeamSide(piece=piece.name, edge=edge.name) for edge in along[start:] + along[:start])
     raise InputError(f"line {line!r} is no whole stretch of a piece's border; a cut or another line parts it")
 
 

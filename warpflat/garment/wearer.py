@@ -153,16 +153,17 @@ def assess_wearer(
         strain = max(0.0, tape.girth / float(lengths.sum()) - 1.0)
         pressure = tension_around(fabric, grain_angle, strain) * tape.curvature
         looseness = np.zeros(len(vertices))
-        own = {}
+        by_side = {}
         for side, columns in sides.items():
             length, body = float(lengths[columns].sum()), float(tape.edges[columns].sum())
             looseness[columns] = max(0.0, 1.0 - body / length)
-            own[side] = {"ease_m": length - body, "pressure_pa": float(pressure[columns].max())}
+            by_side[side] = {"ease_m": length - body, "pressure_pa": float(pressure[columns].max())}
         level, place = name
         ease = float(lengths.sum()) - tape.girth
         rows.append(
             _Row(
-                vertices=vertices, level=level, place=place, ease=ease, strain=strain, pressure=pressure, looseness=looseness, sides=own,
+                vertices=vertices, level=level, place=place, ease=ease, strain=strain, pressure=pressure, looseness=looseness,
+                sides=by_side,
             )
         )  # fmt: skip
     if not rows:
@@ -243,6 +244,6 @@ def _by_face(layout: Layout, form: FormResult, rows: list[_Row]) -> dict[str, Bo
         corners = piece.grid_vertices[piece.surface.faces]
         known = np.isfinite(strain[corners])
         count = np.where(known.any(axis=1), known.sum(axis=1), np.nan)
-        own = [np.where(known, values[corners], 0.0).sum(axis=1) / count for values in (strain, pressure)]
-        found[name] = BodyFit(strain=own[0], pressure=own[1])
+        of_faces = [np.where(known, values[corners], 0.0).sum(axis=1) / count for values in (strain, pressure)]
+        found[name] = BodyFit(strain=of_faces[0], pressure=of_faces[1])
     return found

@@ -17,7 +17,7 @@ from warpflat.export.colours import SMALLEST_SCALE, energy_colours
 from warpflat.export.figure import write_moving_picture
 from warpflat.export.geometry import outline_edges
 from warpflat.export.raster import rasterise, shade
-from warpflat.review.film import FilmPiece, Shape, open_film
+from warpflat.review.film import FilmPiece, open_film
 from warpflat.review.page import read_run
 from warpflat.surface.triangles import triangulate
 
@@ -80,8 +80,20 @@ def _evenly(times: Sequence[int], most: int) -> list[int]:
 
 def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -> list[Image.Image]:
     """Return pictures of all patterns at these frames, RGB, of one size."""
-    shapes = {piece.name: [_drawn(piece.shape(change)) for change in piece.changes] for piece in pieces}
-    frames = [[_layout(piece, shapes[piece.name], time) for piece in pieces] for time in times]
+    topologies = dict[str, list[_Drawn]]()
+    for piece in pieces:
+        for shape in map(piece.shape, piece.changes):
+            triangles, face = triangulate(shape.faces)
+            drawn = _Drawn(triangles=triangles, face=face, edges=outline_edges(shape.faces), count=len(shape.surface))
+            topologies.setdefault(piece.name, []).append(drawn)
+    frames = []
+    for time in times:
+        frame = []
+        for piece in pieces:
+            at = min(time, piece.times[-1])
+            drawn = topologies[piece.name][max(sum(change <= at for change in piece.changes) - 1, 0)]
+            frame.append((drawn, piece.positions(at, drawn.count) + piece.offset[:2], piece.density(at)))
+        frames.append(frame)
     everything = np.concatenate([points for frame in frames for _, points, _ in frame])
     low, size = everything.min(axis=0), np.ptp(everything, axis=0)
     scale = (long_side - 2 * _MARGIN - _FOOT) / float(size.max())
@@ -105,17 +117,6 @@ class _Drawn:
     face: IntArray
     edges: IntArray
     count: int
-
-
-def _drawn(shape: Shape) -> _Drawn:
-    triangles, face = triangulate(shape.faces)
-    return _Drawn(triangles=triangles, face=face, edges=outline_edges(shape.faces), count=len(shape.surface))
-
-
-def _layout(piece: FilmPiece, shapes: Sequence[_Drawn], time: int) -> tuple[_Drawn, FloatArray, FloatArray]:
-    at = min(time, piece.times[-1])
-    shape = shapes[max(sum(change <= at for change in piece.changes) - 1, 0)]
-    return shape, piece.positions(at, shape.count) + piece.offset[:2], piece.density(at)
 
 
 def _image(

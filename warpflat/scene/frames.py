@@ -326,10 +326,19 @@ class Film:
         if kind is not None or self._keys.failed:
             return
         with optional_file(self._folder / "frames.usdc", self.files) as path:
-            from warpflat.export.usd import FrameWriter
+            from warpflat.export.colours import SMALLEST_SCALE
+            from warpflat.export.usd import FrameWriter, film_scale
 
             report_activity("writing the film")
-            with FrameWriter(path, scale=self._scale()) as writer:
+            # The upper end of the colours: by the last frames, or by the first ones if the pieces end without strain.
+            for at in (-1, 0):
+                ends = [recorder.stages[at] for recorder in self.recorders.values()]
+                scale = film_scale(
+                    list(self._surfaces.values()), [self._keys.density(stage, stage.keys[at]) for stage in ends]
+                )
+                if scale > SMALLEST_SCALE:
+                    break
+            with FrameWriter(path, scale=scale) as writer:
                 if self._mannequin is not None:
                     from warpflat.mannequin.normals import vertex_normals
                     from warpflat.mannequin.usd import write_mannequin_usd
@@ -371,19 +380,6 @@ class Film:
                                 **(stage.topology if begins else {}),  # type: ignore[arg-type]
                                 measures=measures,
                             )
-
-    def _scale(self) -> float:
-        """Return the upper end of the colours [J/m2]: by the last frames, or by the first ones if the pieces end without strain."""
-        from warpflat.export.colours import SMALLEST_SCALE
-        from warpflat.export.usd import film_scale
-
-        for at in (-1, 0):
-            stages = [recorder.stages[at] for recorder in self.recorders.values()]
-            densities = [self._keys.density(stage, stage.keys[at]) for stage in stages]
-            scale = film_scale(list(self._surfaces.values()), densities)
-            if scale > SMALLEST_SCALE:
-                break
-        return scale
 
     def _shot(self, stages: Sequence[FilmStage], number: int) -> tuple[FilmStage, list[Key], int]:
         """Return a stage of a piece, the keys that are shown and the number of frames that it needs.
@@ -454,8 +450,11 @@ class FrameRecorder:
                 name = "relax" if progress.stage == "develop" else progress.stage
                 self._begin_stage(name, progress.surface, positions)
                 self._schedule.is_due(progress.step, progress.max_steps)
-            elif not self._has_moved(positions):
-                return
+            elif not self._schedule.is_even:
+                # A layout is kept that lies far enough from the one kept last, by the way of the stage until now.
+                moved, travelled = (np.abs(positions - before).max() for before in (self._last, self._first))
+                if not moved > _KEPT * travelled:
+                    return
             measures = {"step": progress.step, "model_energy_j": progress.model_energy}
             self._keep(positions, progress.face_energy_density(), measures)
 
@@ -519,13 +518,6 @@ class FrameRecorder:
             )
         )
         self._first, self._ended = positions, False
-
-    def _has_moved(self, positions: FloatArray) -> bool:
-        """Return whether the layout lies far enough from the one kept last, by the way of the stage until now."""
-        if self._schedule.is_even:
-            return True
-        moved, travelled = (np.abs(positions - before).max() for before in (self._last, self._first))
-        return bool(moved > _KEPT * travelled)
 
     def _keep(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> None:
         assert self._keys is not None

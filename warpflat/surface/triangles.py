@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.launch import launch_each
-from warpflat.kernels.unfold import unfold_diagonals
 from warpflat.surface.half_edges import four_columns
 
 __all__ = ["corner_triangles", "selected_rows", "triangulate", "unfold_quad_diagonals"]
@@ -136,6 +134,10 @@ def unfold_quad_diagonals(
         #Q by 2 lengths [m], of corners 0-2 (across the hinge 1-3) and of corners 1-3 (across the hinge 0-2); and #Q,
         the face of each row.
     """
+    # Not for those who only triangulate: Warp takes a third of a second to load, as long as reading a film does.
+    from warpflat.core.launch import launch_each
+    from warpflat.kernels.unfold import unfold_diagonals
+
     is_quad = faces[:, 3] >= 0
     index = np.flatnonzero(is_quad).astype(np.int32)
     lengths = np.empty((len(index), 2))
