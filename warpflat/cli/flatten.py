@@ -29,7 +29,9 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
 @click.option(
     "--seams",
     metavar="HOW",
-    help="auto: cut a whole garment where a tailor would; none: keep it whole.  [default: auto where one piece cannot lie flat]",
+    help="auto: cut a whole garment along islands of its texture that look like cut pieces, else where a tailor would; uv, materials, "
+    "groups: along what the file has; file: along the first of these that it has; none: keep it whole.  [default: auto where one piece "
+    "cannot lie flat]",
 )
 @click.option(
     "--front", metavar="AXIS", help="Where the front of a whole garment faces: +z, -z, +x ...  [default: found]"

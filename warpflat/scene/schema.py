@@ -299,7 +299,9 @@ class FindSeamsTable(Table):
     a garment that cannot lie flat in one piece is cut.
     """
 
-    find: Literal["auto", "none"] = "auto"
+    find: Literal["auto", "none", "file", "uv", "materials", "groups"] = "auto"
+    """What is cut: "auto" along texture islands that look like cut pieces, else where a tailor would; "none" only what is drawn; "uv",
+    "materials", "groups" along what the file has of these, "file" along the first of them that it has."""
     up: Direction | None = None
     front: Direction | None = None
     no: list[str] = Field(default_factory=list)
@@ -672,8 +674,8 @@ class SceneTable(Table):
                 raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
             if self.ease is not None:
                 raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
-            found = self.find_seams is not None and self.find_seams.find == "auto"
-            whole = '[seams] find = "auto"' if found else "[[seams_cut]]" if self.seams_cut else None
+            found = None if self.find_seams is None or self.find_seams.find == "none" else self.find_seams.find
+            whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
             if whole and not isinstance(self.surface, FileSurface):
                 raise ValueError(f"{whole} takes a garment from a file")
             if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or whole):

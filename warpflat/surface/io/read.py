@@ -65,6 +65,9 @@ class RawMesh:
         notes: one sentence each.
         groups: objects, nodes or prims as (first vertex, name), in their order.
         marked: rows of vertices without a name: creases of USD, edge elements of PLY.
+        texture: #F by k by 2, texture coordinates at the corners, nan where there are none; None if the file has none.
+        face_material, face_group: #F, a number for the material of each face, and for its group, object, node or subset, each with
+            their names; None where the format knows none.
     """
 
     vertices: FloatArray
@@ -77,6 +80,9 @@ class RawMesh:
     notes: list[str] = field(default_factory=list)
     groups: list[tuple[int, str]] = field(default_factory=list)
     marked: list[NDArray[np.int64]] = field(default_factory=list)
+    texture: FloatArray | None = None
+    face_material: tuple[NDArray[np.int64], tuple[str, ...]] | None = None
+    face_group: tuple[NDArray[np.int64], tuple[str, ...]] | None = None
 
 
 def read_surface(
@@ -205,9 +211,16 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         assert isinstance(usd, UsdMesh)
         for layer in usd.layers:
             note_read(layer)
+        polygons, texture = pad_corners(usd.corners, usd.sizes), None
+        if np.isfinite(usd.texture).any():
+            texture = np.full((*polygons.shape, 2), np.nan)
+            texture[polygons >= 0] = usd.texture
         return RawMesh(
             vertices=usd.vertices,
-            polygons=pad_corners(usd.corners, usd.sizes),
+            polygons=polygons,
+            texture=texture,
+            face_material=usd.face_material,
+            face_group=usd.face_group,
             scale=1.0,
             name=usd.name,
             curves=usd.curves,
@@ -227,6 +240,10 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
             scale=scale,
             split_corners=obj.split_corners,
             groups=obj.groups,
+            notes=obj.notes,
+            texture=obj.texture,
+            face_material=obj.face_material,
+            face_group=obj.face_group,
         )
         if not obj.lines:
             return raw
@@ -261,6 +278,9 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         split_corners=mesh.split_corners,
         groups=mesh.groups,
         marked=list(mesh.edges),
+        texture=mesh.corner_texture,
+        face_material=mesh.face_material,
+        face_group=mesh.face_group,
     )
 
 

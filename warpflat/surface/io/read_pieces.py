@@ -10,6 +10,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
 from warpflat.core.text import format_count
@@ -19,7 +20,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
 
-__all__ = ["read_pieces"]
+__all__ = ["object_parts", "read_pieces"]
 
 
 def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: str | None = None) -> tuple[Surface, ...]:
@@ -49,11 +50,7 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
         points = vertices[first : first + int(polygons.max()) + 1]
         source = str(file) if len(objects) == 1 else f"{file}: {title}"
         try:
-            part = parts_of_faces(points, polygons, weld=False)
-            # Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
-            soup = 2 * int(part.max() + 1) > len(polygons)
-            if soup:
-                part = parts_of_faces(points, polygons, weld=True)
+            part, soup = object_parts(points, polygons)
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
         for number in range(int(part.max()) + 1):
@@ -84,6 +81,19 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
     # Without its second layer a piece may be alone of its name.
     kept = _named_apart([surface for number, surface in enumerate(found) if number not in doubled])
     return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
+
+
+def object_parts(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[IntArray, bool]:
+    """Return the connected part of each face of an object (#F), and whether vertices at one place had to be joined for that.
+
+    Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
+
+    Raises:
+        InputError: as :func:`parts_of_faces`.
+    """
+    part = parts_of_faces(vertices, polygons, weld=False)
+    soup = 2 * int(part.max() + 1) > len(polygons)
+    return (parts_of_faces(vertices, polygons, weld=True) if soup else part), soup
 
 
 def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:
