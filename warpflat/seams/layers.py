@@ -66,13 +66,13 @@ def read_garment(
     """
     file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim or ALL_PRIMS, name=name)
     vertices, title = raw.vertices * scale, name or make_file_name(file.stem)
+    notes = list(raw.notes)
     try:
-        part = parts_of_faces(vertices, raw.polygons, weld=True)
+        part = parts_of_faces(vertices, raw.polygons, weld=True, notes=notes)
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
     found: list[Surface] = []
     faults: list[InputError] = []
-    notes = list(raw.notes)
     counts = np.bincount(part[part >= 0])
     order = np.argsort(-counts, kind="stable")
     for number in order[:_MOST_LAYERS].tolist():

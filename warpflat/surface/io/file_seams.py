@@ -234,7 +234,7 @@ def _has_simple_outline(texture: FloatArray, polygons: Ids) -> bool:
     import shapely
 
     real = (polygons >= 0) & np.isfinite(texture).all(axis=2)
-    number = np.full(polygons.shape, -1, dtype=np.int64)
+    number: Ids = np.full(polygons.shape, -1, dtype=np.int64)
     places, number[real] = np.unique(texture[real], axis=0, return_inverse=True)
     rows: list[list[int]] = [[corner for corner in row if corner >= 0] for row in number.tolist()]
     sides = {(a, b) for row in rows for a, b in pairwise([*row, *row[:1]])}

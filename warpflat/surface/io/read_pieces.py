@@ -46,11 +46,12 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
     found: list[Surface] = []
     closed = small = 0
     objects = list(_objects(raw, name or make_file_name(file.stem)))
+    notes = list(raw.notes)
     for title, first, polygons in objects:
         points = vertices[first : first + int(polygons.max()) + 1]
         source = str(file) if len(objects) == 1 else f"{file}: {title}"
         try:
-            part, soup = object_parts(points, polygons)
+            part, soup = object_parts(points, polygons, notes)
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
         for number in range(int(part.max()) + 1):
@@ -66,7 +67,6 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
             found.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
     if not found:
         raise InputError(f"{file}: every part is closed (it has no border) or a crumb; give the layer of cloth alone")
-    notes = list(raw.notes)
     if closed:
         notes.append(f"{format_count(closed, 'closed part')}, such as a button, left out")
     if small:
@@ -83,7 +83,9 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
     return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
 
 
-def object_parts(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[IntArray, bool]:
+def object_parts(
+    vertices: FloatArray, polygons: NDArray[np.int64], notes: list[str] | None = None
+) -> tuple[IntArray, bool]:
     """Return the connected part of each face of an object (#F), and whether vertices at one place had to be joined for that.
 
     Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
@@ -91,9 +93,15 @@ def object_parts(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[Int
     Raises:
         InputError: as :func:`parts_of_faces`.
     """
-    part = parts_of_faces(vertices, polygons, weld=False)
+    told = list[str]()
+    part = parts_of_faces(vertices, polygons, weld=False, notes=told)
     soup = 2 * int(part.max() + 1) > len(polygons)
-    return (parts_of_faces(vertices, polygons, weld=True) if soup else part), soup
+    if soup:
+        told = []
+        part = parts_of_faces(vertices, polygons, weld=True, notes=told)
+    if notes is not None:
+        notes += told
+    return part, soup
 
 
 def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:
