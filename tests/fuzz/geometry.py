@@ -57,7 +57,7 @@ def _obj(parts: list[tuple[str, Any, Any]]) -> bytes:
 
 @functools.cache
 def garment_meshes() -> dict[str, bytes]:
-    """Meshes by name: a tube; two pieces that meet; doubled layers; shorts; a sheet with a doublet and a folded quad."""
+    """Meshes by name: a tube; two pieces that meet; doubled layers; a doublet; a folded quad; a thick sheet; one with a fin and a pocket."""
     rows, around = 7, 12
     angle, height = 2 * np.pi * np.arange(around) / around, np.linspace(0, 0.3, rows)
     wide = 0.1 + 0.02 * np.cos(angle)[None, :] * (height / 0.3)[:, None]
@@ -75,7 +75,14 @@ def garment_meshes() -> dict[str, bytes]:
     cap = np.array([[-0.1, 0, 0], [0, -0.1, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.09]])
     doublet = [[0, 1, 2, 4], [0, 4, 2, 3]]
     folded = np.array([[0, 0, 0], [0.5, 0, 0.4], [0.1, 0.5, 0.1], [0.1, 0, 0], [0.4, 0.8, 1.2], [0, 1.2, 0.9]])
+    rim = np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
+    wall = np.stack([np.roll(rim, -1), rim, rim + 42, np.roll(rim, -1) + 42], -1)
+    thick = np.vstack([sheet, sheet[:, ::-1] + 42, wall])
+    bent = front * [1, 1, 3]
+    fin = np.stack([grid[1:-1, 2][:-1], grid[1:-1, 2][1:], np.arange(43, 47), np.arange(42, 46)], -1)
     return {
+        "thick.obj": _obj([("thick", np.vstack([bent, bent - [0, 0, 0.003]]), thick)]),
+        "fin.obj": _obj([("fin", np.vstack([front, front[grid[1:-1, 2]] + [0, 0, 0.02]]), np.vstack([sheet, fin]))]),
         "tube.obj": _obj([("tube", tube, belt)]),
         "pieces.obj": _obj([("front", front, sheet), ("back", back, sheet[:, ::-1])]),
         "double.obj": _obj([("outer", front, sheet), ("inner", slipped, sheet[:, ::-1])]),
