@@ -57,7 +57,7 @@ def _obj(parts: list[tuple[str, Any, Any]]) -> bytes:
 
 @functools.cache
 def garment_meshes() -> dict[str, bytes]:
-    """Meshes by name: a tube; two pieces that meet; doubled layers; a doublet; a folded quad; a thick sheet; one with a fin and a pocket."""
+    """Meshes by name: a tube; two pieces that meet, or nearly; doubled layers; a doublet; a folded quad; a thick sheet; one with a fin."""
     rows, around = 7, 12
     angle, height = 2 * np.pi * np.arange(around) / around, np.linspace(0, 0.3, rows)
     wide = 0.1 + 0.02 * np.cos(angle)[None, :] * (height / 0.3)[:, None]
@@ -85,6 +85,9 @@ def garment_meshes() -> dict[str, bytes]:
         "fin.obj": _obj([("fin", np.vstack([front, front[grid[1:-1, 2]] + [0, 0, 0.02]]), np.vstack([sheet, fin]))]),
         "tube.obj": _obj([("tube", tube, belt)]),
         "pieces.obj": _obj([("front", front, sheet), ("back", back, sheet[:, ::-1])]),
+        "nearly.obj": _obj(
+            [("front", front, sheet), ("back", back[:36] * [1, 1.2, 1] - [0, 0, 4e-4], sheet[:25, ::-1])]
+        ),
         "double.obj": _obj([("outer", front, sheet), ("inner", slipped, sheet[:, ::-1])]),
         "doublet.obj": _obj([("cap", cap, doublet)]),
         "folded.obj": _obj([("sheet", folded, [[0, 1, 2, 3], [2, 1, 4, 5]])]),
@@ -227,7 +230,7 @@ def geometry_case(kind: str, random: Random) -> Case:
         command += ["--seams", "auto", "--fabric", "woven", "--max-steps", "30"]
         command += random.choice(([], ["--front", "-z"], ["--up", "+z"], ["--no", "dart"], ["--limit", "1"]))
     elif kind == "pieces":
-        command += ["--component", "all"]
+        command += ["--component", "all", *random.choice(([], [], ["--meet", "0"], ["--meet", "10"]))]
     else:
         name = random.choice(("tube.obj", name))
         ends = [random.choice((random.randrange(84), 0, 72, 10**6)) for _ in range(2)]

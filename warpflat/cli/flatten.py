@@ -58,6 +58,12 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     metavar="SHARE",
     help="Of the cloth that may stay beyond its limit before darts and further seams are tried.  [default: 0.02]",
 )
+@click.option(
+    "--meet",
+    type=float,
+    metavar="MM",
+    help="With --component all: sew borders that run along each other within so many millimetres.  [default: 1]",
+)
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
@@ -133,6 +139,7 @@ def flatten(
         "units": ("surface", "units"),
         "component": ("surface", "component"),
         "prim": ("surface", "prim"),
+        "meet": ("surface", "meet_mm"),
         "solver": ("relax", "solver"),
         "max_steps": ("relax", "max_steps"),
         "time_step": ("relax", "time_step"),

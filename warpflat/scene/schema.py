@@ -202,6 +202,8 @@ class FileSurface(Table):
     component: Component | None = None
     """Which connected part of the mesh; with "all" every part of every object is a piece, and edges that meet in space are seams."""
     prim: str | None = None
+    meet_mm: Annotated[float, Field(ge=0, le=10)] | None = None
+    """With component = "all": borders that run along each other within this distance are sewn; 1 if not given."""
 
     @model_validator(mode="before")
     @classmethod
@@ -678,6 +680,12 @@ class SceneTable(Table):
             whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
             if whole and not isinstance(self.surface, FileSurface):
                 raise ValueError(f"{whole} takes a garment from a file")
+            if (
+                isinstance(self.surface, FileSurface)
+                and self.surface.meet_mm is not None
+                and self.surface.component != "all"
+            ):
+                raise ValueError('surface.meet_mm is for component = "all"; leave it out')
             if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or whole):
                 if self.surface.component == "all" and self.seams_cut:
                     raise ValueError('[[seams_cut]] cuts a whole garment; with component = "all" leave it out')

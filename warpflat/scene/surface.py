@@ -73,11 +73,13 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
         InputError: the file is wrong, or an environment variable is not set.
     """
     from warpflat.surface.io.read_pieces import read_pieces
+    from warpflat.surface.repair.meet import MEET
 
     table = scene.settings.surface
     if not isinstance(table, FileSurface) or table.component != "all":
         return None
-    return read_pieces(_file(scene, table), units=table.units, name=scene.name)
+    meet = MEET if table.meet_mm is None else 1e-3 * table.meet_mm
+    return read_pieces(_file(scene, table), units=table.units, name=scene.name, meet=meet)
 
 
 def _file(scene: Scene, table: FileSurface) -> Path:

@@ -18,12 +18,15 @@ from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_fi
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
+from warpflat.surface.repair.meet import MEET, meet_borders
 from warpflat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
 
 __all__ = ["object_parts", "read_pieces"]
 
 
-def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: str | None = None) -> tuple[Surface, ...]:
+def read_pieces(
+    path: str | PathLike[str], *, units: str | None = None, name: str | None = None, meet: float = MEET
+) -> tuple[Surface, ...]:
     """Read all pieces of a garment: each connected part of each object of an OBJ file, node of a GLB scene or mesh prim of a USD stage.
 
     Objects are repaired and checked each on its own, so that pieces stay apart whose borders lie at one place, as along a seam. They are
@@ -34,6 +37,8 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
         path: the file.
         units: as :func:`warpflat.read_surface`.
         name: for pieces that have none in the file; by default the file's stem.
+        meet: borders that run along each other within this distance [m] are made to agree vertex by vertex, so that they are sewn; 0
+            leaves them as they are.
 
     Returns:
         The pieces, in the order of the file; `input_vertices` are those of the piece's object.
@@ -79,7 +84,10 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
         for number, other in doubled.items()
     ]
     # Without its second layer a piece may be alone of its name.
-    kept = _named_apart([surface for number, surface in enumerate(found) if number not in doubled])
+    kept, met = meet_borders(
+        _named_apart([surface for number, surface in enumerate(found) if number not in doubled]), meet
+    )
+    notes += met
     return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
 
 
