@@ -40,8 +40,9 @@ _SURFACES = (
     "[surface]\nfile = 'tube.obj'\nunits = 'm'\n[[cuts]]\nname = 'across'\nplane = {point = [0.1, 0.16, 0.0], normal = [0.0, 1.0, 0.0]}\n"
     "[[cuts]]\nname = 'half'\nplane = {point = [0.0, 0.1, 0.1], normal = [1.0, 0.0, 0.0]}\n[relax]\nmax_steps = 30\n"
     + _QUIET,
-    "fabric = 'woven'\n[surface]\nfile = 'pieces.obj'\nunits = 'm'\ncomponent = 'all'\n[relax]\nmax_steps = 30\n"
-    + _QUIET,
+    "fabric = 'woven'\n[surface]\nfile = 'nearly.obj'\nunits = 'm'\ncomponent = 'all'\nmeet_mm = 0.7\n[relax]\nmax_steps = 30\n"
+    "[pieces.front]\ndatum = 'to back'\ncuts = [{ from = 2, to = 14 }]\n[pieces.back]\ngrain_angle = 45\n"
+    "lines = { middle = { vertices = [3, 9] } }\n" + _QUIET,
     "[surface]\nshape = 'dome'\nresolution = 5\n[drape]\nmax_steps = 20\nfriction = 0.2\n" + _QUIET,
 )
 

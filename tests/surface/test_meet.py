@@ -12,6 +12,8 @@ import pytest
 import warpflat
 from warpflat.cli.main import main
 from warpflat.garment.sew_pieces import meeting_borders, unsewn_borders
+from warpflat.scene.load import make_scene
+from warpflat.scene.plan import plan_scene
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.meet import meet_borders
@@ -160,3 +162,62 @@ def test_seams_that_nearly_meet_are_sewn_from_the_command_line(
     assert all(
         len(set(pairwise(loop.tolist()))) == len(loop) - 1 for piece in pieces for loop in border_loops(piece.faces)
     )
+
+
+def tube(x: float) -> Surface:
+    turn, height = 2 * np.pi * np.arange(16) / 16, np.linspace(0, 0.3, 9)
+    points = np.array([[x + 0.08 * np.cos(a), y, 0.08 * np.sin(a)] for y in height for a in turn])
+    at = np.arange(9 * 16).reshape(9, 16)
+    quads = np.stack([at[:-1], at[1:], np.roll(at, -1, 1)[1:], np.roll(at, -1, 1)[:-1]], -1).reshape(-1, 4)
+    return make_surface(points, quads, name="sleeve")
+
+
+def test_datum_grain_cuts_and_opening_are_given_by_piece(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path / "three.obj", [sheet(LEFT, UP, name="left"), sheet(RIGHT, UP, name="right"), tube(1.0)])
+    bare = ["flatten", str(path), "--units", "m", "--component", "all", "--frames", "0", "--no-picture", "--quiet"]
+    given = ["--datum", "left:bottom", "--datum", "right:0,60", "--grain-angle", "right:45", "--open", "sleeve:5,133"]
+    assert main([*bare, *given, "--out", str(tmp_path / "out")]) == 0
+    pieces = json.loads((tmp_path / "out" / "metrics.json").read_text())["pieces"]
+    assert {name: piece["datum"] for name, piece in pieces.items()}["left"] == "bottom"
+    assert pieces["right"]["datum"] == "datum"
+    tables = {
+        "surface": {"file": str(path), "units": "m", "component": "all"},
+        "pieces": {"right": {"grain_angle": 45.0}},
+        "grain_angle": 10.0,
+    }
+    garment = plan_scene(make_scene(tables, name="three", folder=tmp_path, where="here")).flatten()
+    assert {name: piece.grain_angle for name, piece in garment.pieces.items()} == {
+        "left": 10,
+        "right": 45,
+        "sleeve": 10,
+    }
+    text = (tmp_path / "out" / "sleeve.obj").read_text()
+    corners = {
+        tuple(word.split("/")[:2]) for row in text.splitlines() if row.startswith("f ") for word in row.split()[1:]
+    }
+    vertices = [vertex for vertex, _ in corners]
+    # Along the column of vertex 5, each of which has two places in the pattern.
+    assert {int(v) - 1 for v in vertices if vertices.count(v) == 2} == {5 + 16 * row for row in range(9)}
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[surface]\nfile = "three.obj"\nunits = "m"\ncomponent = "all"\n[output]\nframes = 0\npicture = false\n'
+        '[pieces.left]\ndatum = "to right"\ncuts = [{ from = 2, to = 20 }]\n'
+    )
+    assert main(["run", str(scene), "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
+    assert metrics["pieces"]["left"]["datum"] == "to right"
+    assert len(metrics["pieces"]["left"]["cuts"]) == 1
+    capsys.readouterr()
+    for odd, words in (
+        (["--datum", "middle:bottom"], "there is no such piece"),
+        (["--datum", "left:nowhere"], "unknown line 'nowhere'"),
+        (["--grain-angle", "left:slanted"], "grain_angle"),
+        (["--open", "sleeve:5,13300"], "pieces.sleeve: cuts[0]"),
+        (["--datum", "left:top", "--datum", "left:bottom"], "given twice"),
+        (["--datum", "bottom"], "give it to a piece"),
+    ):
+        assert main([*bare, *odd, "--out", str(tmp_path / "odd")]) == 2
+        line = capsys.readouterr().err.strip()
+        assert words in line
+        assert "\n" not in line
+        assert not (tmp_path / "odd").exists()
