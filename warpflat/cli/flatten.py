@@ -184,7 +184,7 @@ def flatten(
     for option, values in (("--datum", datums), ("--open", openings), ("--grain-angle", grain_angles)):
         for value in values:
             piece, colon, text = value.rpartition(":")
-            table = pieces.setdefault(piece, {}) if colon else tables
+            own: dict[str, Any] = pieces.setdefault(piece, {}) if colon else tables
             # A USD curve becomes a line of its name.
             line = text.rstrip("/").rpartition("/")[2]
             numbers = [int(v) for v in text.split(",")] if re.fullmatch(r"[0-9]{1,18}(,[0-9]{1,18})+", text) else []
@@ -194,14 +194,14 @@ def flatten(
                 "--open": ("cuts", [{"name": "opening", **ends}] if len(numbers) == 2 else [{"line": line}]),
                 "--grain-angle": ("grain_angle", _degrees(text)),
             }[option]
-            if key in table:
+            if key in own:
                 what = f"piece {quote_value(piece)}" if colon else "the piece"
                 raise InputError(
                     f"{option} is given twice for {what}; give it once, or of several pieces as {option} PIECE:..."
                 )
-            table[key] = given
+            own[key] = given
             if option == "--datum" and numbers:
-                table["lines"] = {"datum": ends}
+                own["lines"] = {"datum": ends}
     if pieces:
         tables["pieces"] = pieces
     # "Ärmel (1).obj" gives files "Armel_1".

@@ -12,7 +12,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, plain_label
 from warpflat.core.text import format_count, quote_value
 from warpflat.seams.options import SeamCut
-from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file
+from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
@@ -73,6 +73,7 @@ def read_garment(
         raise InputError(f"{file}: {error}") from error
     found: list[Surface] = []
     faults: list[InputError] = []
+    largest = 0.0
     counts = np.bincount(part[part >= 0])
     order = np.argsort(-counts, kind="stable")
     for number in order[:_MOST_LAYERS].tolist():
@@ -83,10 +84,12 @@ def read_garment(
         except InputError as error:
             faults.append(error)
             continue
-        if float(np.ptp(surface.vertices, axis=0).max()) >= POSSIBLE[0] or len(order) == 1:
+        size = float(np.ptp(surface.vertices, axis=0).max())
+        largest = max(largest, size)
+        if size >= POSSIBLE[0] or len(order) == 1:
             found.append(surface)
     if not found:
-        raise faults[0] if faults else InputError(f"{file}: every part is a crumb; no cloth is left")
+        raise faults[0] if faults else wrong_size(largest, file, scale)
     layers = [Layer(surface.vertices, surface.faces) for surface in found]
     total = sum(layer.area for layer in layers)
     doubled = doubled_layers(layers)

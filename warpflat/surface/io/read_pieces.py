@@ -14,7 +14,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
 from warpflat.core.text import format_count
-from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file
+from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
@@ -50,6 +50,7 @@ def read_pieces(
     vertices = raw.vertices * scale
     found: list[Surface] = []
     closed = small = 0
+    largest = 0.0
     objects = list(_objects(raw, name or make_file_name(file.stem)))
     notes = list(raw.notes)
     for title, first, polygons in objects:
@@ -65,11 +66,15 @@ def read_pieces(
             except ClosedSurfaceError:
                 closed += 1
                 continue
-            if float(np.ptp(surface.vertices, axis=0).max()) < POSSIBLE[0]:
+            size = float(np.ptp(surface.vertices, axis=0).max())
+            largest = max(largest, size)
+            if size < POSSIBLE[0]:
                 small += 1
                 continue
             check_size(surface, file, scale)
             found.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
+    if small and not found:
+        raise wrong_size(largest, file, scale)
     if not found:
         raise InputError(f"{file}: every part is closed (it has no border) or a crumb; give the layer of cloth alone")
     if closed:
