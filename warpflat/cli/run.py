@@ -92,9 +92,7 @@ def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool,
     if as_json:
         click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet and not verbose:
-        if result.size:
-            click.echo(f"size: {result.size}")
-        for line in summary_lines(result.metrics, result.files, str(folder)):
+        for line in summary_lines(result.metrics, result.files, str(folder), size=result.size):
             click.echo(line)
     elif not quiet:
         if result.size:

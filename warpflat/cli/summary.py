@@ -23,13 +23,14 @@ _MAIN_GIRTHS = ("bust", "waist", "hip")
 _COMPLETED = re.compile(r"\w+ = [\d.]+ c?m (?!instead of )")
 
 
-def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> list[str]:
+def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str, *, size: str = "") -> list[str]:
     """Return the lines at the end of a run, none longer than `WIDTH` unless the folder's name is.
 
     Args:
         metrics: as `metrics.json`.
         files: their names.
         folder: where they lie.
+        size: of what was read, in words.
     """
     pieces = metrics["pieces"]
     unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
@@ -43,6 +44,8 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         f"energy {energy_words(sum(piece['strain_energy_j'] for piece in pieces.values()))}",
     ]
     lines = [_clipped(f"pieces: {len(pieces)}; {', '.join(parts)}")]
+    if size:
+        lines.append(_clipped(f"size: {size}"))
     if relaxed := relaxation_words(piece["stages"] for piece in pieces.values()):
         lines.append(f"relaxed: {relaxed}")
     if girths := metrics.get("girths"):

@@ -94,7 +94,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             )
         if len(taken.names) > MOST_ISLANDS:
             raise InputError(
-                f"{path}: find = {asked.find!r}: {taken.describe} are too many for a pattern, which has at most {MOST_ISLANDS} pieces; "
+                f"{path}: find = {asked.find!r}: {taken.describe()} are too many for a pattern, which has at most {MOST_ISLANDS} pieces; "
                 'find = "auto" (--seams auto) looks for seams'
             )
     by_itself = asked is None and not all_parts and _is_whole_garment(layers[0])
@@ -106,7 +106,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             taken = seams["uv"]
             notes.append("islands of the texture were taken, as they look like cut pieces; --seams none keeps it whole")
         elif why and (by_itself or asked is not None) and not all_parts:
-            notes.append(f"{seams['uv'].describe} were not taken for cut pieces, as {why}; --seams uv takes them")
+            notes.append(f"{seams['uv'].describe()} were not taken for cut pieces, as {why}; --seams uv takes them")
     if taken is None and (all_parts or (asked is None and not drawn and not by_itself)):
         return None
     if isinstance(table.component, int):
@@ -223,7 +223,10 @@ def _named_by_file(found: FoundSeams, seams: FileSeams, read: GarmentFile) -> Fo
         title = find_unused_name(renamed(seam.name), titled)
         titled.add(title)
         made.append(replace(seam, name=title))
-    return replace(found, pieces=tuple(pieces), seams=tuple(made), along=seams.describe)
+    # A seam that ends inside the cloth is told by its name.
+    notes = [edge.sub(lambda match: renamed(match[0]), note) for note in found.notes]
+    along = seams.describe(len(set(islands)))
+    return replace(found, pieces=tuple(pieces), seams=tuple(made), notes=tuple(notes), along=along)
 
 
 def _as_cuts(scene: Scene, number: int, table: SeamCutTable, marks: Sequence[SeamCut]) -> list[SeamCut]:

@@ -56,10 +56,9 @@ class FileSeams:
     names: tuple[str, ...]
     joined: int = 0
 
-    @property
-    def describe(self) -> str:
-        """What parts the cloth, in words."""
-        count = len(self.names)
+    def describe(self, count: int | None = None) -> str:
+        """Return in words what parts the cloth: all islands, or so many of them."""
+        count = len(self.names) if count is None else count
         return {
             "uv": f"{format_count(count, 'island')} of the file's texture",
             "materials": f"{format_count(count, 'area')} of one material each",
