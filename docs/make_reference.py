@@ -45,6 +45,7 @@ HEADINGS = {
     "CutTable": "`[[cuts]]`",
     "CutPlane": "`plane` of a cut",
     "AutoCutTable": "`[auto_cut]`",
+    "PieceTable": "`[pieces.NAME]`",
     "SeamTable": "`[[seams]]`",
     "FindSeamsTable": "`[seams]`",
     "SeamCutTable": "`[[seams_cut]]`",

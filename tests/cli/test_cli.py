@@ -41,6 +41,7 @@ def test_flatten_writes_its_files_and_a_summary(command: Command):
     assert code == 0
     assert len(out.splitlines()) <= 5
     assert out.startswith("pieces: 1; 6 vertices, converged, ")
+    assert "size: reads as 1 m tall (2 x 1 x 0.2 m)" in out
     assert "files: out/cloth: " in out
     assert "it/s" not in err
     assert {path.name for path in Path("out/cloth").iterdir()} == {

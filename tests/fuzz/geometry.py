@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import functools
+import json
+import tempfile
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -12,7 +15,7 @@ from .promise import Case
 
 __all__ = ["GEOMETRY_SHARES", "garment_meshes", "geometry_case"]
 
-GEOMETRY_SHARES = {"form": 3, "tables": 6, "pieces": 6, "open": 4, "garment": 4}
+GEOMETRY_SHARES = {"form": 3, "tables": 6, "pieces": 6, "open": 4, "garment": 4, "islands": 5}
 """How many of a hundred cases, or so, are of which kind: a form takes seconds."""
 
 _QUIET = "[output]\nframes = 0\npicture = false\nreview = false\n"
@@ -37,8 +40,9 @@ _SURFACES = (
     "[surface]\nfile = 'tube.obj'\nunits = 'm'\n[[cuts]]\nname = 'across'\nplane = {point = [0.1, 0.16, 0.0], normal = [0.0, 1.0, 0.0]}\n"
     "[[cuts]]\nname = 'half'\nplane = {point = [0.0, 0.1, 0.1], normal = [1.0, 0.0, 0.0]}\n[relax]\nmax_steps = 30\n"
     + _QUIET,
-    "fabric = 'woven'\n[surface]\nfile = 'pieces.obj'\nunits = 'm'\ncomponent = 'all'\n[relax]\nmax_steps = 30\n"
-    + _QUIET,
+    "fabric = 'woven'\n[surface]\nfile = 'nearly.obj'\nunits = 'm'\ncomponent = 'all'\nmeet_mm = 0.7\n[relax]\nmax_steps = 30\n"
+    "[pieces.front]\ndatum = 'to back'\ncuts = [{ from = 2, to = 14 }]\n[pieces.back]\ngrain_angle = 45\n"
+    "lines = { middle = { vertices = [3, 9] } }\n" + _QUIET,
     "[surface]\nshape = 'dome'\nresolution = 5\n[drape]\nmax_steps = 20\nfriction = 0.2\n" + _QUIET,
 )
 
@@ -54,7 +58,7 @@ def _obj(parts: list[tuple[str, Any, Any]]) -> bytes:
 
 @functools.cache
 def garment_meshes() -> dict[str, bytes]:
-    """Meshes by name: a tube; two pieces that meet; doubled layers; shorts; a sheet with a doublet and a folded quad."""
+    """Meshes by name: a tube; two pieces that meet, or nearly; doubled layers; a doublet; a folded quad; a thick sheet; one with a fin."""
     rows, around = 7, 12
     angle, height = 2 * np.pi * np.arange(around) / around, np.linspace(0, 0.3, rows)
     wide = 0.1 + 0.02 * np.cos(angle)[None, :] * (height / 0.3)[:, None]
@@ -72,9 +76,19 @@ def garment_meshes() -> dict[str, bytes]:
     cap = np.array([[-0.1, 0, 0], [0, -0.1, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.09]])
     doublet = [[0, 1, 2, 4], [0, 4, 2, 3]]
     folded = np.array([[0, 0, 0], [0.5, 0, 0.4], [0.1, 0.5, 0.1], [0.1, 0, 0], [0.4, 0.8, 1.2], [0, 1.2, 0.9]])
+    rim = np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
+    wall = np.stack([np.roll(rim, -1), rim, rim + 42, np.roll(rim, -1) + 42], -1)
+    thick = np.vstack([sheet, sheet[:, ::-1] + 42, wall])
+    bent = front * [1, 1, 3]
+    fin = np.stack([grid[1:-1, 2][:-1], grid[1:-1, 2][1:], np.arange(43, 47), np.arange(42, 46)], -1)
     return {
+        "thick.obj": _obj([("thick", np.vstack([bent, bent - [0, 0, 0.003]]), thick)]),
+        "fin.obj": _obj([("fin", np.vstack([front, front[grid[1:-1, 2]] + [0, 0, 0.02]]), np.vstack([sheet, fin]))]),
         "tube.obj": _obj([("tube", tube, belt)]),
         "pieces.obj": _obj([("front", front, sheet), ("back", back, sheet[:, ::-1])]),
+        "nearly.obj": _obj(
+            [("front", front, sheet), ("back", back[:36] * [1, 1.2, 1] - [0, 0, 4e-4], sheet[:25, ::-1])]
+        ),
         "double.obj": _obj([("outer", front, sheet), ("inner", slipped, sheet[:, ::-1])]),
         "doublet.obj": _obj([("cap", cap, doublet)]),
         "folded.obj": _obj([("sheet", folded, [[0, 1, 2, 3], [2, 1, 4, 5]])]),
@@ -123,9 +137,70 @@ def whole_garments() -> dict[str, bytes]:
     }
 
 
+@functools.cache
+def meshes_with_seams() -> dict[str, bytes]:
+    """A skirt of two islands of texture, materials and groups, as OBJ, and as GLB and USD where their libraries write it."""
+    import trimesh
+    from pxr import Sdf, Usd, UsdGeom
+
+    rows, around = 5, 12
+    turn, height = 2 * np.pi * np.arange(around) / around, np.linspace(0, 0.4, rows)
+    points = np.array([[0.15 * np.cos(a), y, 0.15 * np.sin(a)] for y in height for a in turn])
+    at = np.arange(rows * around).reshape(rows, around)
+    faces = np.stack([at[:-1], at[1:], np.roll(at, -1, 1)[1:], np.roll(at, -1, 1)[:-1]], -1)
+    wide = around // 2 + 1
+    own = np.arange(2 * rows * wide).reshape(2, rows, wide)
+    corners = np.concatenate(
+        [np.stack([one[:-1, :-1], one[1:, :-1], one[1:, 1:], one[:-1, 1:]], -1) for one in own], axis=1
+    )
+    step = 0.15 * 2 * np.pi / around
+    places = np.array([[k + step * u, y] for k in (0, 1) for y in height for u in range(wide)])
+    text = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points] + [f"vt {u:.6f} {v:.6f}" for u, v in places]
+    for half, name in enumerate(("front", "back")):
+        text += [f"g {name}", f"usemtl {name}"]
+        part = (slice(None), slice(half * around // 2, (half + 1) * around // 2))
+        text += [
+            "f " + " ".join(f"{v + 1}/{t + 1}" for v, t in zip(quad, corner, strict=True))
+            for quad, corner in zip(
+                faces[part].reshape(-1, 4).tolist(), corners[part].reshape(-1, 4).tolist(), strict=True
+            )
+        ]
+    quads, corners = faces.reshape(-1, 4), corners.reshape(-1, 4)
+    of = np.empty(len(places), dtype=int)
+    of[corners.ravel()] = quads.ravel()
+    triangles = np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]])
+    visual = trimesh.visual.TextureVisuals(uv=places, material=trimesh.visual.material.PBRMaterial(name="cloth"))
+    scene = trimesh.Scene(trimesh.Trimesh(points[of], triangles, visual=visual, process=False))
+    gltf = scene.export(file_type="gltf", embed_buffers=True)
+    (main,) = (data for file, data in gltf.items() if file.endswith(".gltf"))
+    files = {
+        "obj": "\n".join([*text, ""]).encode(),
+        "glb": scene.export(file_type="glb"),
+        "gltf": json.dumps(json.loads(main)).encode(),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in ("usda", "usdc"):
+            stage = Usd.Stage.CreateNew(f"{folder}/skirt.{kind}")
+            UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+            mesh = UsdGeom.Mesh.Define(stage, "/Skirt")
+            mesh.CreatePointsAttr(points.tolist())
+            mesh.CreateFaceVertexCountsAttr([4] * len(quads))
+            mesh.CreateFaceVertexIndicesAttr(quads.ravel().tolist())
+            texture = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "faceVarying")
+            texture.Set(places.tolist())
+            texture.SetIndices(corners.ravel().tolist())
+            for name, first in (("front", 0), ("back", 6)):
+                chosen = [face for face in range(len(quads)) if face % around // 6 * 6 == first]
+                UsdGeom.Subset.CreateGeomSubset(mesh, name, UsdGeom.Tokens.face, chosen, "pieces")
+                UsdGeom.Subset.CreateGeomSubset(mesh, f"{name}_cloth", UsdGeom.Tokens.face, chosen, "materialBind")
+            stage.GetRootLayer().Save()
+            files[kind] = Path(f"{folder}/skirt.{kind}").read_bytes()
+    return files
+
+
 def geometry_case(kind: str, random: Random) -> Case:
     """A damaged scene or mesh of a kind, and the command that reads it."""
-    from .mutations import _MUCH_WORK, damaged_bytes, damaged_toml
+    from .mutations import _MUCH_WORK, damaged_bytes, damaged_json, damaged_toml
     from .seeds import BARE
 
     meshes = garment_meshes()
@@ -137,6 +212,17 @@ def geometry_case(kind: str, random: Random) -> Case:
         seconds = 120.0 if b"mannequin" in content else 40.0
         run = ("run", "odd.scene.toml", "--out", "out", "--quiet")
         return Case(kind, files, run, subject="odd.scene.toml", leaves="out/metrics.json", seconds=seconds)
+    if kind == "islands":
+        ending, seed = random.choice(list(meshes_with_seams().items()))
+        units = ("--units", "m") if ending == "obj" else ()
+        how = random.choice(("uv", "materials", "groups", "file", "auto"))
+        command = ["flatten", f"odd.{ending}", *units, "--seams", how, "--max-steps", "30", "--out", "out", *BARE]
+        if ending == "gltf" and random.randrange(2):
+            content = damaged_json(random, json.loads(seed))
+        else:
+            content = damaged_bytes(random, seed)
+        file = f"odd.{ending}"
+        return Case(kind, {file: content}, tuple(command), subject=file, leaves="out/metrics.json", seconds=40.0)
     name = random.choice(list(meshes))
     command = ["flatten", "odd.obj", "--units", random.choice(("m", "m", "cm")), "--out", "out", *BARE]
     if kind == "garment":
@@ -145,7 +231,7 @@ def geometry_case(kind: str, random: Random) -> Case:
         command += ["--seams", "auto", "--fabric", "woven", "--max-steps", "30"]
         command += random.choice(([], ["--front", "-z"], ["--up", "+z"], ["--no", "dart"], ["--limit", "1"]))
     elif kind == "pieces":
-        command += ["--component", "all"]
+        command += ["--component", "all", *random.choice(([], [], ["--meet", "0"], ["--meet", "10"]))]
     else:
         name = random.choice(("tube.obj", name))
         ends = [random.choice((random.randrange(84), 0, 72, 10**6)) for _ in range(2)]

@@ -265,7 +265,7 @@ def test_marked_edges_lines_and_files_of_edges_are_cut(tmp_path: Path, capsys: p
     column = [row * 40 + 3 for row in range(16)]
     element = "l " + " ".join(str(vertex + 1) for vertex in column)
     mesh = write(skirt(), tmp_path / "skirt.obj", "g gore", element)
-    _, (mark,) = read_garment(mesh, units="m")
+    (mark,) = read_garment(mesh, units="m").marks
     assert (mark.name, mark.edges) == ("gore", (tuple(column),))
     (tmp_path / "rows.txt").write_text("# the side\n" + " ".join(map(str, column)) + "\n", encoding="utf-8")
     (tmp_path / "rows.json").write_text(json.dumps(list(pairwise(column))), encoding="utf-8")

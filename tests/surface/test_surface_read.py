@@ -8,8 +8,9 @@ import trimesh
 from pxr import Gf, Sdf, Usd, UsdGeom
 from surface_meshes import broken_invariants, cylinder, grid
 
+from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.surface.io.read import read_surface
+from warpflat.surface.io.read import METRES_PER_UNIT, read_surface
 from warpflat.surface.io.read_obj import chain_lines
 from warpflat.surface.triangles import triangulate
 
@@ -204,6 +205,38 @@ def test_missing_unit_is_asked_for_with_sizes(tmp_path, suffix):
 def test_units_scale(tmp_path, unit, metres):
     path = write(tmp_path / "a.obj", SQUARE.replace("1", "5") + "f 1 2 3 4")
     assert np.ptp(read_surface(path, units=unit).vertices[:, 0]) == pytest.approx(5 * metres, rel=1e-15)
+
+
+@pytest.mark.parametrize("way", [["--component", "all"], ["--seams", "auto"], []])
+@pytest.mark.parametrize(
+    ("drawn", "read", "right"),
+    [("mm", "m", "mm"), ("cm", "ft", "cm"), ("m", "mm", "m"), ("dm", "m", "dm"), ("m", "cm", "m")],
+)
+def test_wrong_units_are_named_whatever_is_read(tmp_path, capsys, drawn, read, right, way):
+    """A skirt of two panels, .6 m tall."""
+    panel = [(x, y, z) for z in (0.1, -0.1) for y in np.linspace(0, 0.6, 5) for x in np.linspace(-0.2, 0.2, 4)]
+    rows = [
+        f"v {x / METRES_PER_UNIT[drawn]:g} {y / METRES_PER_UNIT[drawn]:g} {z / METRES_PER_UNIT[drawn]:g}"
+        for x, y, z in panel
+    ]
+    for first in (1, 21):
+        rows.append(f"o panel_{first}")
+        rows += [f"f {a} {a + 1} {a + 5} {a + 4}" for k in range(16) if k % 4 < 3 for a in [first + k]]
+    path = write(tmp_path / "skirt.obj", "\n".join(rows))
+    way = way or ["--component", "0"]
+    code = main(
+        ["flatten", str(path), "--units", read, *way, "--frames", "0", "--no-picture", "--out", str(tmp_path / "out")]
+    )
+    told = capsys.readouterr()
+    height = 0.6 / METRES_PER_UNIT[drawn] * METRES_PER_UNIT[read]
+    if 3e-3 <= height <= 20.0:
+        assert code in (0, 1)
+        assert f"size: reads as {height:.3g} m tall" in told.out
+        assert f"; in {right} it would be 0.6 m" in told.out
+    else:
+        assert code == 2
+        assert f'units = "{right}" (0.6 m)' in told.err
+        assert "\n" not in told.err.strip()
 
 
 def test_implausible_size_suggests_the_unit(tmp_path):

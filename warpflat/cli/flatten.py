@@ -29,7 +29,9 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
 @click.option(
     "--seams",
     metavar="HOW",
-    help="auto: cut a whole garment where a tailor would; none: keep it whole.  [default: auto where one piece cannot lie flat]",
+    help="auto: cut a whole garment along islands of its texture that look like cut pieces, else where a tailor would; uv, materials, "
+    "groups: along what the file has; file: along the first of these that it has; none: keep it whole.  [default: auto where one piece "
+    "cannot lie flat]",
 )
 @click.option(
     "--front", metavar="AXIS", help="Where the front of a whole garment faces: +z, -z, +x ...  [default: found]"
@@ -56,21 +58,30 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     metavar="SHARE",
     help="Of the cloth that may stay beyond its limit before darts and further seams are tried.  [default: 0.02]",
 )
+@click.option(
+    "--meet",
+    type=float,
+    metavar="MM",
+    help="With --component all: sew borders that run along each other within so many millimetres.  [default: 1]",
+)
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
 @click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
 @click.option(
     "--datum",
-    metavar="LINE",
+    "datums",
+    multiple=True,
+    metavar="[PIECE:]LINE",
     help="The line laid straight first: two vertices A,B, counted from 0 (the shortest path between them), a side "
-    "of the piece (bottom, left, right, top), or a line of the file (a USD curve).  [default: a long line through the "
-    "middle]",
+    "of the piece (bottom, left, right, top), or a line of the file (a USD curve). Of several pieces for each by its name.  "
+    "[default: a long line through the middle]",
 )
 @click.option(
     "--open",
-    "opening",
-    metavar="LINE",
+    "openings",
+    multiple=True,
+    metavar="[PIECE:]LINE",
     help="Where a tube, such as a sleeve or a skirt, is cut open: two vertices A,B, one on each border, or a line of the file.  "
     "[default: where its borders are nearest]",
 )
@@ -79,7 +90,13 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     metavar="FILE",
     help="An OBJ file of the same mesh: relax from its texture coordinates.  [default: chosen by cost]",
 )
-@click.option("--grain-angle", type=float, metavar="DEGREES", help="Turns the warp from the datum; 45 is the bias.")
+@click.option(
+    "--grain-angle",
+    "grain_angles",
+    multiple=True,
+    metavar="[PIECE:]DEGREES",
+    help="Turns the warp from the datum; 45 is the bias.",
+)
 @click.option("--model", metavar="NAME", help="springs, or membrane: the cloth measured as worn.  [default: springs]")
 @click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
 @click.option("--stretch-weft", type=float, metavar="SHARE", help="The same along the weft.")
@@ -107,8 +124,9 @@ def flatten(
     verbose: bool,
     as_json: bool,
     device: str | None,
-    datum: str | None,
-    opening: str | None,
+    datums: tuple[str, ...],
+    openings: tuple[str, ...],
+    grain_angles: tuple[str, ...],
     **options: Any,
 ) -> int:
     """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF or USD.
@@ -120,6 +138,7 @@ def flatten(
       warpflat flatten dress.usdc --prim /World/front --datum /World/centre_front
       warpflat flatten front.obj --units m --datum 120,2087 --out front
       warpflat flatten garment.obj --units cm --component all
+      warpflat flatten garment.obj --units cm --component all --datum front:left --grain-angle collar:45 --open sleeve:3,140
       warpflat flatten shirt.obj --units m --fabric woven --seams auto
       warpflat flatten shirt.obj --units m --keep waist --cut-seam "yoke=points:-0.2,1.4,-0.1 0,1.38,-0.12 0.2,1.4,-0.1"
       warpflat flatten leggings.ply --units m --seams none --cut-seam "plane:0,0,0 1,0,0"
@@ -131,6 +150,7 @@ def flatten(
         "units": ("surface", "units"),
         "component": ("surface", "component"),
         "prim": ("surface", "prim"),
+        "meet": ("surface", "meet_mm"),
         "solver": ("relax", "solver"),
         "max_steps": ("relax", "max_steps"),
         "time_step": ("relax", "time_step"),
@@ -155,24 +175,35 @@ def flatten(
     tables["seams_cut"] = [_drawn_seam(text) for text in options["cut_seams"]]
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
-    for key in ("name", "fabric", "start", "grain_angle", "model"):
+    for key in ("name", "fabric", "start", "model"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])
     tables["output"]["picture"] = not options["no_picture"]
-    if datum is not None and re.fullmatch(r"[0-9]{1,18}(,[0-9]{1,18})+", datum):
-        vertices = [int(vertex) for vertex in datum.split(",")]
-        ends = {"from": vertices[0], "to": vertices[1]}
-        tables["datum"] = "datum"
-        tables["lines"] = {"datum": ends if len(vertices) == 2 else {"vertices": vertices}}
-    elif datum is not None:
-        # A USD curve becomes a line of its name.
-        tables["datum"] = datum.rstrip("/").rpartition("/")[2]
-    if opening is not None and re.fullmatch(r"[0-9]{1,18},[0-9]{1,18}", opening):
-        start, end = opening.split(",")
-        tables["cuts"] = [{"name": "opening", "from": int(start), "to": int(end)}]
-    elif opening is not None:
-        tables["cuts"] = [{"line": opening.rstrip("/").rpartition("/")[2]}]
+    pieces: dict[str, dict[str, Any]] = {}
+    for option, values in (("--datum", datums), ("--open", openings), ("--grain-angle", grain_angles)):
+        for value in values:
+            piece, colon, text = value.rpartition(":")
+            own: dict[str, Any] = pieces.setdefault(piece, {}) if colon else tables
+            # A USD curve becomes a line of its name.
+            line = text.rstrip("/").rpartition("/")[2]
+            numbers = [int(v) for v in text.split(",")] if re.fullmatch(r"[0-9]{1,18}(,[0-9]{1,18})+", text) else []
+            ends = {"from": numbers[0], "to": numbers[1]} if len(numbers) == 2 else {"vertices": numbers}
+            key, given = {
+                "--datum": ("datum", "datum" if numbers else line),
+                "--open": ("cuts", [{"name": "opening", **ends}] if len(numbers) == 2 else [{"line": line}]),
+                "--grain-angle": ("grain_angle", _degrees(text)),
+            }[option]
+            if key in own:
+                what = f"piece {quote_value(piece)}" if colon else "the piece"
+                raise InputError(
+                    f"{option} is given twice for {what}; give it once, or of several pieces as {option} PIECE:..."
+                )
+            own[key] = given
+            if option == "--datum" and numbers:
+                own["lines"] = {"datum": ends}
+    if pieces:
+        tables["pieces"] = pieces
     # "Ärmel (1).obj" gives files "Armel_1".
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-") or "piece"
     try:
@@ -187,6 +218,14 @@ def flatten(
         )
         # What is said of no option is about the mesh.
         raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", message)) from None
+
+
+def _degrees(text: str) -> float | str:
+    """Return an angle as a number, or what it is if it is none, which the scene refuses."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _drawn_seam(text: str) -> dict[str, Any]:

@@ -99,9 +99,11 @@ def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool,
     elif not quiet and not verbose:
         # A pipe takes whole lines.
         width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-        for line in summary_lines(result.metrics, result.files, str(folder), width=width):
+        for line in summary_lines(result.metrics, result.files, str(folder), size=result.size, width=width):
             click.echo(line)
     elif not quiet:
+        if result.size:
+            click.echo(f"size: {result.size}")
         click.echo(run_summary(result.metrics, result.files, str(folder)))
         for line in (*fit_lines(result.metrics), *drape_lines(result.metrics)):
             click.echo(line)

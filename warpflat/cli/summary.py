@@ -24,7 +24,7 @@ _COMPLETED = re.compile(r"\w+ = [\d.]+ c?m (?!instead of )")
 
 
 def summary_lines(
-    metrics: Mapping[str, Any], files: Sequence[str], folder: str, *, width: int | None = None
+    metrics: Mapping[str, Any], files: Sequence[str], folder: str, *, size: str = "", width: int | None = None
 ) -> list[str]:
     """Return the lines at the end of a run.
 
@@ -32,6 +32,7 @@ def summary_lines(
         metrics: as `metrics.json`.
         files: their names.
         folder: where they lie.
+        size: of what was read, in words.
         width: letters in a line at most, unless the folder's name is longer; None never cuts a line.
     """
     pieces = metrics["pieces"]
@@ -46,6 +47,8 @@ def summary_lines(
         f"energy {energy_words(sum(piece['strain_energy_j'] for piece in pieces.values()))}",
     ]
     lines = [_clipped(f"pieces: {len(pieces)}; {', '.join(parts)}", width)]
+    if size:
+        lines.append(_clipped(f"size: {size}", width))
     if relaxed := relaxation_words(piece["stages"] for piece in pieces.values()):
         lines.append(f"relaxed: {relaxed}")
     if girths := metrics.get("girths"):

@@ -27,7 +27,7 @@ def flatten_all(
     *,
     fabric: Fabric | str = DEFAULT_FABRIC,
     datum: str | Sequence[str | ArrayLike | None] | None = None,
-    grain_angle: float = 0.0,
+    grain_angle: float | Sequence[float] = 0.0,
     units: str | None = None,
     model: Model = "springs",
     wear: Wear | None = None,
@@ -41,8 +41,9 @@ def flatten_all(
 
     Args:
         surfaces: a `Surface`, or the path of a mesh file, for each piece.
-        fabric, grain_angle, units, model, wear, relax, device: as :func:`warpflat.flatten` takes them, one for all.
+        fabric, units, model, wear, relax, device: as :func:`warpflat.flatten` takes them, one for all.
         datum: one name for all, or a sequence of what `flatten` takes, for each surface one.
+        grain_angle: one for all, or a sequence with one for each surface [degrees].
         callback: called with the number of the surface and its `Progress`, for the developments (step 0) and after every step, for one
             surface after the other.
 
@@ -63,13 +64,21 @@ def flatten_all(
         raise InputError(
             f"datum has {len(datums)} entries for {count} surfaces; give one name for all, or one for each"
         )
-    settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
+    angles = list(grain_angle) if isinstance(grain_angle, Sequence) else [grain_angle] * count
+    if len(angles) != count:
+        raise InputError(
+            f"grain_angle has {len(angles)} entries for {count} surfaces; give one for all, or one for each"
+        )
+    settings = [
+        check_settings(fabric, grain_angle=angle, model=model, wear=wear, relax=relax, device=device)
+        for angle in angles
+    ]
 
     def develop(number: int, surface: Surface | str | Path) -> DevelopedPiece:
         piece = as_surface(surface, units)
         try:
             return develop_piece(
-                piece, datums[number], settings, None if callback is None else partial(callback, number)
+                piece, datums[number], settings[number], None if callback is None else partial(callback, number)
             )
         except InputError as error:
             named = repr(piece.name) in str(error)

@@ -34,6 +34,8 @@ __all__ = ["meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "uns
 BESIDE = 1e-3
 # Of one border only places further apart along it than this [m] can be beside each other; shorter stretches than the second are corners.
 _APART, _SHORTEST = 1e-2, 3e-3
+# So many stretches that are not sewn are told one by one.
+_MOST_TOLD = 20
 # Distance [m] of places along borders that are compared, and how many there are at most.
 _SAMPLES, _MOST_SAMPLES = 5e-4, 200_000
 # Layouts of mirrored pieces that differ by less than this [m] are two roundings of one.
@@ -184,7 +186,7 @@ def meeting_borders(
 
 
 def unsewn_notes(garment: Garment) -> list[str]:
-    """Return notes on borders of meshes that run along each other and are not sewn; at most three, and how many more there are."""
+    """Return a note on each stretch of border of meshes that runs along another and is not sewn, and on how many more there are."""
     if garment.form is not None:
         return []
     sewn = {
@@ -194,10 +196,11 @@ def unsewn_notes(garment: Garment) -> list[str]:
         for edge in pairwise(row.tolist())
     }
     found = unsewn_borders({name: piece.network.surface for name, piece in garment.pieces.items()}, without=sewn)
-    more = [f"{len(found) - 3} more stretches of border run along others and are not sewn"] if len(found) > 3 else []
+    left = len(found) - _MOST_TOLD
+    more = [f"{left} more stretches of border run along others and are not sewn"] if left > 0 else []
     alone = len(garment.pieces) > 1 and garment.sewn is None
     none = ["no borders meet in space, vertex by vertex: the pieces are not sewn to each other"] if alone else []
-    return [*found[:3], *more, *none]
+    return [*found[:_MOST_TOLD], *more, *none]
 
 
 def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple[str, int, int]] = ()) -> list[str]:
@@ -253,7 +256,7 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
             place = ", ".join(f"{100 * x:.0f}" for x in points[here[run[len(run) // 2]]] + 0.0)
             words = (
                 f"{whose} run {1e3 * float(np.median(gap[run])):.2f} mm apart for {1e3 * long:.0f} mm about ({place}) cm and are not "
-                "sewn: only borders that agree vertex by vertex are, and no lining to its outer layer all around"
+                "sewn: only two borders that agree vertex by vertex are, and no lining to its outer layer all around"
             )
             notes.append((long, words))
     return [words for _, words in sorted(notes, key=lambda entry: -entry[0])]

@@ -10,22 +10,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError, is_number, nearest
+from warpflat.core.file_names import make_file_name
 from warpflat.core.input_files import check_values, reading
 from warpflat.core.memory_limit import require_memory_for_run
-from warpflat.core.text import quote_value
+from warpflat.core.text import find_unused_name, format_count, quote_value
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.scene.schema import FileSurface, SeamCutTable
 from warpflat.scene.surface import scene_surface
+from warpflat.surface.half_edges import half_edges
+from warpflat.surface.repair.weld import weld_map
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from warpflat.flattening.result import Flattening
-    from warpflat.seams.find import FoundSeams
+    from warpflat.seams.find import FoundSeam, FoundSeams
+    from warpflat.seams.layers import GarmentFile
     from warpflat.seams.options import SeamCut
+    from warpflat.surface.io.file_seams import FileSeams
     from warpflat.surface.mesh import Surface
 
 __all__ = ["found_seams", "plain_panel", "read_edges", "seams_entry"]
@@ -45,30 +51,64 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     from warpflat.seams.find import find_seams
     from warpflat.seams.layers import read_garment
     from warpflat.seams.options import SeamOptions
+    from warpflat.surface.io.file_seams import FILE_SEAMS, MOST_ISLANDS, file_seams, like_cut_pieces
+    from warpflat.surface.io.read_pieces import object_parts
 
     settings, table = scene.settings, scene.settings.surface
-    asked = settings.find_seams
-    drawn = settings.seams_cut
-    if not isinstance(table, FileSurface) or table.component == "all":
+    asked, drawn = settings.find_seams, settings.seams_cut
+    if not isinstance(table, FileSurface) or (asked is not None and asked.find == "none" and not (drawn or asked.keep)):
         return None
-    if asked is not None and asked.find == "none" and not (drawn or asked.keep):
-        return None
+    of_file = asked is not None and asked.find in ("file", *FILE_SEAMS)
     own = ("lines", "cuts", "auto_cut", "datum", "start", "constraints", "seams", "drape")
-    if asked is None and not drawn and (table.component is not None or any(getattr(settings, key) for key in own)):
+    if asked is None and not drawn and any(getattr(settings, key) for key in own):
+        return None
+    all_parts = table.component == "all"
+    if asked is None and not drawn and table.component is not None and not all_parts:
+        return None
+    if all_parts and asked is not None and asked.find == "none":
         return None
     with errors_named(f"{scene.where}: surface.file"):
         path = scene.folder / expand_variables(table.file)
     try:
-        whole, marks = read_garment(path, units=table.units, prim=table.prim, name=scene.name)
-        layers: Sequence[Surface] = whole
+        read = read_garment(path, units=table.units, prim=table.prim, name=scene.name)
     except InputError:
-        if asked is None and not drawn:
+        if (asked is None and not drawn) or (all_parts and not of_file):
             return None
         raise
+    layers: Sequence[Surface] = read.layers
     # Before anything is tried on it, or read again.
     require_memory_for_run(sum(len(layer.vertices) for layer in layers), frames=FrameSchedule(settings.output).wanted)
-    by_itself = asked is None and _is_whole_garment(layers[0])
-    if asked is None and not drawn and not by_itself:
+    seams, taken, notes = file_seams(read.raw), None, list[str]()
+    if asked is not None and of_file:
+        wanted = FILE_SEAMS if asked.find == "file" else (asked.find,)
+        taken = next((seams[way] for way in wanted if way in seams), None)
+        if taken is None:
+            lacks = {
+                "uv": "texture coordinates",
+                "materials": "more than one material",
+                "groups": "more than one group",
+            }
+            other = f"seams by {' and '.join(seams)}" if seams else "no other seams either"
+            raise InputError(
+                f"{path}: find = {asked.find!r}: the file does not have {' or '.join(lacks[way] for way in wanted)}; it has "
+                f'{other}: give find = "auto" (--seams auto) to look for seams'
+            )
+        if len(taken.names) > MOST_ISLANDS:
+            raise InputError(
+                f"{path}: find = {asked.find!r}: {taken.describe()} are too many for a pattern, which has at most {MOST_ISLANDS} pieces; "
+                'find = "auto" (--seams auto) looks for seams'
+            )
+    by_itself = asked is None and not all_parts and _is_whole_garment(layers[0])
+    if not of_file and (asked is None or asked.find == "auto") and "uv" in seams and len(seams["uv"].edges):
+        why = like_cut_pieces(read.raw, seams["uv"])
+        parts = int(object_parts(read.raw.vertices, read.raw.polygons)[0].max()) + 1 if all_parts else 1
+        more = len(seams["uv"].names) > parts
+        if not why and (by_itself or (more and not drawn) or asked is not None):
+            taken = seams["uv"]
+            notes.append("islands of the texture were taken, as they look like cut pieces; --seams none keeps it whole")
+        elif why and (by_itself or asked is not None) and not all_parts:
+            notes.append(f"{seams['uv'].describe()} were not taken for cut pieces, as {why}; --seams uv takes them")
+    if taken is None and (all_parts or (asked is None and not drawn and not by_itself)):
         return None
     if isinstance(table.component, int):
         if table.component >= len(layers):
@@ -79,20 +119,115 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     elif table.component == "largest":
         layers = layers[:1]
     given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"smooth_mm"})
-    given |= {"find": "auto" if by_itself else "none"} if asked is None else {}
+    given["find"] = "auto" if taken is None and (by_itself or (asked is not None and asked.find == "auto")) else "none"
     smooth = 0.0 if asked is None else 1e-3 * asked.smooth_mm
-    cuts = tuple(cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, marks))
+    cuts = [cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, read.marks)]
+    if taken is not None:
+        if taken.joined:
+            notes.append(
+                f"{format_count(taken.joined, 'island')} of less than a thousandth of the cloth joined to a neighbour"
+            )
+        cuts += _cuts_of_file(taken, read, layers, f"{path}")
     with errors_named(scene.where):
         options = SeamOptions(
             **{**given, "no": tuple(given.get("no", ())), "keep": tuple(given.get("keep", ()))},
             smooth=smooth,
-            cuts=cuts,
+            cuts=tuple(cuts),
         )
         found = find_seams(layers, options, fabric=scene_fabric(scene))
-    why = "one piece cannot lie flat, so its seams were found; --seams none keeps it whole"
-    if drawn:
-        why = "one piece cannot lie flat, so other seams were found, too; --seams none makes no others than you have drawn"
-    return replace(found, notes=(why, *found.notes)) if by_itself else found
+    if taken is not None:
+        found = _named_by_file(found, taken, read)
+    elif by_itself:
+        why = "one piece cannot lie flat, so its seams were found; --seams none keeps it whole"
+        if drawn:
+            why = "one piece cannot lie flat, so other seams were found, too; --seams none makes no others than you have drawn"
+        notes.insert(0, why)
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface], file: str) -> list[SeamCut]:
+    """Return a cut for each two islands that meet, along the edges that the layers still have after their repair."""
+    from warpflat.seams.options import SeamCut
+
+    place = weld_map(read.raw.vertices).astype(np.int64)
+
+    def keys(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+        ends = np.sort(place[edges], axis=1)
+        return ends[:, 0] * len(place) + ends[:, 1]
+
+    there = [layer.input_index[half_edges(layer.faces).edges].astype(np.int64) for layer in layers]
+    edges = seams.edges[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))]
+    beside = np.sort(seams.beside[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))], axis=1)
+    return [
+        SeamCut(
+            name=f"seam {a} {b}", edges=tuple(map(tuple, edges[(beside == (a, b)).all(axis=1)].tolist())), where=file
+        )
+        for a, b in np.unique(beside, axis=0).tolist()
+    ]
+
+
+def _named_by_file(found: FoundSeams, seams: FileSeams, read: GarmentFile) -> FoundSeams:
+    """Return the pieces with the names that the file has for them, seams and edges named by the pieces that meet there.
+
+    A piece is of the island of most of its cloth, and has its name. Groups and materials name pieces of a texture only where each has
+    its own.
+    """
+    from scipy.spatial import cKDTree
+
+    raw = read.raw
+    corners = raw.polygons >= 0
+    middle = (raw.vertices[np.maximum(raw.polygons, 0)] * corners[..., None]).sum(axis=1) / corners.sum(axis=1)[:, None]
+    tree = cKDTree(middle * read.scale)
+    islands, titles = list[int](), list[list[str]]()
+    named = {"materials": raw.face_material, "groups": raw.face_group}
+    for piece in found.pieces:
+        triangles = piece.vertices[piece.faces[:, :3]]
+        area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+        face = tree.query(triangles.mean(axis=1))[1]
+        islands.append(int(np.bincount(seams.island[face], area).argmax()))
+        titles.append(
+            ["" if of is None else of[1][int(np.bincount(of[0][face], area).argmax())] for of in named.values()]
+        )
+    ways = [seams.way] if seams.way in named else ["groups", "materials"]
+    names = [piece.name for piece in found.pieces]
+    for way in ways:
+        own = [make_file_name(title[list(named).index(way)]) for title in titles]
+        if all(title[list(named).index(way)] for title in titles) and (way == seams.way or len(set(own)) == len(own)):
+            taken: set[str] = set()
+            names = []
+            for name in own:
+                number = [f"{name}_{k + 1}" for k in range(len(own))] if own.count(name) > 1 else [name]
+                names.append(next(one for one in number if one not in taken))
+                taken.add(names[-1])
+            break
+    known = dict(zip(islands[::-1], names[::-1], strict=True))
+    edge = re.compile(r"seam (\d+) (\d+)")
+
+    def renamed(title: str, own: str | None = None) -> str:
+        match = edge.match(title)
+        if match is None:
+            return title
+        pair = [known.get(int(match[k]), "piece") for k in (1, 2)]
+        if own is None:
+            return f"{pair[0]} to {pair[1]}" if pair[0] != pair[1] else f"seam of {pair[0]}"
+        return f"to {pair[1] if pair[0] == own else pair[0]}" if pair[0] != pair[1] else "seam"
+
+    pieces: list[Surface] = []
+    made: list[FoundSeam] = []
+    titled = set[str]()
+    for piece, name, island in zip(found.pieces, names, islands, strict=True):
+        lines: dict[str, Any] = {}
+        for title, line in piece.lines.items():
+            lines[find_unused_name(renamed(title, known[island]), lines)] = line
+        pieces.append(replace(piece, name=name, lines=lines))
+    for seam in found.seams:
+        title = find_unused_name(renamed(seam.name), titled)
+        titled.add(title)
+        made.append(replace(seam, name=title))
+    # A seam that ends inside the cloth is told by its name.
+    notes = [edge.sub(lambda match: renamed(match[0]), note) for note in found.notes]
+    along = seams.describe(len(set(islands)))
+    return replace(found, pieces=tuple(pieces), seams=tuple(made), notes=tuple(notes), along=along)
 
 
 def _as_cuts(scene: Scene, number: int, table: SeamCutTable, marks: Sequence[SeamCut]) -> list[SeamCut]:
@@ -175,15 +310,25 @@ def read_edges(path: Path) -> list[list[int]]:
 
 
 def plain_panel(scene: Scene) -> Surface | None:
-    """Return the surface of a scene that asks for nothing of seams, where it can lie flat in one piece; None else."""
+    """Return the surface of a scene that asks for nothing of seams, where it can lie flat in one piece; None else.
+
+    A file whose texture has several islands may bring its seams.
+    """
+    from warpflat.surface.io.file_seams import file_seams
+    from warpflat.surface.io.read import read_mesh_file
+
     settings, table = scene.settings, scene.settings.surface
     if not isinstance(table, FileSurface) or table.component is not None or settings.find_seams or settings.seams_cut:
         return None
     try:
-        surface = scene_surface(scene)
+        with errors_named(f"{scene.where}: surface.file"):
+            path = scene.folder / expand_variables(table.file)
+        read = read_mesh_file(path, units=table.units, prim=table.prim, name=scene.name)
+        surface = scene_surface(scene, read)
     except InputError:
         return None
-    return None if _is_whole_garment(surface) else surface
+    has_islands = read[1].texture is not None and len(file_seams(read[1])["uv"].names) > 1
+    return None if has_islands or _is_whole_garment(surface) else surface
 
 
 def _is_whole_garment(surface: Surface) -> bool:

@@ -40,7 +40,7 @@ from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fab
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
-from warpflat.scene.surface import scene_pieces, scene_surface
+from warpflat.scene.surface import scene_pieces, scene_surface, with_piece_tables
 from warpflat.seams.find import GRAIN, FoundSeams, seam_words
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import BorderSeam
@@ -94,10 +94,11 @@ class MeshPlan:
             InputError: a piece cannot be flattened, or a seam or a constraint asks what it cannot be.
         """
         scene, settings, relax = self.scene, self.scene.settings, scene_relax_options(self.scene)
+        tables = settings.pieces
         names, recorders = [surface.name for surface in self.surfaces], recorders or {}
         steps = {name: None if callback is None else partial(callback, name) for name in names}
         with errors_named(scene.where):
-            if len(names) == 1 and self.found is None:
+            if len(names) == 1 and self.found is None and not tables:
                 step = steps[names[0]]
                 pieces = [flatten_surface(scene, self.surfaces[0], relax, callback=step, device=self.device)]
             else:
@@ -105,8 +106,17 @@ class MeshPlan:
                     self.surfaces,
                     fabric=scene_fabric(scene),
                     # Pieces of a garment whose seams were found know how their grain runs.
-                    datum=[GRAIN if GRAIN in surface.lines else None for surface in self.surfaces],
-                    grain_angle=settings.grain_angle,
+                    datum=[
+                        datum or (GRAIN if GRAIN in surface.lines else None)
+                        for surface in self.surfaces
+                        for datum in [None if surface.name not in tables else tables[surface.name].datum]
+                    ],
+                    grain_angle=[
+                        settings.grain_angle
+                        if surface.name not in tables or tables[surface.name].grain_angle is None
+                        else float(tables[surface.name].grain_angle or 0.0)
+                        for surface in self.surfaces
+                    ],
                     model=settings.model,
                     wear=scene_wear(scene),
                     relax=relax,
@@ -281,9 +291,12 @@ def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | No
             raise InputError(
                 f'{scene.where}: a drape takes one piece, or the folder of a run: warpflat drape DIR --body "EU 38"'
             )
-        with errors_named(scene.where):
-            opened = [plan_cuts(part, []) for part in parts]
-        # Lines along seams name the edges of the pattern.
+        # Lines along seams name the edges of the pattern. What a piece is cut along may be one of them.
+        opened = []
+        for part in with_piece_tables(scene, name_seams(parts) if settings.pieces else parts):
+            table = settings.pieces.get(part.name)
+            with errors_named(f"{scene.where}: pieces.{part.name}" if table is not None else scene.where):
+                opened.append(plan_cuts(part, [] if table is None else table.cuts))
         sequences = [
             replace(each, surface=surface, notes=tuple(f"{surface.name}: {note}" for note in each.notes))
             for each, surface in zip(opened, name_seams([each.surface for each in opened]), strict=True)

@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warpflat.core.activity import report_activity
 from warpflat.core.beside import Beside
 from warpflat.core.memory_limit import require_memory_for_run
@@ -37,6 +39,8 @@ from warpflat.scene.found_seams import seams_entry
 from warpflat.scene.frames import MANNEQUIN, Film, FrameSchedule
 from warpflat.scene.load import Scene
 from warpflat.scene.plan import GarmentPlan, MeshPlan, plan_scene
+from warpflat.scene.schema import FileSurface
+from warpflat.surface.io.read import size_words
 
 # From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
 _MANY = 500_000
@@ -52,11 +56,13 @@ class SceneResult:
         metrics: as `metrics.json`.
         files: names of the files that were written.
         notes: what was repaired or chosen, one sentence each.
+        size: of what was read from a mesh file, in words; "" for anything else.
     """
 
     metrics: dict[str, Any]
     files: tuple[str, ...]
     notes: tuple[str, ...]
+    size: str = ""
 
 
 def run_scene(
@@ -206,10 +212,14 @@ def _run(
     drape = settings.drape is not None
     metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=known, drape=drape)
     name_notes = note_on_names(garment.parts) if output.picture else ()
+    size = ""
+    if isinstance(settings.surface, FileSurface):
+        size = size_words(np.concatenate([surface.vertices for surface in plan.surfaces]), settings.surface.units)
     return SceneResult(
         metrics=metrics,
         files=tuple(files),
         notes=(*notes, *fit_notes, *written.notes, *name_notes, *manifest_notes),
+        size=size,
     )
 
 

@@ -202,6 +202,8 @@ class FileSurface(Table):
     component: Component | None = None
     """Which connected part of the mesh; with "all" every part of every object is a piece, and edges that meet in space are seams."""
     prim: str | None = None
+    meet_mm: Annotated[float, Field(ge=0, le=10)] | None = None
+    """With component = "all": borders that run along each other within this distance are sewn; 1 if not given."""
 
     @model_validator(mode="before")
     @classmethod
@@ -267,6 +269,20 @@ class LineTable(Table):
         return self
 
 
+class PieceTable(Table):
+    """What one piece of several has of its own: of a file with component = "all", or of a garment that is cut along seams.
+
+    Vertices count those of the piece's object in the file, from 0, or those of its own OBJ file where the garment was cut.
+    """
+
+    datum: str | None = None
+    """A line of `lines`, an edge of the piece as "to front", or a side of its border."""
+    grain_angle: Annotated[float, Field(ge=-360, le=360)] | None = None
+    """Angle from the datum to the warp, counter-clockwise; that of the scene if not given."""
+    lines: dict[str, LineTable] = Field(default_factory=dict)
+    cuts: list[CutTable] = Field(default_factory=list)
+
+
 class SeamTable(Table):
     """A seam: on a form one of those that it has, on a [surface] two lines along its border that are sewn together.
 
@@ -299,7 +315,9 @@ class FindSeamsTable(Table):
     a garment that cannot lie flat in one piece is cut.
     """
 
-    find: Literal["auto", "none"] = "auto"
+    find: Literal["auto", "none", "file", "uv", "materials", "groups"] = "auto"
+    """What is cut: "auto" along texture islands that look like cut pieces, else where a tailor would; "none" only what is drawn; "uv",
+    "materials", "groups" along what the file has of these, "file" along the first of them that it has."""
     up: Direction | None = None
     front: Direction | None = None
     no: list[str] = Field(default_factory=list)
@@ -623,6 +641,7 @@ class SceneTable(Table):
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
     auto_cut: AutoCutTable | None = None
+    pieces: dict[str, PieceTable] = Field(default_factory=dict)
     seams: list[SeamTable] = Field(default_factory=list)
     find_seams: FindSeamsTable | None = None
     seams_cut: list[SeamCutTable] = Field(default_factory=list)
@@ -672,19 +691,32 @@ class SceneTable(Table):
                 raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
             if self.ease is not None:
                 raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
-            found = self.find_seams is not None and self.find_seams.find == "auto"
-            whole = '[seams] find = "auto"' if found else "[[seams_cut]]" if self.seams_cut else None
+            found = None if self.find_seams is None or self.find_seams.find == "none" else self.find_seams.find
+            whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
             if whole and not isinstance(self.surface, FileSurface):
                 raise ValueError(f"{whole} takes a garment from a file")
+            if (
+                isinstance(self.surface, FileSurface)
+                and self.surface.meet_mm is not None
+                and self.surface.component != "all"
+            ):
+                raise ValueError('surface.meet_mm is for component = "all"; leave it out')
             if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or whole):
                 if self.surface.component == "all" and self.seams_cut:
                     raise ValueError('[[seams_cut]] cuts a whole garment; with component = "all" leave it out')
-                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "constraints", "drape"):
+                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "drape"):
                     if getattr(self, key):
                         why = whole or 'component = "all"'
-                        raise ValueError(f"{key} belongs to one piece; with {why} leave it out")
-            for number, cut in enumerate(self.cuts):
-                cut.check_for_surface(f"cuts[{number}]")
+                        own = f", or give it to a piece: [pieces.NAME] {key}" if key in PieceTable.model_fields else ""
+                        raise ValueError(f"{key} belongs to one piece; with {why} leave it out{own}")
+            elif self.pieces and (self.find_seams is None or self.find_seams.find == "none"):
+                raise ValueError('[pieces] is for several pieces: of component = "all", or along seams that are found')
+            for where, cuts in (
+                ("", self.cuts),
+                *((f"pieces.{name}.", piece.cuts) for name, piece in self.pieces.items()),
+            ):
+                for number, cut in enumerate(cuts):
+                    cut.check_for_surface(f"{where}cuts[{number}]")
             if self.half:
                 raise ValueError(
                     "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
@@ -703,6 +735,8 @@ class SceneTable(Table):
                     f"{'[seams]' if self.find_seams else '[[seams_cut]]'} is for a garment from a file; a form has its own "
                     "seams, and [[seams]] change them"
                 )
+            if self.pieces:
+                raise ValueError("pieces is for pieces from a file; on a form give [[cuts]] with their piece")
             if self.lines or self.datum:
                 raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
             if self.auto_cut and self.shape == "auto":

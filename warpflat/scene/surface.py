@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,16 +16,16 @@ from warpflat.scene.schema import (
     LineTable,
     ShapeSurface,
 )
-from warpflat.surface.io.read import read_surface
+from warpflat.surface.io.read import RawMesh, read_mesh_file, surface_of_file
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.border import SIDES, line_on_border
 from warpflat.surface.paths.lines import line_between, line_from_curve, line_from_indices, line_on_plane, with_lines
 
-__all__ = ["scene_pieces", "scene_surface"]
+__all__ = ["scene_pieces", "scene_surface", "with_piece_tables"]
 
 
-def scene_surface(scene: Scene) -> Surface:
-    """Read or make the scene's surface, with its feature lines.
+def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | None = None) -> Surface:
+    """Read or make the scene's surface, with its feature lines; `read` is its file, if it has been read before.
 
     Raises:
         InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.
@@ -46,23 +47,58 @@ def scene_surface(scene: Scene) -> Surface:
             raise InputError(
                 f'{scene.where}: surface.component: this needs one piece; "all" is for `warpflat run` and `flatten`'
             )
-        surface = read_surface(path, units=table.units, component=table.component, prim=table.prim, name=scene.name)
+        read = read or read_mesh_file(path, units=table.units, prim=table.prim, name=scene.name)
+        surface = surface_of_file(read, component=table.component, name=scene.name)
     surface = replace(surface, name=scene.name)
-    for name, line in scene.settings.lines.items():
-        with errors_named(f"{scene.where}: lines.{name}"):
-            surface = with_lines(surface, {name: _line(surface, line)})
     wanted = {} if scene.settings.datum is None else {"datum": scene.settings.datum}
     wanted |= {f"constraints[{i}]": constraint.line for i, constraint in enumerate(scene.settings.constraints)}
     named = scene_surface_seams(scene.settings.seams, scene.name)
     wanted |= {f"seams[{i}].sides[{k}]": seam.sides[k] for i, seam in enumerate(named) for k in (0, 1)}
+    surface = _with_table_lines(surface, scene.settings.lines, wanted, where=f"{scene.where}: ")
+    with errors_named(f"{scene.where}: seams"):
+        surface_seams(surface, named)
+    return surface
+
+
+def with_piece_tables(scene: Scene, pieces: Sequence[Surface]) -> list[Surface]:
+    """Return pieces with the lines that the scene draws on them by name.
+
+    Raises:
+        InputError: there is no such piece (names the nearest), or a line is not on it.
+    """
+    tables = scene.settings.pieces
+    for name in tables:
+        if name not in {piece.name for piece in pieces}:
+            raise InputError(
+                f"{scene.where}: pieces.{name}: there is no such piece; {nearest(name, [piece.name for piece in pieces])}"
+            )
+    made = []
+    for piece in pieces:
+        table = tables.get(piece.name)
+        if table is not None:
+            wanted = {} if table.datum is None else {"datum": table.datum}
+            piece = _with_table_lines(piece, table.lines, wanted, where=f"{scene.where}: pieces.{piece.name}.")
+        made.append(piece)
+    return made
+
+
+def _with_table_lines(
+    surface: Surface, tables: Mapping[str, LineTable], wanted: Mapping[str, str], *, where: str
+) -> Surface:
+    """Return a surface with the lines of tables, and with sides of its border where these are wanted, by the key that wants each.
+
+    Raises:
+        InputError: a line is not on the surface, or unknown.
+    """
+    for name, line in tables.items():
+        with errors_named(f"{where}lines.{name}"):
+            surface = with_lines(surface, {name: _line(surface, line)})
     for key, name in wanted.items():
         if name not in surface.lines:
-            with errors_named(f"{scene.where}: {key}"):
+            with errors_named(f"{where}{key}"):
                 if name not in SIDES:
                     raise InputError(f"unknown line {name!r}; {nearest(name, {*surface.lines, *SIDES})}")
                 surface = with_lines(surface, {name: line_on_border(surface, name)})
-    with errors_named(f"{scene.where}: seams"):
-        surface_seams(surface, named)
     return surface
 
 
@@ -73,11 +109,13 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
         InputError: the file is wrong, or an environment variable is not set.
     """
     from warpflat.surface.io.read_pieces import read_pieces
+    from warpflat.surface.repair.meet import MEET
 
     table = scene.settings.surface
     if not isinstance(table, FileSurface) or table.component != "all":
         return None
-    return read_pieces(_file(scene, table), units=table.units, name=scene.name)
+    meet = MEET if table.meet_mm is None else 1e-3 * table.meet_mm
+    return read_pieces(_file(scene, table), units=table.units, name=scene.name, meet=meet)
 
 
 def _file(scene: Scene, table: FileSurface) -> Path:

@@ -79,6 +79,7 @@ class FoundSeams:
         what: the garment in words.
         up, front: the axes of space that are nearest to its own, as "+y" and "+z".
         notes: what was chosen or left out, one sentence each, the most important first.
+        along: what of the garment's file the seams follow, in words; "" where they were found or drawn.
     """
 
     __repr__ = short_repr
@@ -89,6 +90,7 @@ class FoundSeams:
     up: str
     front: str
     notes: tuple[str, ...] = ()
+    along: str = ""
 
 
 def find_seams(
@@ -463,4 +465,5 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
 def seam_words(found: FoundSeams) -> str:
     """Return what was found in one line."""
     total = 100 * sum(seam.length for seam in found.seams)
-    return f"{found.what}: {format_count(len(found.pieces), 'piece')}, {format_count(len(found.seams), 'seam')} of {total:.0f} cm"
+    along = f", along {found.along}" if found.along else ""
+    return f"{found.what}: {format_count(len(found.pieces), 'piece')}, {format_count(len(found.seams), 'seam')} of {total:.0f} cm{along}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from os import PathLike
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,18 +12,27 @@ from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, plain_label
 from warpflat.core.text import format_count, quote_value
 from warpflat.seams.options import SeamCut
-from warpflat.surface.io.read import POSSIBLE, check_size, read_mesh_file
+from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.validate import make_surface, parts_of_faces
 
-__all__ = ["read_garment", "read_layers"]
+__all__ = ["GarmentFile", "read_garment", "read_layers"]
 
 # A part is a trifle, such as a button, below this share of the area of all; a closed one below this.
 _TRIFLE, _CLOSED_TRIFLE = 0.004, 0.05
 # So many parts at most are cut, each on its own.
 _MOST_LAYERS = 40
+
+
+class GarmentFile(NamedTuple):
+    """The layers of a garment's file, its lines as cuts, and its mesh as it stands, of `scale` metres per unit."""
+
+    layers: tuple[Surface, ...]
+    marks: tuple[SeamCut, ...]
+    raw: RawMesh
+    scale: float
 
 
 def read_layers(
@@ -41,28 +51,29 @@ def read_layers(
     Raises:
         InputError: one line that names the file.
     """
-    return read_garment(path, units=units, prim=prim, name=name)[0]
+    return read_garment(path, units=units, prim=prim, name=name).layers
 
 
 def read_garment(
     path: str | PathLike[str], *, units: str | None = None, prim: str | None = None, name: str | None = None
-) -> tuple[tuple[Surface, ...], tuple[SeamCut, ...]]:
+) -> GarmentFile:
     """Read the layers of a garment as :func:`read_layers`, and as cuts the lines of its file.
 
-    These are line elements of OBJ, edge elements of PLY, and curves and creases of USD.
+    Lines are line elements of OBJ, edge elements of PLY, and curves and creases of USD.
 
     Raises:
         InputError: one line that names the file.
     """
     file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim or ALL_PRIMS, name=name)
     vertices, title = raw.vertices * scale, name or make_file_name(file.stem)
+    notes = list(raw.notes)
     try:
-        part = parts_of_faces(vertices, raw.polygons, weld=True)
+        part = parts_of_faces(vertices, raw.polygons, weld=True, notes=notes)
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
     found: list[Surface] = []
     faults: list[InputError] = []
-    notes = list(raw.notes)
+    largest = 0.0
     counts = np.bincount(part[part >= 0])
     order = np.argsort(-counts, kind="stable")
     for number in order[:_MOST_LAYERS].tolist():
@@ -73,10 +84,12 @@ def read_garment(
         except InputError as error:
             faults.append(error)
             continue
-        if float(np.ptp(surface.vertices, axis=0).max()) >= POSSIBLE[0] or len(order) == 1:
+        size = float(np.ptp(surface.vertices, axis=0).max())
+        largest = max(largest, size)
+        if size >= POSSIBLE[0] or len(order) == 1:
             found.append(surface)
     if not found:
-        raise faults[0] if faults else InputError(f"{file}: every part is a crumb; no cloth is left")
+        raise faults[0] if faults else wrong_size(largest, file, scale)
     layers = [Layer(surface.vertices, surface.faces) for surface in found]
     total = sum(layer.area for layer in layers)
     doubled = doubled_layers(layers)
@@ -107,7 +120,8 @@ def read_garment(
         marks.append(
             SeamCut(name=plain_label(key), line=line, closed=closed, where=f"line {quote_value(key)} of {file}")
         )
-    return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:]), tuple(marks)
+    kept[0] = replace(kept[0], notes=(*notes, *kept[0].notes))
+    return GarmentFile(layers=tuple(kept), marks=tuple(marks), raw=raw, scale=scale)
 
 
 def _is_closed(surface: Surface) -> bool:

@@ -18,6 +18,8 @@ _INSIDE, _OUTSIDE = -0.25, 0.35
 _ACROSS, _RIM, _UPRIGHT = 0.9, 0.025, 0.85
 # Turned cloth is no wider than this share of the square root of the area.
 _WIDEST = 0.15
+# What takes more than this share of a piece that the user has drawn is that piece, as a waistband, and is worn as it lies.
+_PIECE = 0.5
 # An opening is level from this on (its area over that of a circle as long).
 _LEVEL = 0.4
 
@@ -26,7 +28,8 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
     """Return the cloth without what is turned inside at its openings, and a note if there was any."""
     size = float(np.sqrt(cloth.face_areas.sum()))
     drop = np.zeros(len(cloth.faces), dtype=bool)
-    openings = 0
+    openings, areas, part = 0, cloth.face_areas, cloth.parts()
+    piece = np.bincount(part, areas)
     for loop in cloth.borders():
         points = cloth.vertices[loop]
         following, middle = np.roll(points, -1, axis=0), points.mean(axis=0)
@@ -35,13 +38,13 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
         if length < 0.06 * size or np.linalg.norm(area) < _LEVEL * length**2 / (4 * np.pi):
             continue
         turned = _turned(cloth, loop, area / np.linalg.norm(area), size)
-        if turned is not None:
+        if turned is not None and (np.bincount(part, areas * turned) <= _PIECE * piece).all():
             drop |= turned
             openings += 1
     if not openings or drop.mean() > 0.5:
         return cloth, []
     kept = replace(cloth, faces=cloth.faces[~drop])
-    part = kept.parts()
+    part = replace(kept, seams={}).parts()
     kept = replace(kept, faces=kept.faces[part == np.bincount(part).argmax()])
     used, place = np.unique(kept.faces, return_inverse=True)
     area_out = 1e4 * float(cloth.face_areas[drop].sum())

@@ -38,6 +38,9 @@ __all__ = [
     "read_mesh_file",
     "read_scan",
     "read_surface",
+    "size_words",
+    "surface_of_file",
+    "wrong_size",
 ]
 
 
@@ -49,6 +52,8 @@ SUFFIXES = (*GLTF, ".obj", ".off", ".ply", ".stl", *_USD)
 # A piece of a garment lies between these extents [m]; a usual one between the other two.
 POSSIBLE = (3e-3, 20.0)
 _USUAL = (0.02, 5.0)
+# A garment that is worn, one unit of ten at most; and what is not doubted, pieces such as a pocket among it.
+_WORN, _LIKELY = (0.25, 2.2), (0.08, 3.0)
 
 
 @dataclass(kw_only=True)
@@ -65,6 +70,9 @@ class RawMesh:
         notes: one sentence each.
         groups: objects, nodes or prims as (first vertex, name), in their order.
         marked: rows of vertices without a name: creases of USD, edge elements of PLY.
+        texture: #F by k by 2, texture coordinates at the corners, nan where there are none; None if the file has none.
+        face_material, face_group: #F, a number for the material of each face, and for its group, object, node or subset, each with
+            their names; None where the format knows none.
     """
 
     vertices: FloatArray
@@ -77,6 +85,9 @@ class RawMesh:
     notes: list[str] = field(default_factory=list)
     groups: list[tuple[int, str]] = field(default_factory=list)
     marked: list[NDArray[np.int64]] = field(default_factory=list)
+    texture: FloatArray | None = None
+    face_material: tuple[NDArray[np.int64], tuple[str, ...]] | None = None
+    face_group: tuple[NDArray[np.int64], tuple[str, ...]] | None = None
 
 
 def read_surface(
@@ -109,7 +120,24 @@ def read_surface(
     Raises:
         InputError: one line that names the file.
     """
-    file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim, name=name)
+    return surface_of_file(
+        read_mesh_file(path, units=units, prim=prim, name=name), component=component, name=name, weld=weld
+    )
+
+
+def surface_of_file(
+    read: tuple[Path, RawMesh, float, list[Path]],
+    *,
+    component: int | Literal["largest"] | None = None,
+    name: str | None = None,
+    weld: bool | None = None,
+) -> Surface:
+    """Return the surface of a file that :func:`read_mesh_file` has read; see :func:`read_surface`.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    file, raw, scale, sources = read
     if component is None:
         _refuse_stray_vertex(raw, scale, file)
     surface = make_surface(
@@ -173,9 +201,11 @@ def read_mesh_file(
             }
             extents = {unit: " x ".join(f"{side:.3g}" for side in extent) for unit, extent in sides.items()}
             sizes = "; ".join(f'"{unit}": {extent} m' for unit, extent in extents.items())
+            likely = _likely_unit(max(sides["m"]))
+            guess = f"; a garment is likeliest in {likely}" if likely else ""
             raise InputError(
                 'carries no unit: say which with units = "m" in the scene or --units m on the command line '
-                f"(m, dm, cm, mm, in, ft); the mesh would measure, as {sizes}"
+                f"(m, dm, cm, mm, in, ft); the mesh would measure, as {sizes}{guess}"
             )
     report_activity("checking the mesh")
     return file, raw, raw.scale, sources
@@ -205,9 +235,16 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         assert isinstance(usd, UsdMesh)
         for layer in usd.layers:
             note_read(layer)
+        polygons, texture = pad_corners(usd.corners, usd.sizes), None
+        if np.isfinite(usd.texture).any():
+            texture = np.full((*polygons.shape, 2), np.nan)
+            texture[polygons >= 0] = usd.texture
         return RawMesh(
             vertices=usd.vertices,
-            polygons=pad_corners(usd.corners, usd.sizes),
+            polygons=polygons,
+            texture=texture,
+            face_material=usd.face_material,
+            face_group=usd.face_group,
             scale=1.0,
             name=usd.name,
             curves=usd.curves,
@@ -227,6 +264,10 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
             scale=scale,
             split_corners=obj.split_corners,
             groups=obj.groups,
+            notes=obj.notes,
+            texture=obj.texture,
+            face_material=obj.face_material,
+            face_group=obj.face_group,
         )
         if not obj.lines:
             return raw
@@ -261,6 +302,9 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         split_corners=mesh.split_corners,
         groups=mesh.groups,
         marked=list(mesh.edges),
+        texture=mesh.corner_texture,
+        face_material=mesh.face_material,
+        face_group=mesh.face_group,
     )
 
 
@@ -289,15 +333,48 @@ def check_size(surface: Surface, file: Path, scale: float) -> None:
         InputError: it is not; names the unit that would be right.
     """
     size = float(np.ptp(surface.vertices, axis=0).max())
-    if POSSIBLE[0] <= size <= POSSIBLE[1]:
-        return
+    if not POSSIBLE[0] <= size <= POSSIBLE[1]:
+        raise wrong_size(size, file, scale)
+
+
+def wrong_size(size: float, file: Path, scale: float) -> InputError:
+    """Return the error that a piece is not as large as a piece of a garment can be; it names the unit that would be right.
+
+    Args:
+        size: the longest side of its box [m].
+        file: from which it was read.
+        scale: metres per unit of the file, as it was read.
+    """
     fitting = [u for u, metres in METRES_PER_UNIT.items() if _USUAL[0] <= size / scale * metres <= _USUAL[1]]
     what = "larger than any garment" if size > 1 else "smaller than any piece of a garment"
     advice = " or ".join(f'units = "{unit}" ({size / scale * METRES_PER_UNIT[unit]:.3g} m)' for unit in fitting)
-    raise InputError(
+    return InputError(
         f"{file}: the piece would be {size:.4g} m long, {what}; "
         + (f"plausible: {advice}" if advice else "no usual unit makes it plausible: scale the mesh")
     )
+
+
+def _likely_unit(size: float) -> str | None:
+    """Return the unit in which a garment of this size [units of the file] is as large as one that is worn; None if there is none."""
+    return next(
+        (unit for unit in ("m", "dm", "cm", "mm") if _WORN[0] <= size * METRES_PER_UNIT[unit] <= _WORN[1]), None
+    )
+
+
+def size_words(vertices: FloatArray, units: str | None) -> str:
+    """Return the size of what was read in words, and a unit that is likelier where it is not that of a garment.
+
+    Args:
+        vertices: #V by 3, of all pieces [m].
+        units: in which the file was read; None for the file's own.
+    """
+    sides = np.ptp(vertices, axis=0)
+    size, tall = float(sides.max()), bool(sides[1] >= 0.5 * sides.max())
+    words = f"reads as {sides[1] if tall else size:.3g} m {'tall' if tall else 'long'} ({' x '.join(f'{side:.3g}' for side in sides)} m)"
+    likely = None if units is None else _likely_unit(size / METRES_PER_UNIT[units])
+    if likely in (None, units) or _LIKELY[0] <= size <= _LIKELY[1]:
+        return words
+    return f"{words}; in {likely} it would be {size / METRES_PER_UNIT[units or 'm'] * METRES_PER_UNIT[likely or 'm']:.3g} m"
 
 
 def _snap_curves(surface: Surface, curves: dict[str, FloatArray]) -> Surface:

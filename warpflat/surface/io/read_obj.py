@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.surface.io.usd_stage import numbered
 from warpflat.surface.repair.polygons import pad_corners
 
 __all__ = ["ObjMesh", "chain_lines", "read_obj"]
@@ -27,6 +28,7 @@ _POSITION = re.compile(
 )
 _CORNER = re.compile(r"[-+]?\d{1,18}(?:/|$)")
 _SAME_TEXTURE = re.compile(r"([-+]?\d+)/\1(?:/\S*)?$")
+_TEXTURE = re.compile(r"[^\s/]+(?:/([-+]?\d{1,18})?\S*)?")
 
 
 @dataclass(kw_only=True)
@@ -39,6 +41,9 @@ class ObjMesh:
         lines: line elements by the name of their group or object, each a list of chains of vertex indices.
         split_corners: the exporter wrote one `v` per texture coordinate.
         groups: objects and groups as (first vertex, name), in their order.
+        texture: #F by k by 2, the texture coordinates of corners, nan where they have none; None if no face has any.
+        face_material, face_group: #F, a number for the material and the group or object of each face, and their names.
+        notes: what was left out, one sentence each.
     """
 
     vertices: FloatArray
@@ -46,6 +51,10 @@ class ObjMesh:
     lines: dict[str, list[list[int]]] = field(default_factory=dict)
     split_corners: bool = False
     groups: list[tuple[int, str]] = field(default_factory=list)
+    texture: FloatArray | None = None
+    face_material: tuple[NDArray[np.int64], tuple[str, ...]]
+    face_group: tuple[NDArray[np.int64], tuple[str, ...]]
+    notes: list[str] = field(default_factory=list)
 
 
 def read_obj(path: Path) -> ObjMesh:
@@ -68,7 +77,9 @@ def read_obj(path: Path) -> ObjMesh:
 
     # Rows are the text after a keyword, with their line numbers.
     vertices, vertex_line, faces, face_line = list[str](), list[int](), list[str](), list[int]()
-    elements, groups, group, textures = list[tuple[str, str, int, int]](), list[tuple[int, str]](), "", 0
+    elements, groups, group = list[tuple[str, str, int, int]](), list[tuple[int, str]](), ""
+    textures, texture_line, material = list[str](), list[int](), ""
+    of_material, of_group = list[str](), list[str]()
     for number, line in enumerate(text.split("\n"), start=1):
         if "#" in line:
             line = line[: line.index("#")]
@@ -79,8 +90,13 @@ def read_obj(path: Path) -> ObjMesh:
         elif key in ("f", "fo"):
             faces.append(rest)
             face_line.append(number)
+            of_material.append(material)
+            of_group.append(group)
         elif key == "vt":
-            textures += 1
+            textures.append(rest)
+            texture_line.append(number)
+        elif key == "usemtl":
+            material = rest.strip()
         elif key == "l":
             elements.append((group, rest, number, len(vertices)))
         elif key in ("g", "o") and rest.strip():
@@ -126,14 +142,49 @@ def read_obj(path: Path) -> ObjMesh:
     if len(wrong):
         face = int(np.searchsorted(np.cumsum(count), wrong[0], side="right"))
         raise refusal(face, f"refers to vertex {given[wrong[0]]}, but the file has {total:,} (1 to {total})")
+    polygons = pad_corners(index, count)
+    texture, notes = _texture_of_corners(textures, texture_line, faces, face_line, polygons >= 0)
     return ObjMesh(
         vertices=positions,
-        polygons=pad_corners(index, count),
+        polygons=polygons,
         lines=_line_elements(elements, total),
         # All corners' texture coordinates have the numbers of their vertices: the exporter wrote one `v` per `vt`.
-        split_corners=textures == total and all(map(_SAME_TEXTURE.match, chain.from_iterable(corners))),
+        split_corners=len(textures) == total and all(map(_SAME_TEXTURE.match, chain.from_iterable(corners))),
         groups=groups,
+        texture=texture,
+        face_material=numbered(of_material),
+        face_group=numbered(of_group),
+        notes=notes,
     )
+
+
+def _texture_of_corners(
+    rows: list[str], lines: list[int], faces: list[str], face_line: list[int], real: NDArray[np.bool_]
+) -> tuple[FloatArray | None, list[str]]:
+    """Return the texture coordinates of corners (#F by k by 2), None if there are none; and a note where they are damaged.
+
+    Args:
+        rows: the coordinates as text, and in `lines` where each stands.
+        faces: the corners as text, and in `face_line` where each face stands.
+        real: #F by k, where a face has a corner.
+    """
+    words = _TEXTURE.findall(" ".join(faces)) if rows else []
+    if not any(words):
+        return None, []
+    try:
+        coordinates = np.array([[float(word) for word in [*row.split(), "0"][:2]] for row in rows])
+        given = np.array([int(word or 0) for word in words], dtype=np.int64)
+    except (ValueError, OverflowError):
+        return None, ["texture coordinates that are no two numbers: all were left out"]
+    if len(given) != real.sum():
+        return None, ["faces whose texture coordinates are no numbers: all were left out"]
+    seen = np.repeat(np.searchsorted(lines, face_line), real.sum(axis=1))
+    index = np.where(given < 0, seen + given, given - 1)
+    known = (given != 0) & (index >= 0) & (index < len(coordinates))
+    notes = ["faces refer to texture coordinates that the file does not have"] if (~known & (given != 0)).any() else []
+    texture = np.full((*real.shape, 2), np.nan)
+    texture[real] = np.where(known[:, None], coordinates[np.where(known, index, 0)], np.nan)
+    return texture, notes
 
 
 def _line_elements(rows: list[tuple[str, str, int, int]], total: int) -> dict[str, list[list[int]]]:

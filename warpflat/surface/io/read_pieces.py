@@ -10,19 +10,23 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
 from warpflat.core.text import format_count
-from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file
+from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
+from warpflat.surface.repair.meet import MEET, meet_borders
 from warpflat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
 
-__all__ = ["read_pieces"]
+__all__ = ["object_parts", "read_pieces"]
 
 
-def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: str | None = None) -> tuple[Surface, ...]:
+def read_pieces(
+    path: str | PathLike[str], *, units: str | None = None, name: str | None = None, meet: float = MEET
+) -> tuple[Surface, ...]:
     """Read all pieces of a garment: each connected part of each object of an OBJ file, node of a GLB scene or mesh prim of a USD stage.
 
     Objects are repaired and checked each on its own, so that pieces stay apart whose borders lie at one place, as along a seam. They are
@@ -33,6 +37,8 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
         path: the file.
         units: as :func:`warpflat.read_surface`.
         name: for pieces that have none in the file; by default the file's stem.
+        meet: borders that run along each other within this distance [m] are made to agree vertex by vertex, so that they are sewn; 0
+            leaves them as they are.
 
     Returns:
         The pieces, in the order of the file; `input_vertices` are those of the piece's object.
@@ -44,16 +50,14 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
     vertices = raw.vertices * scale
     found: list[Surface] = []
     closed = small = 0
+    largest = 0.0
     objects = list(_objects(raw, name or make_file_name(file.stem)))
+    notes = list(raw.notes)
     for title, first, polygons in objects:
         points = vertices[first : first + int(polygons.max()) + 1]
         source = str(file) if len(objects) == 1 else f"{file}: {title}"
         try:
-            part = parts_of_faces(points, polygons, weld=False)
-            # Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
-            soup = 2 * int(part.max() + 1) > len(polygons)
-            if soup:
-                part = parts_of_faces(points, polygons, weld=True)
+            part, soup = object_parts(points, polygons, notes)
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
         for number in range(int(part.max()) + 1):
@@ -62,14 +66,17 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
             except ClosedSurfaceError:
                 closed += 1
                 continue
-            if float(np.ptp(surface.vertices, axis=0).max()) < POSSIBLE[0]:
+            size = float(np.ptp(surface.vertices, axis=0).max())
+            largest = max(largest, size)
+            if size < POSSIBLE[0]:
                 small += 1
                 continue
             check_size(surface, file, scale)
             found.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
+    if small and not found:
+        raise wrong_size(largest, file, scale)
     if not found:
         raise InputError(f"{file}: every part is closed (it has no border) or a crumb; give the layer of cloth alone")
-    notes = list(raw.notes)
     if closed:
         notes.append(f"{format_count(closed, 'closed part')}, such as a button, left out")
     if small:
@@ -82,8 +89,32 @@ def read_pieces(path: str | PathLike[str], *, units: str | None = None, name: st
         for number, other in doubled.items()
     ]
     # Without its second layer a piece may be alone of its name.
-    kept = _named_apart([surface for number, surface in enumerate(found) if number not in doubled])
+    kept, met = meet_borders(
+        _named_apart([surface for number, surface in enumerate(found) if number not in doubled]), meet
+    )
+    notes += met
     return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
+
+
+def object_parts(
+    vertices: FloatArray, polygons: NDArray[np.int64], notes: list[str] | None = None
+) -> tuple[IntArray, bool]:
+    """Return the connected part of each face of an object (#F), and whether vertices at one place had to be joined for that.
+
+    Faces that share no vertices, as in STL, are joined. Others are apart where the pattern or its texture is.
+
+    Raises:
+        InputError: as :func:`parts_of_faces`.
+    """
+    told = list[str]()
+    part = parts_of_faces(vertices, polygons, weld=False, notes=told)
+    soup = 2 * int(part.max() + 1) > len(polygons)
+    if soup:
+        told = []
+        part = parts_of_faces(vertices, polygons, weld=True, notes=told)
+    if notes is not None:
+        notes += told
+    return part, soup
 
 
 def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:

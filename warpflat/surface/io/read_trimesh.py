@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
+import json
 import logging
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.input_files import noting_resolver
+from warpflat.surface.io.usd_stage import numbered
 
 __all__ = ["GLTF", "read_with_trimesh"]
 
@@ -32,6 +35,8 @@ class TrimeshMesh:
         split_corners: whether the format splits vertices per corner of a face or per texture coordinate.
         groups: the nodes as (first vertex, name), in their order.
         edges: #E by 2, elements of a PLY file.
+        corner_texture: #F by 3 by 2, texture coordinates of GLB and glTF, nan where there are none; None if no corner has any.
+        face_material, face_group: #F, a number for the material and the node of each face, and their names.
     """
 
     vertices: FloatArray
@@ -39,6 +44,9 @@ class TrimeshMesh:
     split_corners: bool
     groups: list[tuple[int, str]]
     edges: NDArray[np.int64]
+    corner_texture: FloatArray | None
+    face_material: tuple[NDArray[np.int64], tuple[str, ...]]
+    face_group: tuple[NDArray[np.int64], tuple[str, ...]]
 
 
 def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
@@ -52,35 +60,43 @@ def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
         InputError: without the file's name: it cannot be read, has no such node, or no faces.
     """
     suffix = file.suffix.lower()
-    scene = _load_scene(file)
+    scene, materials = _load_scene(file)
     meshes = list(_instances(scene))
     if node is not None:
-        names = [name for name, _, _ in meshes]
-        meshes = [item for item in meshes if item[0] == node]
+        names = [one.node for one in meshes]
+        meshes = [one for one in meshes if one.node == node]
         if not meshes:
             raise InputError(f"there is no mesh node {node!r}; {nearest(node, names)}")
-    if not any(len(faces) for _, _, faces in meshes):
+    if not any(len(one.faces) for one in meshes):
         raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
-    start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)]).tolist()
+    start = np.cumsum([0, *(len(one.vertices) for one in meshes)]).tolist()
     textured = suffix == ".ply" and any(
         getattr(getattr(geometry, "visual", None), "kind", None) == "texture" for geometry in scene.geometry.values()
     )
-    total = sum(len(vertices) for _, vertices, _ in meshes)
+    total = sum(len(one.vertices) for one in meshes)
     elements = [_edges(geometry) for geometry in scene.geometry.values()] if suffix == ".ply" else []
     edges = np.concatenate([*elements, np.empty((0, 2), dtype=np.int64)])
     if len(edges) and not 0 <= edges.min() <= edges.max() < total:
         raise InputError(f"an edge refers to vertex {edges.max()}, but the file has {total:,}, numbered from 0")
+    # A corner beyond the vertices is refused later, by its face.
+    textures = [one.texture[np.minimum(one.faces, len(one.texture) - 1)] for one in meshes if len(one.faces)]
+    texture = np.concatenate(textures)
+    size = [len(one.faces) for one in meshes]
+    number, material = numbered([materials.get(one.geometry, "") for one in meshes])
     return TrimeshMesh(
         edges=edges,
-        vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
-        faces=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
+        vertices=np.concatenate([one.vertices for one in meshes]),
+        faces=np.concatenate([one.faces + at for one, at in zip(meshes, start, strict=False)]),
         split_corners=suffix in (".stl", *GLTF) or textured,
-        groups=[(at, name) for (name, _, _), at in zip(meshes, start, strict=False)] if suffix in GLTF else [],
+        groups=[(at, one.node) for one, at in zip(meshes, start, strict=False)] if suffix in GLTF else [],
+        corner_texture=texture if np.isfinite(texture).any() else None,
+        face_material=(np.repeat(number, size), material),
+        face_group=(np.repeat(np.arange(len(meshes)), size), tuple(one.node for one in meshes)),
     )
 
 
-def _load_scene(file: Path) -> Any:
-    """Load a file with trimesh, whose log and warnings are silenced meanwhile."""
+def _load_scene(file: Path) -> tuple[Any, dict[str, str]]:
+    """Load a file with trimesh, whose log and warnings are silenced meanwhile; return the scene, and the materials of its geometry."""
     import trimesh
 
     suffix = file.suffix.lower()
@@ -96,7 +112,20 @@ def _load_scene(file: Path) -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options)
+            if suffix not in GLTF:
+                return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options), {}
+            data = file.read_bytes()
+            first, last = (20, 20 + int.from_bytes(data[12:16], "little")) if suffix == ".glb" else (0, len(data))
+            # Trimesh reads texture coordinates together with the pictures only; under this name they are an attribute like any other.
+            head = data[first:last].replace(b'"TEXCOORD_0"', b'"_EXCOORD_0"')
+            scene = trimesh.load_scene(
+                io.BytesIO(data[:first] + head + data[last:]),
+                file_type=suffix[1:],
+                process=False,
+                resolver=noting_resolver(file),
+                **options,
+            )
+            return scene, _materials(head, list(scene.geometry))
     except InputError:
         raise
     # Any error of a parser is the file's fault, of whatever type it is.
@@ -117,8 +146,35 @@ def _edges(geometry: Any) -> NDArray[np.int64]:
         return np.empty((0, 2), dtype=np.int64)
 
 
-def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]]:
-    """Yield the meshes of a trimesh scene: node, world positions, triangles."""
+def _materials(head: bytes, geometry: list[str]) -> dict[str, str]:
+    """Return the name of its material for each geometry that trimesh has made of a glTF file, in the order of its primitives."""
+    try:
+        table = json.loads(head)
+        primitives = [
+            one for mesh in table["meshes"] for one in mesh["primitives"] if one.get("mode", 4) in (0, 1, 4, 5)
+        ]
+        given = [one.get("material") for one in primitives]
+        names = [
+            None if of is None else str(table["materials"][of].get("name") or f"material_{of + 1}") for of in given
+        ]
+    # Names are extras: without them the file is what it was.
+    except (AttributeError, IndexError, KeyError, RecursionError, TypeError, ValueError):
+        return {}
+    return {key: name for key, name in zip(geometry, names, strict=True) if name} if len(names) == len(geometry) else {}
+
+
+class _Instance(NamedTuple):
+    """A mesh at its place in a scene: world positions, triangles, and texture coordinates of vertices, nan where there are none."""
+
+    node: str
+    geometry: str
+    vertices: FloatArray
+    faces: NDArray[np.int64]
+    texture: FloatArray
+
+
+def _instances(scene: Any) -> Iterator[_Instance]:
+    """Yield the meshes of a trimesh scene."""
     import trimesh
 
     for node in scene.graph.nodes_geometry:
@@ -131,7 +187,13 @@ def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]
         if not np.array_equal(matrix, np.eye(4)):
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
-        yield node, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
+        texture = np.full((len(vertices), 2), np.nan)
+        given = np.asarray(mesh.vertex_attributes.get("_EXCOORD_0", texture))
+        if given.shape == texture.shape and given.dtype.kind in "fiu":
+            texture = given.astype(np.float64)
+        yield _Instance(
+            node, geometry, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1], texture
+        )
 
 
 def check_ply(path: Path) -> None:

@@ -17,7 +17,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import quote_value
 from warpflat.core.usd_process import UNREADABLE
 
-__all__ = ["ALL_PRIMS", "UsdMesh", "read_usd_stage"]
+__all__ = ["ALL_PRIMS", "UsdMesh", "numbered", "read_usd_stage"]
 
 #: Stands for all mesh prims of a stage.
 ALL_PRIMS = "*"
@@ -38,12 +38,17 @@ class UsdMesh:
         layers: the files of which the stage is composed.
         groups: the meshes as (first vertex, name of the prim), in their order.
         creases: rows of vertices, as of edges that are marked with a crease in Blender.
+        texture: #C by 2, the texture coordinates of all faces' corners, nan where there are none.
+        face_material, face_group: #F, a number for the material and the subset or mesh of each face, and their names.
     """
 
     name: str
     vertices: FloatArray
     sizes: NDArray[np.int64]
     corners: NDArray[np.int64]
+    texture: FloatArray
+    face_material: tuple[NDArray[np.int64], tuple[str, ...]]
+    face_group: tuple[NDArray[np.int64], tuple[str, ...]]
     curves: dict[str, FloatArray] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     layers: list[str] = field(default_factory=list)
@@ -129,6 +134,8 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
         return world * metres_per_unit, bool(np.linalg.det(matrix[:3, :3]) < 0)
 
     parts = list[tuple[FloatArray, NDArray[np.int64], NDArray[np.int64]]]()
+    textures = list[FloatArray]()
+    materials, groups = list[str](), list[str]()
     creases = list[NDArray[np.int64]]()
     for one in chosen:
         mesh = UsdGeom.Mesh(one)
@@ -156,11 +163,19 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
             raise InputError(f"mesh {at} has no faces: all are holes")
         sizes, corners = all_sizes[kept], all_corners[np.repeat(kept, all_sizes)]
         vertices, mirrored = to_metres(points, one)
+        texture = _texture(one, all_corners, len(points))
+        if texture is None:
+            notes.append(f"texture coordinates of mesh {at} are broken and were left out")
+            texture = np.full((len(all_corners), 2), np.nan)
+        texture = texture[np.repeat(kept, all_sizes)]
+        for names, found in ((materials, _materials(one, len(all_sizes))), (groups, _subsets(one, len(all_sizes)))):
+            names += [name for name, stays in zip(found, kept.tolist(), strict=True) if stays]
         left_handed = _value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
         if left_handed != mirrored:
             # Faces are wound the other way, from the same first corner.
             first, size = np.repeat(np.cumsum(sizes) - sizes, sizes), np.repeat(sizes, sizes)
-            corners = corners[first + (size - np.arange(len(corners)) + first) % size]
+            turned = first + (size - np.arange(len(corners)) + first) % size
+            corners, texture = corners[turned], texture[turned]
         before = sum(len(points) for points, _, _ in parts)
         rows = np.asarray(_value(mesh.GetCreaseIndicesAttr()) or [], dtype=np.int64)
         lengths = np.asarray(_value(mesh.GetCreaseLengthsAttr()) or [], dtype=np.int64)
@@ -171,12 +186,16 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
         elif len(rows):
             creases += np.split(rows + before, np.cumsum(lengths)[:-1])
         parts.append((vertices, sizes, corners))
+        textures.append(texture)
     start = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)]).tolist()
     out = UsdMesh(
         name=chosen[0].GetName(),
         vertices=np.concatenate([vertices for vertices, _, _ in parts]),
         sizes=np.concatenate([sizes for _, sizes, _ in parts]),
         corners=np.concatenate([corners + at for (_, _, corners), at in zip(parts, start, strict=False)]),
+        texture=np.concatenate(textures),
+        face_material=numbered(materials),
+        face_group=numbered(groups),
         notes=notes,
         layers=[layer.realPath for layer in stage.GetUsedLayers() if layer.realPath],
         groups=[(at, one.GetName()) for one, at in zip(chosen, start, strict=False)],
@@ -205,6 +224,59 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
                 key += "_"
             out.curves[key] = part
     return out
+
+
+def numbered(names: list[str]) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """Return a number for each name, from 0 in their order, and the names."""
+    number = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    return np.fromiter(map(number.__getitem__, names), dtype=np.int64, count=len(names)), tuple(number)
+
+
+def _texture(mesh: Any, corners: NDArray[np.int64], points: int) -> FloatArray | None:
+    """Return the texture coordinates of a mesh's corners (#C by 2), all nan where it has none; None where they are broken.
+
+    `st` comes first, then any other primvar of pairs with a value for each corner or point.
+    """
+    from pxr import Usd, UsdGeom
+
+    kinds = ("texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]")
+    ways = (UsdGeom.Tokens.faceVarying, UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying)
+    known = [
+        primvar
+        for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues()
+        if str(primvar.GetTypeName()) in kinds and primvar.GetInterpolation() in ways
+    ]
+    known.sort(key=lambda primvar: primvar.GetPrimvarName() != "st")
+    if not known:
+        return np.full((len(corners), 2), np.nan)
+    flat = known[0].ComputeFlattened() or known[0].ComputeFlattened(Usd.TimeCode.EarliestTime())
+    values = np.asarray(flat if flat is not None else [], dtype=np.float64).reshape(-1, 2)
+    each = known[0].GetInterpolation() == UsdGeom.Tokens.faceVarying
+    if len(values) != (len(corners) if each else points):
+        return None
+    return values if each else values[corners]
+
+
+def _subsets(mesh: Any, count: int, *, materials: bool = False) -> list[str]:
+    """Return for each face of a mesh the name of the subset that holds it, of those for materials or of the others; else ""."""
+    from pxr import UsdGeom
+
+    names = [""] * count
+    for subset in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(mesh)):
+        binds = subset.GetFamilyNameAttr().Get() == "materialBind"
+        if subset.GetElementTypeAttr().Get() == UsdGeom.Tokens.face and binds == materials:
+            for face in _value(subset.GetIndicesAttr()) or []:
+                if 0 <= face < count:
+                    names[face] = subset.GetPrim().GetName()
+    return names if materials or any(names) else [mesh.GetName()] * count
+
+
+def _materials(mesh: Any, count: int) -> list[str]:
+    """Return for each face of a mesh the name of the subset that binds its material, else that of the mesh's own material."""
+    from pxr import UsdShade
+
+    own = UsdShade.MaterialBindingAPI(mesh).GetDirectBinding().GetMaterialPath()
+    return [name or (own.name if own else "") for name in _subsets(mesh, count, materials=True)]
 
 
 def _value(attribute: Any) -> Any:

@@ -1,6 +1,6 @@
 """Validation and repair: any polygons become a checked :class:`Surface`, or are refused.
 
-The steps are: numbers and indices, corners, split corners, double faces, the component, edges with too many faces, winding,
+The steps are: numbers and indices, corners, split corners, double faces, edges with too many faces, the component, winding, thickness,
 points in which the surface only touches itself, the border, slivers. Faults with one plain remedy are repaired and noted; the others
 are refused with advice. Vertices that stay keep their order and their exact position.
 """
@@ -28,6 +28,7 @@ from warpflat.surface.repair.polygons import (
     split_polygons,
     split_quads,
 )
+from warpflat.surface.repair.sheets import face_vectors, outer_sheet, part_sheets
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
 
@@ -36,6 +37,8 @@ __all__ = ["ClosedSurfaceError", "check_positions", "make_surface", "parts_of_fa
 
 # Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
 _SMALLEST, _LARGEST = 1e-20, 1e20
+# So many sheets at most meet at an edge. One that comes off with less than this share of the area is left out if one piece is asked for.
+_MOST_SHEETS, _FIN = 8, 0.05
 # Odd factors by which the vertices of a face are mixed to one number.
 _HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93], dtype=np.uint64)
 
@@ -54,6 +57,7 @@ class _Mesh:
         origin: #F, the input face of each.
         index: #V, the input row of each vertex.
         notes: repairs made, one sentence each.
+        crowded: where more than two faces met, and the surface was parted into sheets; "" for nowhere.
     """
 
     vertices: FloatArray
@@ -61,6 +65,7 @@ class _Mesh:
     origin: IntArray
     index: IntArray
     notes: list[str] = field(default_factory=list)
+    crowded: str = ""
     _made: dict[str, tuple[IntArray, Any]] = field(default_factory=dict)
 
     @property
@@ -127,13 +132,14 @@ def make_surface(
         paths = {key: checked_line(key, line, len(positions)) for key, line in (lines or {}).items()}
         place = _weld(mesh, weld, split_corners, component is not None)
         _drop_double_faces(mesh)
+        _part_sheets(mesh)
         _drop_double_layers(mesh)
         _choose_component(mesh, component)
-        _refuse_crowded_edges(mesh)
         faces, turned = orient(mesh.half_edges)
         if turned:
             mesh.faces = faces
             mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
+        _take_outer_sheet(mesh)
         _separate_touching_fans(mesh)
         _drop_unused(mesh)
         kept_lines, off = renumber_lines(
@@ -192,18 +198,24 @@ def make_surface(
         raise type(error)(f"{source or name}: {error}") from error
 
 
-def parts_of_faces(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool) -> IntArray:
+def parts_of_faces(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool, notes: list[str] | None = None) -> IntArray:
     """Return the connected part of each polygon (#F), from 0 in their order; -1 for those that repair drops.
 
     Args:
         vertices, polygons: as :func:`make_surface`.
         weld: whether vertices at the same place are joined before.
+        notes: gets a sentence for each repair that parts or drops faces.
 
     Raises:
         InputError: without the input's name, as :func:`make_surface`.
     """
     mesh = _checked_faces(check_positions(vertices), polygons)
     _weld(mesh, weld, split_corners=False, chosen=True)
+    before = len(mesh.notes)
+    _drop_double_faces(mesh)
+    _part_sheets(mesh)
+    if notes is not None:
+        notes += mesh.notes[before:]
     part = np.full(len(np.asarray(polygons)), -1, dtype=np.int32)
     part[mesh.origin] = mesh.part
     return part
@@ -349,7 +361,18 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
     rank = np.argsort(-sizes, kind="stable")
     valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, largest first'
     if component is None:
-        if len(sizes) > 1:
+        if len(sizes) > 1 and mesh.crowded:
+            area = np.bincount(label, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1))
+            small = area < _FIN * area.sum()
+            if small.sum() < len(area) - 1:
+                raise InputError(
+                    f"{mesh.crowded}; parted there, it falls into {len(sizes):,} sheets of {_sizes(sizes[rank])} faces: choose one with "
+                    f'{valid}, or take all with component = "all"'
+                )
+            lost = 1e4 * float(area[small].sum())
+            mesh.keep(~small[label])
+            mesh.notes.append(f"{format_count(int(small.sum()), 'small sheet')} left out ({lost:.2g} cm2)")
+        elif len(sizes) > 1:
             if (meeting := t_junction(mesh.vertices, mesh.faces, label)) is not None:
                 vertex, a, b = meeting
                 raise InputError(
@@ -381,7 +404,12 @@ def _sizes(sizes: NDArray[np.int64]) -> str:
     return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else shown[0]
 
 
-def _refuse_crowded_edges(mesh: _Mesh) -> None:
+def _part_sheets(mesh: _Mesh) -> None:
+    """Part the surface into sheets where more than two faces meet, as at a fin or a pocket.
+
+    Raises:
+        InputError: so many meet at an edge that they are no cloth.
+    """
     he = mesh.half_edges
     crowded = np.flatnonzero(he.count > 2)
     if len(crowded) == 0:
@@ -389,10 +417,36 @@ def _refuse_crowded_edges(mesh: _Mesh) -> None:
     a, b = he.edges[crowded[0]].tolist()
     at = mesh.origin[he.face[he.edge == crowded[0]]]
     more = f" ({format_count(len(crowded) - 1, 'more edge')} like it)" if len(crowded) > 1 else ""
-    raise InputError(
+    mesh.crowded = (
         f"the edge between vertices {a} and {b} is not manifold: {len(at)} faces meet there ({list_some(at)}; counted "
-        f"from 0){more}; cloth has at most two at an edge: delete the surplus faces or part the surface there"
+        f"from 0){more}"
     )
+    if he.count.max() > _MOST_SHEETS:
+        raise InputError(
+            f"{mesh.crowded}; cloth has at most two at an edge, and {_MOST_SHEETS} sheets at most are parted: delete the surplus faces"
+        )
+    faces, origin = part_sheets(mesh.vertices, he)
+    before = int(mesh.part.max()) + 1
+    mesh.faces, mesh.vertices, mesh.index = faces, mesh.vertices[origin], mesh.index[origin]
+    areas = np.sort(np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, faces), axis=1)))[::-1]
+    off = [f"{1e4 * area:.2g}" for area in areas[1 : 1 + max(len(areas) - before, 0)]]
+    mesh.notes.append(
+        f"{format_count(len(crowded), 'edge')} at which more than two faces meet: the sheets were parted there"
+        + (f", {format_count(len(off), 'sheet')} came off ({', '.join(off[:4])} cm2)" if off else "")
+    )
+
+
+def _take_outer_sheet(mesh: _Mesh) -> None:
+    """Take the outer sheet of a closed surface that is cloth drawn with its thickness."""
+    if (mesh.half_edges.count != 2).any():
+        return
+    sheet = outer_sheet(mesh.vertices, mesh.half_edges)
+    if sheet is not None:
+        mesh.keep(sheet.faces)
+        mesh.notes.append(
+            f"cloth drawn {1e3 * sheet.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
+            f"({1e4 * sheet.left_out:.0f} cm2) left out"
+        )
 
 
 def _separate_touching_fans(mesh: _Mesh) -> None:
