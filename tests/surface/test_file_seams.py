@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ import warpflat
 from warpflat.cli.main import main
 from warpflat.scene.found_seams import found_seams
 from warpflat.scene.load import make_scene
+from warpflat.seams.layers import read_garment
 from warpflat.surface.io.file_seams import file_seams, like_cut_pieces
 from warpflat.surface.io.read import read_mesh_file
+from warpflat.surface.repair.layers import Layer
 
 ROWS, AROUND, PIECES = 9, 24, 4
 
@@ -239,3 +242,18 @@ def test_seams_are_the_edges_between_islands(tmp_path: Path) -> None:
     assert all(a != b for a, b in seams.beside.tolist())
     assert sorted(np.bincount(seams.island)) == [(ROWS - 1) * AROUND // PIECES] * PIECES
     assert all(abs(b - a) == AROUND for a, b in seams.edges.tolist())
+
+
+@pytest.mark.skipif(not os.environ.get("WARPFLAT_DATA"), reason="WARPFLAT_DATA is not set: no real meshes")
+def test_a_suit_is_cut_where_its_maker_unwrapped_it() -> None:
+    path = Path(os.environ["WARPFLAT_DATA"]) / "garments" / "male_casualsuit04.obj"
+    tables = {"surface": {"file": str(path), "units": "dm"}}
+    result = found_seams(make_scene(tables, name="suit", folder=path.parent, where="here"))
+    assert result is not None
+    assert result.along == "6 islands of the file's texture"
+    assert {"left_leg", "right_leg", "back", "front"} < {piece.name for piece in result.pieces}
+    assert len(result.pieces) == 6
+    # No cloth is lost, but the facings at three openings.
+    area = sum(Layer(piece.vertices, piece.faces).area for piece in result.pieces)
+    whole = sum(Layer(layer.vertices, layer.faces).area for layer in read_garment(path, units="dm").layers)
+    assert whole - area == pytest.approx(0.0087, abs=2e-4)
