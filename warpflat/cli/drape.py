@@ -44,7 +44,7 @@ def drape(
     edges: bool,
     correct: bool,
 ) -> int:
-    """Put a sewn garment on its body: a scene's, that of a run's folder, or a pattern's (pattern.json, DXF or SVG).
+    """Put a sewn garment on its body: a scene's, a run's, or that of a pattern (pattern.json, GarmentCode, DXF or SVG).
 
     For a scene it is as if it had a [drape] table; the settings of one that it has hold. A pattern is placed by its seams. A DXF
     or an SVG of another program names none: they stand in a TOML file.
@@ -54,6 +54,7 @@ def drape(
       warpflat drape scenes/basic_block.toml
       warpflat drape scenes/basic_block.toml --correct
       warpflat drape out/dress --fabric denim
+      warpflat drape shirt_specification.json --body scan.obj
       warpflat drape shirt.dxf --edges
       warpflat drape shirt.dxf --seams shirt.toml --body "EU 38"
     """

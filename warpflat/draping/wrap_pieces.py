@@ -27,7 +27,9 @@ from warpflat.mannequin.mannequin import Mannequin
 __all__ = ["UNITS", "draw_together", "wrap_pieces"]
 
 #: Where a file's units stand.
-UNITS = "are its units right (in DXF the text UNITS or $INSUNITS, in SVG width and viewBox)?"
+UNITS = (
+    "are its units right (in DXF the text UNITS or $INSUNITS, in SVG width and viewBox, in GarmentCode units_in_meter)?"
+)
 # Cloth around less than this share of the body's waist is no garment for it.
 _LEAST_GIRTH = 0.5
 
