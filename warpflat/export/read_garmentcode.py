@@ -28,6 +28,8 @@ __all__ = ["CENTIMETRES", "LABELS", "EdgeKey", "garmentcode_pattern"]
 CENTIMETRES = 100.0
 # Chords of a curve stray from it by at most this [m]: a wide hem is then as long as its curve within .01 mm.
 _CHORD = 5e-6
+# A shoulder's distance from the middle of the body [m], near enough to tell a sleeve's upper end.
+_SHOULDER = 0.15
 #: By level of the body the label of the edges that are attached there.
 LABELS = {"waist": "lower_interface"}
 
@@ -243,12 +245,16 @@ def _read_panel(key: str, entry: PanelEntry, properties: PropertiesEntry) -> _Pa
     turned = Rotation.from_euler("xyz", entry.rotation, degrees=True).as_matrix()
     placement = np.column_stack([turned[:, :2], np.array(entry.translation) / properties.units_in_meter])
     middle = placement @ [*ring.mean(axis=0), 1.0]
-    words = [*re.split(r"[^a-z]+", key.lower()), *re.split(r"[^a-z]+", entry.label.lower())]
-    on_arm = any(word.startswith(("sleeve", "cuff", "arm")) for word in words)
+    # A label says on which part of the body a panel is; else its name does.
+    words = re.split(r"[^a-z]+", (entry.label or key).lower())
+    on_arm = any(word.startswith(("sleeve", "arm")) for word in words) or {"sl", "cuff"} <= set(words)
     x, y = ring.T
     flip = np.diag([-1.0 if x @ np.roll(y, -1) < y @ np.roll(x, -1) else 1.0, 1.0])
     # Of the four ways to stand the one whose height rises most, or on an arm, whose sleeve may lie, comes nearest to the shoulder.
-    up = np.array([-np.sign(middle[0]), 1.0, 0.0]) if on_arm else np.array([0.0, 1.0, 0.0])
+    up = np.array([0.0, 1.0, 0.0])
+    if on_arm:
+        highest = float((np.column_stack([ring, np.ones(len(ring))]) @ placement[1]).max())
+        up = np.array([np.sign(middle[0]) * _SHOULDER - middle[0], highest - middle[1], 0.0])
     quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
     ways = [flip @ np.linalg.matrix_power(quarter, k) for k in range(4)]
     # Rows are points: a point p of the piece is the point `way @ p` of the panel.
