@@ -321,6 +321,35 @@ def test_other_programs_can_read_what_is_written(tmp_path: Path):
         assert given["pattern"].keys() == pattern.keys()
 
 
+def test_a_band_whose_ends_meet_is_opened_where_a_zip_would_be(tmp_path: Path):
+    """GarmentCode refuses two corners of a panel that become one, unless a stitch joins the panel to itself there."""
+    front, back = (piece_of(name, [(0.0, 0.0), (0.3, 0.0), (0.3, 0.4), (0.0, 0.4)]) for name in ("front", "back"))
+    band = piece_of("band", [(0.0, 0.0), (0.6, 0.0), (0.6, 0.04), (0.0, 0.04)])
+    sides = {
+        "left": ("front.e2", "back.e4"),
+        "right": ("back.e2", "front.e4"),
+        "waist": ("band.e1", "back.e3 + front.e3"),
+    }
+    seams = [
+        Seam(name=name, sides=(side_of(one, reversed=False), side_of(other, reversed=True)))
+        for name, (one, other) in sides.items()
+    ]
+    drafted = draft_garment(Pattern(name="skirt", pieces={"": [front, back, band]}, seams=seams), true=False)
+    data, notes = garmentcode_json(drafted)
+    assert len(notes) == 1
+    assert "is open over 400 mm between" in notes[0]
+    (opened,) = data["pattern"]["open"]
+    assert opened["stitch"][0]["seam"] in ("left", "right")
+    assert len(data["pattern"]["stitches"]) == 3
+    file = tmp_path / "skirt_specification.json"
+    write_garmentcode(drafted, file)
+    assert {seam.name: seam.sides for seam in read_pattern(file).seams} == {seam.name: seam.sides for seam in seams}
+    # With its ends sewn to each other the band needs no opening.
+    closed = Seam(name="ends", sides=(side_of("band.e2", reversed=False), side_of("band.e4", reversed=True)))
+    whole = draft_garment(Pattern(name="skirt", pieces={"": [front, back, band]}, seams=[*seams, closed]), true=False)
+    assert garmentcode_json(whole)[1] == ()
+
+
 def test_what_garmentcode_does_not_know_is_named(command: Command):
     hole = Hole(name="eye", points=0.05 * np.array([(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]))
     cloth = piece_of("cloth", [(0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)], holes=[hole])

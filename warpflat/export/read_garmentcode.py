@@ -91,13 +91,23 @@ class PropertiesEntry(Entry):
     units_in_meter: Annotated[float, Field(ge=1e-3, le=1e6)] = CENTIMETRES
 
 
+#: Two edges, and the word "right_wrong" where the cloth's right side meets a wrong one.
+Stitch = Annotated[list[StitchSideEntry | Literal["right_wrong"]], Field(min_length=2, max_length=3)]
+
+
+class OpenStitchEntry(Entry):
+    """A stitch that the package has left out for GarmentCode's sake, and its number among the others."""
+
+    at: Annotated[int, Field(ge=0)]
+    stitch: Stitch
+
+
 class PanelsEntry(Entry):
-    """Panels, and stitches of two edges each, with the word "right_wrong" where the cloth's right side meets a wrong one."""
+    """Panels and stitches; `open` is the package's own key."""
 
     panels: Annotated[dict[Name, PanelEntry], Field(min_length=1)]
-    stitches: list[Annotated[list[StitchSideEntry | Literal["right_wrong"]], Field(min_length=2, max_length=3)]] = (
-        Field(default_factory=list)
-    )
+    stitches: list[Stitch] = Field(default_factory=list)
+    open: list[OpenStitchEntry] = Field(default_factory=list)
 
 
 class GarmentCodeEntry(Entry):
@@ -162,7 +172,10 @@ def garmentcode_pattern(data: Any, name: str) -> Pattern:
     """
     entry = check_table(GarmentCodeEntry, data)
     panels = {key: _read_panel(key, each, entry.properties) for key, each in entry.pattern.panels.items()}
-    partners, own_chains = _read_stitches(entry.pattern.stitches, panels)
+    stitches = list(entry.pattern.stitches)
+    for left_out in sorted(entry.pattern.open, key=lambda each: each.at):
+        stitches.insert(left_out.at, left_out.stitch)
+    partners, own_chains = _read_stitches(stitches, panels)
     for panel in panels.values():
         _find_darts(panel, partners)
     chains = [chain for chain in own_chains if {*chain.sides[0], *chain.sides[1]} <= partners.keys()]
