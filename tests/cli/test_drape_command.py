@@ -35,13 +35,14 @@ def test_a_drawing_is_draped(tube: Path, tmp_path: Path, capsys: pytest.CaptureF
     table = tmp_path / "worn.toml"
     table.write_text('spacing_mm = 40\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\nmax_steps = 100\n')
     out = tmp_path / "out"
-    assert main(["drape", str(tube), "--seams", str(table), "--out", str(out)]) == 1
+    assert main(["drape", str(tube), "--seams", str(table), "--out", str(out), "--usd"]) == 1
     printed = capsys.readouterr()
     assert "the drape is not at rest after 100 steps" in printed.err
     assert "woven is taken" in printed.err
     assert "worn: fits: no" in printed.out
     assert "from the body" in printed.out
     names = {"back.draped.obj", "drape.png", "drape.webp", "frames.usdc", "front.draped.obj", "metrics.json"}
+    names |= {"worn.usdc"}
     assert {path.name for path in out.iterdir()} == names
     assert json.loads((out / "metrics.json").read_text())["drape"]["compared_with"] == "body"
 

@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 from command import Command
 
+import warpflat
 from warpflat.core.errors import InputError
+from warpflat.draping.drape_pattern import place_pieces
+from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.export.garmentcode import garmentcode_json, write_garmentcode
 from warpflat.export.pattern_json import write_pattern_json
 from warpflat.export.read_garmentcode import garmentcode_pattern
@@ -114,6 +117,21 @@ def test_a_panel_seen_from_behind_is_turned_over_and_a_sleeve_stands_upright():
     assert turned.placement is not None
     # About x first, then about y: the panel's (1, 0) points backwards, its (0, 1) to the side.
     np.testing.assert_allclose(np.abs(turned.placement[:, :2]).sum(axis=1), [1.0, 0.0, 1.0], atol=1e-12)
+
+
+def test_sleeves_of_every_pose_stand_upright():
+    """Drawn along x or along y, spread, half down or hanging: the cap is always up."""
+    lying = [(0.0, 0.0), (-50.0, 0.0), (-50.0, -20.0), (0.0, -20.0)]
+    upright = [(0.0, 0.0), (20.0, 0.0), (20.0, 50.0), (0.0, 50.0)]
+    for corners, place, angle in ((lying, [70.0, 140.0, 15.0], 0.0), (lying, [55.0, 110.0, 15.0], -50.0),
+                                  (upright, [20.0, 90.0, 15.0], 0.0), (upright, [60.0, 100.0, 15.0], 45.0)):  # fmt: skip
+        given = panel(corners, translation=place, rotation=[0.0, 0.0, angle], label="arm")
+        piece = garmentcode_pattern(file_of({"a": given}, []), "p").piece("a", "")
+        assert np.ptp(piece.outline, axis=0) == pytest.approx([0.2, 0.5])
+        assert piece.placement is not None
+        ends = [float((piece.placement @ [*piece.outline[:, 0].mean() * np.ones(1), y, 1.0])[0]) for y in
+                (piece.outline[:, 1].min(), piece.outline[:, 1].max())]  # fmt: skip
+        assert ends[1] < ends[0] + 1e-9
 
 
 def test_stitches_that_follow_each_other_are_a_seam_across_a_dart():
@@ -303,6 +321,35 @@ def test_other_programs_can_read_what_is_written(tmp_path: Path):
         assert given["pattern"].keys() == pattern.keys()
 
 
+def test_a_band_whose_ends_meet_is_opened_where_a_zip_would_be(tmp_path: Path):
+    """GarmentCode refuses two corners of a panel that become one, unless a stitch joins the panel to itself there."""
+    front, back = (piece_of(name, [(0.0, 0.0), (0.3, 0.0), (0.3, 0.4), (0.0, 0.4)]) for name in ("front", "back"))
+    band = piece_of("band", [(0.0, 0.0), (0.6, 0.0), (0.6, 0.04), (0.0, 0.04)])
+    sides = {
+        "left": ("front.e2", "back.e4"),
+        "right": ("back.e2", "front.e4"),
+        "waist": ("band.e1", "back.e3 + front.e3"),
+    }
+    seams = [
+        Seam(name=name, sides=(side_of(one, reversed=False), side_of(other, reversed=True)))
+        for name, (one, other) in sides.items()
+    ]
+    drafted = draft_garment(Pattern(name="skirt", pieces={"": [front, back, band]}, seams=seams), true=False)
+    data, notes = garmentcode_json(drafted)
+    assert len(notes) == 1
+    assert "is open over 400 mm between" in notes[0]
+    (opened,) = data["pattern"]["open"]
+    assert opened["stitch"][0]["seam"] in ("left", "right")
+    assert len(data["pattern"]["stitches"]) == 3
+    file = tmp_path / "skirt_specification.json"
+    write_garmentcode(drafted, file)
+    assert {seam.name: seam.sides for seam in read_pattern(file).seams} == {seam.name: seam.sides for seam in seams}
+    # With its ends sewn to each other the band needs no opening.
+    closed = Seam(name="ends", sides=(side_of("band.e2", reversed=False), side_of("band.e4", reversed=True)))
+    whole = draft_garment(Pattern(name="skirt", pieces={"": [front, back, band]}, seams=[*seams, closed]), true=False)
+    assert garmentcode_json(whole)[1] == ()
+
+
 def test_what_garmentcode_does_not_know_is_named(command: Command):
     hole = Hole(name="eye", points=0.05 * np.array([(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]))
     cloth = piece_of("cloth", [(0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)], holes=[hole])
@@ -316,6 +363,73 @@ def test_what_garmentcode_does_not_know_is_named(command: Command):
     assert "cloth: GarmentCode knows no holes: eye left out" in ended.err
     assert "seam 'second': one of its edges is in another seam" in ended.err
     assert [seam.name for seam in read_pattern("run/p_specification.json").seams] == ["first"]
+
+
+def test_panels_hang_where_the_body_is():
+    """A top hangs from the shoulders and a skirt of its own from the waist; sleeves of two halves go around the arms."""
+    top = [
+        (0.0, 0.0),
+        (50.0, 0.0),
+        (50.0, 30.0),
+        (40.0, 50.0),
+        (32.0, 52.0),
+        (25.0, 40.0),
+        (18.0, 52.0),
+        (10.0, 50.0),
+        (0.0, 30.0),
+    ]
+    skirt = [(0.0, 0.0), (50.0, 0.0), (45.0, 60.0), (5.0, 60.0)]
+    sleeve = [(0.0, 0.0), (20.0, 0.0), (20.0, 25.0), (0.0, 40.0)]
+
+    def other_side(panel_of: dict[str, Any]) -> dict[str, Any]:
+        """The panel behind: its edges run the other way, and keep their numbers where k becomes -2 - k."""
+        turned = copy.deepcopy(panel_of)
+        turned["edges"] = [{**edge, "endpoints": edge["endpoints"][::-1]} for edge in reversed(panel_of["edges"])]
+        turned["translation"] = [*panel_of["translation"][:2], -panel_of["translation"][2]]
+        return turned
+
+    panels: dict[str, Any] = {"top_f": panel(top, translation=[-25.0, 300.0, 30.0])}
+    panels["skirt_f"] = panel(skirt, translation=[-25.0, 0.0, 30.0])
+    panels["skirt_f"]["edges"][2]["label"] = "lower_interface"
+    for side, x in (("left", 40.0), ("right", -40.0)):
+        # The seam over the arm, the longer one, is on the far side from the body.
+        shape = [(-a, b) for a, b in sleeve[::-1]] if side == "left" else sleeve
+        panels[f"{side}_sleeve_f"] = panel(shape, translation=[x, 90.0, 20.0], label="arm")
+    for name in list(panels):
+        panels[name.replace("_f", "_b")] = other_side(panels[name])
+    count = {name: len(each["edges"]) for name, each in panels.items()}
+    stitches = [f"{f}.{k} {f.replace('_f', '_b')}.{count[f] - 1 - k}"
+                for f, ks in (("top_f", (1, 3, 6, 8)), ("skirt_f", (1, 3)), ("left_sleeve_f", (1, 3)), ("right_sleeve_f", (1, 3)))
+                for k in ks]  # fmt: skip
+    pattern = garmentcode_pattern(file_of(panels, stitches), "p")
+    pieces, seams, _ = whole_pieces(pattern.pieces[""], pattern.seams)
+    meshes, welds = mesh_pieces(pieces, seams, 0.03)
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    placed = place_pieces(pieces, meshes, welds, body)
+    shoulder = max(body.line(f"shoulder {side}")[:, 1].max() for side in ("left", "right"))
+    for name in ("top_f", "top_b"):
+        assert placed[name][:, 1].max() == pytest.approx(shoulder + 0.01, abs=1e-6)
+    waist = body.levels()["waist"].height
+    for name in ("skirt_f", "skirt_b"):
+        assert placed[name][:, 1].max() == pytest.approx(waist, abs=1e-6)
+    skin = body.surface().vertices
+    for name, sign in (("top_f", 1.0), ("top_b", -1.0), ("skirt_f", 1.0), ("skirt_b", -1.0)):
+        points = placed[name]
+        assert np.ptp(points[:, 2]) < 1e-9
+        beside = skin[(skin[:, 1] > points[:, 1].min()) & (skin[:, 1] < points[:, 1].max())]
+        beside = beside[np.abs(beside[:, 0]) < 0.25]
+        assert (sign * (points[0, 2] - beside[:, 2]) > 0.01).all()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        both = np.concatenate([placed[f"{side}_sleeve_{half}"] for half in "fb"])
+        arm = body.line(f"armhole {side}").mean(axis=0)
+        wrist = body.line(f"wrist {side}").mean(axis=0)
+        along = (wrist - arm) / np.linalg.norm(wrist - arm)
+        off = both - arm - np.outer((both - arm) @ along, along)
+        # A tube of 400 mm around the arm, one half before it and one behind.
+        np.testing.assert_allclose(np.linalg.norm(off, axis=1), 0.4 / (2 * np.pi), atol=1e-6)
+        assert sign * both[:, 0].mean() > 0.1
+        halves = [placed[f"{side}_sleeve_{half}"][:, 2].mean() for half in "fb"]
+        assert halves[0] > halves[1] + 0.05
 
 
 @needs_data

@@ -106,6 +106,7 @@ _GARMENTCODE = {
             [{"panel": "left_sleeve", "edge": 0}, {"panel": "left_sleeve", "edge": 2}, "right_wrong"],
         ],
         "panel_order": ["front", "left_sleeve"],
+        "open": [{"at": 1, "stitch": [{"panel": "left_sleeve", "edge": 1}, {"panel": "left_sleeve", "edge": 3}]}],
     },
     "parameters": {},
     "parameter_order": [],

@@ -29,6 +29,7 @@ Of a pattern the last two and metrics.json come out alone."""
 @click.option(
     "--edges", is_flag=True, help="Print the edges of a pattern's pieces, to name them in [[seams]]; drape nothing."
 )
+@click.option("--usd", is_flag=True, help="Write worn.usdc, too: the worn garment as one mesh with its pattern.")
 @output_options()
 def drape(
     scene: Path,
@@ -43,8 +44,9 @@ def drape(
     size: str | None,
     edges: bool,
     correct: bool,
+    usd: bool,
 ) -> int:
-    """Put a sewn garment on its body: a scene's, that of a run's folder, or a pattern's (pattern.json, DXF or SVG).
+    """Put a sewn garment on its body: a scene's, a run's, or that of a pattern (pattern.json, GarmentCode, DXF or SVG).
 
     For a scene it is as if it had a [drape] table; the settings of one that it has hold. A pattern is placed by its seams. A DXF
     or an SVG of another program names none: they stand in a TOML file.
@@ -54,6 +56,7 @@ def drape(
       warpflat drape scenes/basic_block.toml
       warpflat drape scenes/basic_block.toml --correct
       warpflat drape out/dress --fabric denim
+      warpflat drape shirt_specification.json --body scan.obj
       warpflat drape shirt.dxf --edges
       warpflat drape shirt.dxf --seams shirt.toml --body "EU 38"
     """
@@ -74,7 +77,7 @@ def drape(
         start_warp_silently()
         job = OutsideJob.read(scene, sewing=seams, body=body)
         folder = out if out is not None else Path("out") / f"{job.name}-draped"
-        result = drape_outside(job, folder, fabric=fabric, size=size, device=device)
+        result = drape_outside(job, folder, fabric=fabric, size=size, device=device, usd=usd)
         warnings = warnings_of(result.metrics)
         # What was left out has a line of its own at the end.
         notes = [note for note in result.notes if note not in result.metrics.get("notes", ())]
@@ -100,5 +103,7 @@ def drape(
     table = loaded.settings.drape or DrapeTable()
     if correct:
         table = table.model_copy(update={"correct": True})
+    if usd:
+        table = table.model_copy(update={"usd": True})
     loaded = replace(loaded, settings=loaded.settings.model_copy(update={"drape": table}))
     return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)

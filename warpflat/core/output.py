@@ -87,7 +87,7 @@ _TIMES = "seconds", "memory_mb"
 # Files that bear no name: in a folder with several runs they are taken to be the last one's.
 _NAMELESS = (
     "frames.usdc", "picture.png", "wear.png", "drape.png", "drape.webp", "corrected.png", "walked.png", "pattern.pdf", "pattern.json",
-    "review.html", "film.webp", "contact_sheet.png",
+    "review.html", "film.webp", "contact_sheet.png", "worn.usdc",
 )  # fmt: skip
 
 #: Called with the path of a file that was left out, and the note on it.

@@ -9,13 +9,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpflat.core.arrays import FloatArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
 from warpflat.core.short_repr import short_repr
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
 from warpflat.draping.lift import Lift, whole_lifts
-from warpflat.draping.mesh_pieces import mesh_pieces
+from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
@@ -23,11 +24,11 @@ from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.pattern.pieces import Pattern
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.whole_pieces import whole_pieces
 from warpflat.surface.connectivity import join_labels
 
-__all__ = ["Placement", "drape_pattern"]
+__all__ = ["Placement", "drape_pattern", "place_pieces"]
 
 # The largest piece of a garment is between so short and so long [m].
 _SIZES = (0.05, 10.0)
@@ -113,18 +114,7 @@ def drape_pattern(
     elif body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
     else:
-        at = {name: piece.at for name, piece in pieces.items() if piece.at}
-        hung = {
-            name: np.column_stack([mesh.points, np.ones(len(mesh.points))]) @ place.T
-            for name, mesh in meshes.items()
-            if (place := pieces[name].placement) is not None
-        }
-        heights: dict[str, list[float]] = {}
-        for name, points in hung.items():
-            for edge, level in pieces[name].levels.items():
-                heights.setdefault(level, []).extend(points[meshes[name].edges[edge], 1].tolist())
-        levels = {level: float(np.mean(row)) for level, row in heights.items()}
-        placed = wrap_pieces(meshes, welds, body, at=at, hung=hung, levels=levels, top=placement.top)
+        placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
@@ -176,3 +166,30 @@ def drape_pattern(
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
+
+
+def place_pieces(
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    body: Mannequin,
+    *,
+    top: str | float | None = None,
+) -> dict[str, FloatArray]:
+    """Return where the points of pieces start around a body (#P by 3 [m] each): see :func:`warpflat.draping.wrap_pieces.wrap_pieces`.
+
+    Raises:
+        InputError: as there.
+    """
+    hung = {
+        name: np.column_stack([mesh.points, np.ones(len(mesh.points))]) @ place.T
+        for name, mesh in meshes.items()
+        if (place := pieces[name].placement) is not None
+    }
+    levels = {
+        name: (level, float(np.mean([points[meshes[name].edges[edge], 1].mean() for edge in pieces[name].levels])))
+        for name, points in hung.items()
+        for level in pieces[name].levels.values()
+    }
+    at = {name: piece.at for name, piece in pieces.items() if piece.at}
+    return wrap_pieces(meshes, welds, body, at=at, hung=hung, levels=levels, top=top)

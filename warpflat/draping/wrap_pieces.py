@@ -27,7 +27,9 @@ from warpflat.mannequin.mannequin import Mannequin
 __all__ = ["UNITS", "draw_together", "wrap_pieces"]
 
 #: Where a file's units stand.
-UNITS = "are its units right (in DXF the text UNITS or $INSUNITS, in SVG width and viewBox)?"
+UNITS = (
+    "are its units right (in DXF the text UNITS or $INSUNITS, in SVG width and viewBox, in GarmentCode units_in_meter)?"
+)
 # Cloth around less than this share of the body's waist is no garment for it.
 _LEAST_GIRTH = 0.5
 
@@ -71,7 +73,7 @@ def wrap_pieces(
     *,
     at: Mapping[str, str] | None = None,
     hung: Mapping[str, FloatArray] | None = None,
-    levels: Mapping[str, float] | None = None,
+    levels: Mapping[str, tuple[str, float]] | None = None,
     top: str | float | None = None,
 ) -> dict[str, FloatArray]:
     """Place the points of each piece (#P by 3 [m]) around a body.
@@ -82,13 +84,13 @@ def wrap_pieces(
         body: with its levels.
         at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
         hung: by piece the points (#P by 3 [m]) where it hangs beside a body.
-        levels: by level of the body the height [m] at which what hangs there begins in `hung`.
+        levels: by piece the level of the body where it hangs, and the height [m] that this has in `hung`.
         top: the highest point of what does not hang from the shoulders: a level of the body or a height [m]; its waist if not given.
 
     Raises:
         InputError: a piece hangs together with no other, the pieces go around half the waist only, or a level is unknown.
     """
-    at, hung, hanging_from = dict(at or {}), hung or {}, levels or {}
+    at, hung = dict(at or {}), hung or {}
     for name in meshes:
         words = name.lower().replace("_", " ").split()
         if name not in at and any(word.startswith("sleeve") for word in words):
@@ -97,50 +99,55 @@ def wrap_pieces(
     if not trunk:
         raise InputError("there are sleeves alone; a garment needs a piece around the trunk")
     fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
-    joins = _joins(welds, trunk)
-    plane = _lay_out(meshes, joins, trunk, fronts or trunk[:1])
-    hangs_from_shoulder, width, _ = _girth(plane, joins)
-    points = np.concatenate(list(plane.values()))
-    high = float(points[:, 1].max())
-    if hangs_from_shoulder and top is None:
-        level = float(max(body.line(f"shoulder {side}")[:, 1].max() for side in ("left", "right"))) + _ABOVE
-    else:
-        of_body, at_level = body.levels(), "waist" if top is None else top
-        if isinstance(at_level, str) and at_level not in of_body:
-            raise InputError(f"top: level {at_level!r} is unknown: {nearest(at_level, of_body)}")
-        level = of_body[at_level].height if isinstance(at_level, str) else float(at_level)
     waist = body.line("waist")
     girth = float(np.linalg.norm(np.diff(waist, axis=0, append=waist[:1]), axis=1).sum())
+    shoulder = float(max(body.line(f"shoulder {side}")[:, 1].max() for side in ("left", "right"))) + _ABOVE
+    heights = {name: level.height for name, level in body.levels().items()}
+    at_level = "waist" if top is None else top
+    if isinstance(at_level, str) and at_level not in heights:
+        raise InputError(f"top: level {at_level!r} is unknown: {nearest(at_level, heights)}")
+    below = heights[at_level] if isinstance(at_level, str) else float(at_level)
+    arms = {name: side.removesuffix(" arm") for name, side in at.items() if side.endswith(" arm")}
+    placed = {name: row for side in ("left", "right") for name, row in _on_arm(meshes, welds, arms, side, body).items()}
+    joins, width = _joins(welds, trunk), 0.0
+    is_hung = hung.keys() >= set(trunk)
+    # A suit of several garments hangs each by itself; what is wrapped hangs together.
+    for part in _parts(joins, trunk) if is_hung else [trunk]:
+        inner = [join for join in joins if set(join.pieces) <= set(part)]
+        plane = _lay_out(meshes, inner, part, [name for name in fronts if name in part] or part[:1])
+        over_shoulders, around, _ = _girth(plane, inner)
+        width = max(width, around)
+        if not is_hung:
+            continue
+        # From the seams over the shoulders, the lowest of them where a hood has such ones too; and from lines at levels of the body.
+        shift = dict.fromkeys(part, 0.0)
+        if top is not None:
+            shift = dict.fromkeys(part, below - max(float(hung[name][:, 1].max()) for name in part))
+        elif over_shoulders:
+            seams = [np.concatenate(join.points(hung))[:, 1].max() for join in over_shoulders]
+            shift = dict.fromkeys(part, shoulder - float(min(seams)))
+        lines: dict[str, list[float]] = {}
+        for level, height in (levels[name] for name in part if levels and name in levels):
+            lines.setdefault(level, []).append(height)
+        for level, row in lines.items():
+            height = float(np.mean(row))
+            hangs = [name for name in part if hung[name][:, 1].mean() < height] if top or over_shoulders else part
+            shift |= dict.fromkeys(hangs, heights[level] - height)
+        for name in part:
+            placed[name] = _beside(hung[name] + [0.0, shift[name], 0.0], meshes[name].triangles, body)
     if width < _LEAST_GIRTH * girth:
         raise InputError(
             f"the pattern goes {1e3 * width:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {UNITS} Is a piece missing?"
         )
-    arms = {name: side.removesuffix(" arm") for name, side in at.items() if side.endswith(" arm")}
-    placed = {name: row for side in ("left", "right") for name, row in _on_arm(meshes, welds, arms, side, body).items()}
-    if hung.keys() >= set(trunk):
-        shift = dict.fromkeys(trunk, 0.0)
-        if hangs_from_shoulder or top is not None:
-            shift = dict.fromkeys(trunk, level - max(float(hung[name][:, 1].max()) for name in trunk))
-        for name, begins in hanging_from.items():
-            to = body.levels()[name].height - begins
-            # With what hangs from the shoulders alone above it, a line at the waist draws what is below to its level.
-            shift = {
-                each: to if hung[each][:, 1].mean() < begins or not (hangs_from_shoulder or top) else by
-                for each, by in shift.items()
-            }
-        for name in trunk:
-            placed[name] = _beside(hung[name] + [0.0, shift[name], 0.0], meshes[name].triangles, body)
+    if is_hung:
         return placed
-    origin = np.array([0.0, level - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
+    hangs_at = shoulder if over_shoulders and top is None else below
+    high = max(float(points[:, 1].max()) for points in plane.values())
+    origin = np.array([0.0, hangs_at - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
     frame = _Frame(origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     # The pieces in tiers above each other: those of one are joined by upright seams.
-    tiers = {name: {name} for name in plane}
-    for join in joins:
-        a, b = join.pieces
-        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane)):
-            merged = tiers[a] | tiers[b]
-            tiers |= dict.fromkeys(merged, merged)
-    for tier in {id(tier): sorted(tier) for tier in tiers.values()}.values():
+    upright = [join for join in joins if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane))]
+    for tier in _parts(upright, list(plane)):
         laid = {name: plane[name] for name in tier}
         inner = [join for join in joins if set(join.pieces) <= laid.keys()]
         _, of_tier, meets = _girth(laid, inner)
@@ -162,6 +169,15 @@ class _Join:
     def points(self, points: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return the points on both sides (#J by 2)."""
         return points[self.pieces[0]][self.vertices[0]], points[self.pieces[1]][self.vertices[1]]
+
+
+def _parts(joins: Sequence[_Join], names: Sequence[str]) -> list[list[str]]:
+    """Return the names in parts that hang together by joins."""
+    parts = {name: {name} for name in names}
+    for join in joins:
+        a, b = join.pieces
+        parts |= dict.fromkeys(merged := parts[a] | parts[b], merged)
+    return [[name for name in names if name in part] for part in {id(part): part for part in parts.values()}.values()]
 
 
 def _joins(welds: Sequence[Sequence[Weld]], names: Sequence[str]) -> list[_Join]:
@@ -265,14 +281,14 @@ def _centred(plane: Mapping[str, FloatArray], width: float, fronts: Sequence[str
     return {name: points - [middle, 0.0] for name, points in plane.items()}
 
 
-def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[bool, float, bool]:
-    """Return whether the pieces hang from seams over the shoulders, the way around, and whether an upright seam meets behind the body.
+def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[list[_Join], float, bool]:
+    """Return the seams over the shoulders, the way around, and whether an upright seam meets behind the body.
 
     The way around is how far apart the edges lie that meet there [m], or the width of all pieces. Edges half as far apart are those
     of shoulders or, upright, those inside a leg.
     """
     whole = float(np.ptp(np.concatenate(list(plane.values()))[:, 0]))
-    around, shoulders = list[float](), False
+    around, shoulders = list[float](), list[_Join]()
     for join in joins:
         rows = join.points(plane)
         apart = abs(float((rows[0] - rows[1])[:, 0].mean()))
@@ -285,7 +301,7 @@ def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[boo
                 row[:, 1].mean() > 0.5 * (plane[name][:, 1].min() + plane[name][:, 1].max())
                 for name, row in zip(join.pieces, rows, strict=True)
             )
-            shoulders = shoulders or (flat and on_top)
+            shoulders += [join] if flat and on_top else []
     return shoulders, max(around, default=whole), bool(around)
 
 

@@ -11,15 +11,19 @@ from warpflat.draping.frames import write_drape_film, write_drape_frames
 from warpflat.draping.picture import write_drape_picture
 from warpflat.draping.result import Drape
 from warpflat.export.obj import write_obj
+from warpflat.export.sewn_usd import write_sewn_usd
 from warpflat.surface.mesh import Surface
 
 __all__ = ["save_drape", "write_drape_files"]
 
 
-def save_drape(drape: Drape, folder: str | Path, *, picture: bool = True, frames: bool = False) -> list[str]:
+def save_drape(
+    drape: Drape, folder: str | Path, *, picture: bool = True, frames: bool = False, usd: bool = False
+) -> list[str]:
     """Write `NAME.draped.obj` per piece, `drape.png` and, for frames, `drape.webp`, all of them or none.
 
-    With frames the way to rest is added to the folder's `frames.usdc`, too, or a new one is written.
+    With `usd` the worn garment is written as one mesh with its pattern, too: `worn.usdc`, see :mod:`warpflat.export.sewn_usd`. With
+    frames the way to rest is added to the folder's `frames.usdc`, or a new one is written.
 
     Returns:
         The names of the files, without those of pictures and film that had to be left out.
@@ -28,11 +32,14 @@ def save_drape(drape: Drape, folder: str | Path, *, picture: bool = True, frames
         InputError: the folder cannot be written.
     """
     names = [*(["drape.png"] if picture else []), *(["drape.webp"] if picture and frames else [])]
-    with output_folder(folder, [*names, *(["frames.usdc"] if frames else [])], sources=drape.sources) as to:
-        return write_drape_files(drape, to, picture=picture, frames=frames)
+    names += [*(["frames.usdc"] if frames else []), *(["worn.usdc"] if usd else [])]
+    with output_folder(folder, names, sources=drape.sources) as to:
+        return write_drape_files(drape, to, picture=picture, frames=frames, usd=usd)
 
 
-def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True, frames: bool = False) -> list[str]:
+def write_drape_files(
+    drape: Drape, folder: Path, *, picture: bool = True, frames: bool = False, usd: bool = False
+) -> list[str]:
     """Write the files into a folder in a block of :func:`warpflat.core.output.output_folder`.
 
     Returns:
@@ -52,6 +59,11 @@ def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True, frame
         path = file_in(folder, name, ".draped.obj")
         write_obj(path, surface, cloth.flat[rows])
         files.append(path.name)
+    if usd:
+        write_sewn_usd(
+            folder / "worn.usdc", drape.positions, cloth.faces, cloth.flat, cloth.flat_faces, cloth.piece_faces
+        )
+        files.append("worn.usdc")
     if picture:
         with optional_file(folder / "drape.png", files) as path:
             write_drape_picture(path, drape)

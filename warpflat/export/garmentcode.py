@@ -52,8 +52,8 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
 
     Panels are whole and have no allowance: halves are unfolded, and pairs are there twice. Both sides of a seam are split at the same
     places, since a stitch joins one edge to one: at corners, at the ends of edges, and where one cubic would not keep to the line.
-    `name` of an edge, `grain` and `placed` of a panel, `seam` and `reversed` of a stitch are the package's own keys, which other
-    programs pass over.
+    `name` of an edge, `grain` and `placed` of a panel, `seam` and `reversed` of a stitch and `open` are the package's own keys, which
+    other programs pass over.
 
     Raises:
         InputError: an unknown size, or a piece that cannot be unfolded.
@@ -140,8 +140,23 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
             for each in both
         ]
         written.append([*sides, "right_wrong"] if both[0].reversed == both[1].reversed else sides)
+    opened = _openings(written, {name: len(panel["vertices"]) for name, panel in panels.items()})
+    for at in opened:
+        (first, second), ends = written[at][:2], stitches[at][0]
+        length = float(arc_lengths(cubic_weights(np.linspace(0.0, 1.0, 101)) @ ends[0].control)[-1])
+        left_out.append(
+            f"seam {first['seam']!r} is open over {1e3 * length:.0f} mm between {first['panel']} and {second['panel']}: "
+            "the ends of a piece meet there in a point, which GarmentCode does not sew"
+        )
+    pattern: dict[str, Any] = {
+        "panels": panels,
+        "stitches": [stitch for at, stitch in enumerate(written) if at not in opened],
+        "panel_order": list(panels),
+    }
+    if opened:
+        pattern["open"] = [{"at": at, "stitch": written[at]} for at in opened]
     return {
-        "pattern": {"panels": panels, "stitches": written, "panel_order": list(panels)},
+        "pattern": pattern,
         "parameters": {},
         "parameter_order": [],
         "properties": {
@@ -151,6 +166,48 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
             "units_in_meter": int(CENTIMETRES),
         },
     }, tuple(left_out)
+
+
+def _openings(stitches: Sequence[Sequence[Any]], corners: Mapping[str, int]) -> list[int]:
+    """Return which stitches are left open, so that no two corners of a panel meet but those that a stitch of the panel with itself joins.
+
+    Such corners are the ends of a waistband that goes around to where it began. A stitch of other panels between them is opened,
+    as a zip would be.
+    """
+    opened: list[int] = []
+    for _ in stitches:
+        # The corners that each stitch brings together.
+        links: dict[tuple[str, int], list[tuple[tuple[str, int], int]]] = {}
+        itself: set[frozenset[tuple[str, int]]] = set()
+        for number, (first, second, *word) in enumerate(stitches):
+            if number in opened:
+                continue
+            (a, i), (b, j) = ((side["panel"], side["edge"]) for side in (first, second))
+            ends = ((a, i), (a, (i + 1) % corners[a])), ((b, j), (b, (j + 1) % corners[b]))
+            for one, other in zip(ends[0], ends[1] if word else ends[1][::-1], strict=True):
+                links.setdefault(one, []).append((other, number))
+                links.setdefault(other, []).append((one, number))
+                itself |= {frozenset((one, other))} if a == b else set()
+        found = None
+        for start in links:
+            # Breadth first over all that meets in this corner, with the stitches on the way.
+            ways: dict[tuple[str, int], list[int]] = {start: []}
+            for corner in (reached := [start]):
+                for other, number in links[corner]:
+                    if other not in ways:
+                        ways[other] = [*ways[corner], number]
+                        reached.append(other)
+            same = [corner for corner in reached if corner[0] == start[0]]
+            sewn = any(frozenset((start, corner)) in itself for corner in same)
+            if len(same) > 1 and not sewn:
+                found = ways[same[1]], start[0]
+                break
+        if found is None:
+            break
+        way, panel = found
+        others = [number for number in way if panel not in (stitches[number][0]["panel"], stitches[number][1]["panel"])]
+        opened.append((others or way)[0])
+    return sorted(opened)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,8 @@ __all__ = ["CENTIMETRES", "LABELS", "EdgeKey", "garmentcode_pattern"]
 CENTIMETRES = 100.0
 # Chords of a curve stray from it by at most this [m]: a wide hem is then as long as its curve within .01 mm.
 _CHORD = 5e-6
+# A shoulder's distance from the middle of the body [m], near enough to tell a sleeve's upper end.
+_SHOULDER = 0.15
 #: By level of the body the label of the edges that are attached there.
 LABELS = {"waist": "lower_interface"}
 
@@ -89,13 +91,23 @@ class PropertiesEntry(Entry):
     units_in_meter: Annotated[float, Field(ge=1e-3, le=1e6)] = CENTIMETRES
 
 
+#: Two edges, and the word "right_wrong" where the cloth's right side meets a wrong one.
+Stitch = Annotated[list[StitchSideEntry | Literal["right_wrong"]], Field(min_length=2, max_length=3)]
+
+
+class OpenStitchEntry(Entry):
+    """A stitch that the package has left out for GarmentCode's sake, and its number among the others."""
+
+    at: Annotated[int, Field(ge=0)]
+    stitch: Stitch
+
+
 class PanelsEntry(Entry):
-    """Panels, and stitches of two edges each, with the word "right_wrong" where the cloth's right side meets a wrong one."""
+    """Panels and stitches; `open` is the package's own key."""
 
     panels: Annotated[dict[Name, PanelEntry], Field(min_length=1)]
-    stitches: list[Annotated[list[StitchSideEntry | Literal["right_wrong"]], Field(min_length=2, max_length=3)]] = (
-        Field(default_factory=list)
-    )
+    stitches: list[Stitch] = Field(default_factory=list)
+    open: list[OpenStitchEntry] = Field(default_factory=list)
 
 
 class GarmentCodeEntry(Entry):
@@ -160,7 +172,10 @@ def garmentcode_pattern(data: Any, name: str) -> Pattern:
     """
     entry = check_table(GarmentCodeEntry, data)
     panels = {key: _read_panel(key, each, entry.properties) for key, each in entry.pattern.panels.items()}
-    partners, own_chains = _read_stitches(entry.pattern.stitches, panels)
+    stitches = list(entry.pattern.stitches)
+    for left_out in sorted(entry.pattern.open, key=lambda each: each.at):
+        stitches.insert(left_out.at, left_out.stitch)
+    partners, own_chains = _read_stitches(stitches, panels)
     for panel in panels.values():
         _find_darts(panel, partners)
     chains = [chain for chain in own_chains if {*chain.sides[0], *chain.sides[1]} <= partners.keys()]
@@ -243,12 +258,16 @@ def _read_panel(key: str, entry: PanelEntry, properties: PropertiesEntry) -> _Pa
     turned = Rotation.from_euler("xyz", entry.rotation, degrees=True).as_matrix()
     placement = np.column_stack([turned[:, :2], np.array(entry.translation) / properties.units_in_meter])
     middle = placement @ [*ring.mean(axis=0), 1.0]
-    words = [*re.split(r"[^a-z]+", key.lower()), *re.split(r"[^a-z]+", entry.label.lower())]
-    on_arm = any(word.startswith(("sleeve", "cuff", "arm")) for word in words)
+    # A label says on which part of the body a panel is; else its name does.
+    words = re.split(r"[^a-z]+", (entry.label or key).lower())
+    on_arm = any(word.startswith(("sleeve", "arm")) for word in words) or {"sl", "cuff"} <= set(words)
     x, y = ring.T
     flip = np.diag([-1.0 if x @ np.roll(y, -1) < y @ np.roll(x, -1) else 1.0, 1.0])
     # Of the four ways to stand the one whose height rises most, or on an arm, whose sleeve may lie, comes nearest to the shoulder.
-    up = np.array([-np.sign(middle[0]), 1.0, 0.0]) if on_arm else np.array([0.0, 1.0, 0.0])
+    up = np.array([0.0, 1.0, 0.0])
+    if on_arm:
+        highest = float((np.column_stack([ring, np.ones(len(ring))]) @ placement[1]).max())
+        up = np.array([np.sign(middle[0]) * _SHOULDER - middle[0], highest - middle[1], 0.0])
     quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
     ways = [flip @ np.linalg.matrix_power(quarter, k) for k in range(4)]
     # Rows are points: a point p of the piece is the point `way @ p` of the panel.

@@ -27,6 +27,7 @@ def drape_names(scene: Scene) -> list[str]:
         return []
     names = [f"{scene.name}.draped.obj"] if settings.mannequin is None else []
     names += ["drape.png"] if output.picture else []
+    names += ["worn.usdc"] if table.usd else []
     names += ["drape.webp"] if output.picture and FrameSchedule(output).wanted else []
     if table.correct or table.correct_fabric is not None:
         names += ["corrected.png"] if output.picture else []
@@ -60,10 +61,12 @@ def write_drape(
 
     draped = drape_scene(scene, garment, device=device)
     output = scene.settings.output
-    files = write_drape_files(draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted)
-    metrics = {"drape": draped.measures()}
     table = scene.settings.drape
     assert table is not None
+    files = write_drape_files(
+        draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted, usd=table.usd
+    )
+    metrics = {"drape": draped.measures()}
     if table.correct or table.correct_fabric is not None:
         entry, more = _write_correction(scene, garment, draped, folder)
         metrics["drape"]["correction"] = entry

@@ -242,6 +242,7 @@ def drape_outside(
     fabric: str | None = None,
     size: str | None = None,
     device: str | None = None,
+    usd: bool = False,
 ) -> SceneResult:
     """Drape a pattern from outside; write `metrics.json`, `NAME.draped.obj` per piece, `frames.usdc` and pictures, all of them or none.
 
@@ -251,6 +252,7 @@ def drape_outside(
         fabric: a name, before that of the sewing file and of the pattern; "woven" if none of them says one.
         size: of the pattern; its sample size if not given.
         device: Warp device.
+        usd: whether `worn.usdc` is written, too.
 
     Raises:
         InputError: an unknown fabric or size, a pattern that cannot be meshed, placed or written.
@@ -267,7 +269,8 @@ def drape_outside(
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
     options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
-    names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc"]
+    usd = usd or table.usd
+    names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc", *(["worn.usdc"] if usd else [])]
     with output_folder(out, names, sources=job.sources, guard=True) as folder:
         require_own_metrics(folder)
         report_activity("draping")
@@ -279,7 +282,7 @@ def drape_outside(
             draped, more = drape_pattern(
                 pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
             )
-        files = [*write_drape_files(draped, folder, frames=True), "metrics.json"]
+        files = [*write_drape_files(draped, folder, frames=True, usd=usd), "metrics.json"]
         body = {} if job.body is None else {"mannequin": job.body.metrics()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": draped.measures()})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)

@@ -431,6 +431,8 @@ class DrapeTable(Table):
     """Whether the pattern is corrected until the worn garment lies on the designed surface, or no nearer."""
     correct_fabric: str | None = None
     """Another cloth for the corrected pattern, in which it is to be worn in the same shape."""
+    usd: bool = False
+    """Whether the worn garment is written as one mesh with its pattern, `worn.usdc`, as Style3D has it."""
 
 
 class OutputTable(Table):
