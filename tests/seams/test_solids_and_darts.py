@@ -12,6 +12,7 @@ import trimesh
 import warpflat
 from warpflat.cli.main import main
 from warpflat.scene.found_seams import found_seams
+from warpflat.seams.fields import Operators
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 from warpflat.surface.tubes import tube_borders
@@ -92,6 +93,24 @@ def write(surface: Surface, path: Path) -> Path:
     lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
+
+
+def test_trousers_as_tight_as_a_skin_have_a_panel_more_in_each_leg() -> None:
+    plain = solids.trousers(0.04)
+    vertices = plain.vertices.copy()
+    faces = plain.faces[:, :3].astype(np.int64)
+    normals = Operators(vertices=vertices, faces=faces).vertex_normals
+    for side in (1, -1):
+        for place in ([0.07 * side, 0.1, -0.14], [0.12 * side, -0.28, 0.07], [0.13 * side, -0.4, -0.08]):
+            away = np.linalg.norm(plain.vertices - place, axis=1)
+            vertices += 0.03 * np.exp(-(away**2) / (2 * 0.05**2))[:, None] * normals
+    found = warpflat.find_seams(warpflat.make_surface(vertices, faces, name="tight"), fabric="woven")
+    names = {seam.name for seam in found.seams}
+    assert {"panel left", "panel right"} <= names
+    assert len(found.pieces) == 6
+    flat = [warpflat.flatten(piece, fabric="woven", datum="grain") for piece in found.pieces]
+    area = np.array([piece.fit.area.sum() for piece in flat])
+    assert (area * [piece.fit.outside for piece in flat]).sum() < 0.03 * area.sum()
 
 
 def test_the_command_parts_a_garment_and_sews_it(tmp_path: Path) -> None:
