@@ -23,6 +23,7 @@ from warpflat.garment.sew_pieces import sew_pieces
 from warpflat.seams.anatomy import Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
+from warpflat.seams.solid import SOLID
 from warpflat.seams.symmetric import other_side
 from warpflat.seams.tailor import FACING, LEFT, side_word
 from warpflat.solver.options import RelaxOptions
@@ -69,12 +70,14 @@ _SAME = 1e-6
 # A seam costs nothing if closing it brings no more than this share of the garment's cloth beyond the limit, and no more strain energy than
 # this share of all, and this much [J/m2].
 _NOTHING, _NO_ENERGY, _NO_DENSITY = 1.5e-3, 0.02, 1e-2
+# Seams of a closed thing are alike if their lengths agree within this share.
+_EQUAL = 0.015
 # Seams that a garment keeps even so: it is put together at them.
 _STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm")
 # Names of a seam on trial, and of its mirror image.
 _TRIAL, _MATE = "on trial", "on trial, mirrored"
-# Prices are known to this share.
-_PRICE_LEFT = 0.1
+# Prices are known to this share, what is made to the second.
+_PRICE_LEFT, _TRIAL_LEFT = 0.1, 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -266,16 +269,23 @@ def _priced(
         mate = other_side(name)
         both = [name, mate] if mate != name and mate in cloth.seams else [name]
         alike = anatomy.mirror is not None and len(both) == 2
+        if name.startswith(SOLID):
+            # What lies between equal pieces: they stay equal, and are drawn once.
+            long = _length(cloth, name)
+            both = [
+                one for one in cloth.seams if one.startswith(SOLID) and abs(_length(cloth, one) - long) < _EQUAL * long
+            ]
+            alike = True
         trial, after = _without(cloth, both[:1], pieces, anatomy, fabric, prepare)
-        found[name] = trial
-        if alike:
-            found[mate] = replace(trial, name=mate)
-        most = _NO_ENERGY * energy + _NO_DENSITY * area
+        for one in both if alike else both[:1]:
+            found[one] = replace(trial, name=one)
+        # What closed things are made of must lie within its limit, no more.
+        most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
         kept = name.startswith(_STRUCTURAL) or any(options.keeps(one) for one in both)
         if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
             continue
-        if len(both) == 2:
-            trial, after = _without(cloth, both, pieces, anatomy, fabric, prepare)
+        # Before it is closed, it is known well: the layout of what is joined is far from rest.
+        trial, after = _without(cloth, both, pieces, anatomy, fabric, prepare, energy_left=_TRIAL_LEFT)
         now = sum(one.outside for one in after)
         if (
             trial.released is None
@@ -291,7 +301,14 @@ def _priced(
 
 
 def _without(
-    cloth: Cloth, names: Sequence[str], pieces: list[_Measured], anatomy: Anatomy, fabric: Fabric, prepare: Prepare
+    cloth: Cloth,
+    names: Sequence[str],
+    pieces: list[_Measured],
+    anatomy: Anatomy,
+    fabric: Fabric,
+    prepare: Prepare,
+    *,
+    energy_left: float = _PRICE_LEFT,
 ) -> tuple[Trial, list[_Measured]]:
     """Return what seams do, by the pieces that there were without them, and these pieces."""
     closed = cloth
@@ -302,7 +319,7 @@ def _without(
         return needed, pieces
     try:
         # What costs much need not be known well: joined pieces are large, and far from rest.
-        after = _measured(closed, anatomy, fabric, prepare, pieces, energy_left=_PRICE_LEFT)
+        after = _measured(closed, anatomy, fabric, prepare, pieces, energy_left=energy_left)
     except InputError:
         return replace(needed, needed="cannot lie flat without it"), pieces
     if sum(one.result.overlap for one in after) > sum(one.result.overlap for one in pieces) + _OVERLAP:
@@ -329,7 +346,7 @@ def _measured(
     prepare: Prepare,
     known: Sequence[_Measured],
     *,
-    energy_left: float = 0.02,
+    energy_left: float = _TRIAL_LEFT,
 ) -> list[_Measured]:
     """Return the pieces, flattened coarsely; those that are as they were are taken over, and mirror images are flattened once.
 
@@ -414,7 +431,7 @@ def _strained_by_sewing(cloth: Cloth, pieces: Sequence[_Measured]) -> float:
         replace(one.result, surface=replace(one.result.surface, name=f"piece {number}"))
         for number, one in enumerate(beside)
     ]
-    sewn = sew_pieces(flat, options=_trial_options(0.02), eased=True).pieces.values()
+    sewn = sew_pieces(flat, options=_trial_options(_TRIAL_LEFT), eased=True).pieces.values()
     return sum(piece.fit.outside * one.area for piece, one in zip(sewn, beside, strict=True)) - sum(
         one.outside for one in beside
     )
