@@ -11,7 +11,9 @@ import seam_solids as solids
 
 import warpflat
 from warpflat.garment.sew_pieces import meeting_borders, unsewn_borders
-from warpflat.seams.find import FoundSeams
+from warpflat.seams.anatomy import find_anatomy
+from warpflat.seams.fields import Operators
+from warpflat.seams.find import FoundSeams, cloth_of
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 
@@ -69,6 +71,39 @@ def test_a_shirt_becomes_front_back_and_two_sleeves(name: str) -> None:
     armhole = by_name["front"].vertices[np.concatenate(edges)]
     assert np.abs(armhole[:, 0]).min() > 0.13
     assert np.abs(armhole[:, 0]).max() < 0.30
+
+
+def test_the_sleeves_of_a_waisted_shirt_begin_at_its_armpits_not_at_its_waist() -> None:
+    plain = solids.shirt(arm=0.9, sleeve=0.235, step=0.035)
+    height = plain.vertices[:, 1]
+    narrower = np.where(height < 0.4, 1.0 - 0.5 * np.exp(-(((height - 0.15) / 0.12) ** 2)), 1.0)
+    waisted = warpflat.make_surface(plain.vertices * np.stack([narrower, 0 * narrower + 1, narrower], 1), plain.faces)
+    cloth = cloth_of(waisted)
+    anatomy = find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+    assert [limb.kind for limb in anatomy.limbs] == ["sleeve", "sleeve"]
+    assert [limb.fork[1] for limb in anatomy.limbs] == pytest.approx([0.415, 0.415], abs=0.02)
+
+
+def test_a_sleeves_end_that_turns_inwards_to_the_wrist_is_no_cloth() -> None:
+    surface = shirt("T-pose")
+    vertices, faces = [surface.vertices], surface.faces.tolist()
+    for loop in border_loops(surface.faces):
+        rim = surface.vertices[loop]
+        if abs(rim[:, 0].mean()) < 0.3:
+            continue
+        middle, around = rim.mean(axis=0), len(loop)
+        before = loop.tolist()
+        for share, inwards in ((0.85, 0.001), (0.6, 0.0055)):
+            ring = middle + share * (rim - middle)
+            ring[:, 0] -= np.sign(middle[0]) * inwards
+            first = sum(map(len, vertices))
+            vertices.append(ring)
+            row = list(range(first, first + around))
+            faces += [[before[(k + 1) % around], before[k], row[k], row[(k + 1) % around]] for k in range(around)]
+            before = row
+    found = warpflat.find_seams(warpflat.make_surface(np.concatenate(vertices), faces))
+    assert any("drawn thickness" in note for note in found.notes)
+    assert sum(map(_area, found.pieces)) == pytest.approx(_area(surface), rel=3e-3)
 
 
 def test_left_and_right_are_mirror_images() -> None:

@@ -480,7 +480,7 @@ def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Ki
         while before[way[-1]] >= 0:
             way.append(int(before[way[-1]]))
         points = cloth.vertices[way[::-1]]
-        fork, along, length, bend = _fork(points, size)
+        fork, along, length, bend = _fork(points, upward, size)
         if i in arms and (bend < _STRAIGHT or length < _SHORTEST_SLEEVE * size):
             continue
         found.append(
@@ -513,7 +513,7 @@ def _averaged_limbs(limbs: Sequence[Limb], normal: FloatArray, offset: float, si
     return made
 
 
-def _fork(points: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float, float]:
+def _fork(points: FloatArray, upward: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float, float]:
     """Return where a way along a limb and on along the trunk bends most, the direction from there along the limb, and its length.
 
     Returns:
@@ -528,16 +528,22 @@ def _fork(points: FloatArray, size: float) -> tuple[FloatArray, FloatArray, floa
     for _ in range(2):
         # The way follows edges: its steps are smoothed away.
         line[1:-1] = 0.25 * line[:-2] + 0.5 * line[1:-1] + 0.25 * line[2:]
-    chord = (line[-1] - line[0]) / max(float(np.linalg.norm(line[-1] - line[0])), 1e-300)
-    away = line - line[0]
-    at = int(np.linalg.norm(away - (away @ chord)[:, None] * chord, axis=1).argmax())
-    at = min(max(at, 1), 199)
-    for _ in range(4):
-        r = max(3, min(at, 200 - at, max(3, int(200 * 0.2 * size / max(total, 1e-300)))))
+    reach = max(3, int(200 * 0.2 * size / max(total, 1e-300)))
+
+    def legs(at: int) -> tuple[FloatArray, FloatArray, int]:
+        r = max(3, min(at, 200 - at, reach))
         low, high = max(0, at - r), min(200, at + r)
         one, other = line[low] - line[at], line[high] - line[at]
         one /= max(float(np.linalg.norm(one)), 1e-300)
         other /= max(float(np.linalg.norm(other)), 1e-300)
+        return one, other, r
+
+    # Where it comes up from the limb and goes down again. At the waist a way bends, too, and a short sleeve bends it near its end only.
+    rises = [-r * float((one + other) @ upward) for one, other, r in map(legs, range(1, 200))]
+    at = 1 + int(np.argmax(rises))
+    for _ in range(4):
+        one, other, r = legs(at)
+        low, high = max(0, at - r), min(200, at + r)
         step = line[low : high + 1] @ -(one + other)
         new = low + int(step.argmax())
         new = min(max(new, 1), 199)

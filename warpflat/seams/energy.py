@@ -14,15 +14,19 @@ from numpy.typing import NDArray
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.cutting.ledger import coarse_options
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
+from warpflat.garment.sew_pieces import sew_pieces
 from warpflat.seams.anatomy import Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
+from warpflat.seams.solid import SOLID
 from warpflat.seams.symmetric import other_side
 from warpflat.seams.tailor import FACING, LEFT, side_word
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 
@@ -46,6 +50,13 @@ _MOUTH, _OVERLAP = 4e-3, 1e-5
 _PLACES, _STRETCHES = 3, 2
 # A place is looked at if it has this share of what is beyond in its piece.
 _HEARD = 0.08
+# Nor is a dart's mouth wider than this share of its length: such a wedge is no dart.
+_WIDE = 0.6
+# A seam leaves no piece that is narrower somewhere than this share of the garment's size, between stretches of its border that are longer
+# than so many times that: nobody cuts a neck of cloth, or a tip, that narrow.
+_NARROW, _BESIDE_NECK = 0.05, 3.0
+# So many of the best lines are sewn on trial: two sides that differ in length strain each other.
+_SEWN_ON_TRIAL = 3
 # Two ways to the border are different from this angle on [cosine].
 _OTHER_WAY = 0.6
 # Lengths are shares of the garment's size. A dart is between these long, and its tip a little behind the place.
@@ -59,10 +70,14 @@ _SAME = 1e-6
 # A seam costs nothing if closing it brings no more than this share of the garment's cloth beyond the limit, and no more strain energy than
 # this share of all, and this much [J/m2].
 _NOTHING, _NO_ENERGY, _NO_DENSITY = 1.5e-3, 0.02, 1e-2
+# Seams of a closed thing are alike if their lengths agree within this share.
+_EQUAL = 0.015
 # Seams that a garment keeps even so: it is put together at them.
 _STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm")
-# Prices are known to this share.
-_PRICE_LEFT = 0.1
+# Names of a seam on trial, and of its mirror image.
+_TRIAL, _MATE = "on trial", "on trial, mirrored"
+# Prices are known to this share, what is made to the second.
+_PRICE_LEFT, _TRIAL_LEFT = 0.1, 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,10 +152,13 @@ def cut_by_energy(
     cloth, pieces, trials = _priced(cloth, pieces, anatomy, fabric, options, prepare)
     exhausted = set[int]()
     tried = 0
-    most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
     parting = _PARTED_FIRST * total < sum(piece.outside for piece in pieces)
+    most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
+    if parting and options.most_pieces is None and (anatomy.kind == "trousers" or anatomy.open_front):
+        # What is as tight as a skin has a panel more in each leg, a jacket two in each sleeve.
+        most += 2
     for _ in range(_MOST_ROUNDS):
-        beyond = sum(piece.outside for piece in pieces)
+        beyond, energy = sum(piece.outside for piece in pieces), sum(piece.energy for piece in pieces)
         if beyond <= options.limit * total:
             break
         worst = next(
@@ -160,55 +178,68 @@ def cut_by_energy(
             continue
         if worst is None or tried >= _MOST_TRIALS:
             break
-        twin = _twin(worst, pieces, anatomy)
-        best: tuple[float, _Candidate, Cloth, list[_Measured]] | None = None
+        twin, now = _twin(worst, pieces, anatomy), len(pieces)
+        good = list[tuple[float, _Candidate, Cloth, list[_Measured]]]()
+
         laid = _with_layout(cloth, worst)
-        for candidate in _candidates(cloth, worst, anatomy, may_part=parting and len(pieces) < most):
+        least = max(_WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
+        for candidate in _candidates(cloth, worst, anatomy, may_part=parting and now < most):
             if options.forbids(candidate.name):
                 continue
             tried += 1
             report_activity(f"seams: trying {candidate.name}")
-            made = _cut(laid, worst.mesh, candidate, f"trial of {candidate.name}")
+            made = _cut(laid, worst.mesh, candidate, _TRIAL)
             if made is None:
+                continue
+            if twin is None and _is_lopsided(candidate, anatomy):
+                # Both sides of a piece are cut alike.
+                target = _mesh_at(made, worst.mesh)
+                made = (None if target is None else _cut(made, target, _mirrored(candidate, anatomy), _MATE)) or made
+            # Where a twin is cut alike, it adds as many.
+            more = (int(made.parts().max()) + 1 - now) * (1 if twin is None else 2)
+            if more and now + more > most:
                 continue
             try:
                 after = _measured(made, anatomy, fabric, prepare, pieces)
             except InputError:
                 continue
-            if not _can_be_sewn(
-                made,
-                candidate,
-                worst,
-                [piece for piece in after if all(piece.result is not one.result for one in pieces)],
-            ):
+            new = [piece for piece in after if all(piece.result is not one.result for one in pieces)]
+            if sum(piece.energy for piece in after) >= energy:
+                continue
+            if not _can_be_sewn(made, candidate, worst, new, anatomy.size):
                 continue
             gain = beyond - sum(piece.outside for piece in after)
-            value = gain - _PRICE * 100.0 * _length(made, f"trial of {candidate.name}")
-            least = max(_WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
-            if gain >= least and (best is None or value > best[0]):
-                best = value, candidate, made, after
+            if gain >= least:
+                good.append((gain, candidate, made, after))
                 if gain >= _ENOUGH * worst.outside and not candidate.parts:
                     break
+        best: tuple[float, _Candidate, Cloth, list[_Measured]] | None = None
+        good.sort(key=lambda one: _value(one[0], one[2], len(one[3]) - now), reverse=True)
+        for gain, candidate, made, after in good[:_SEWN_ON_TRIAL]:
+            gain -= _strained_by_sewing(made, after)
+            value = _value(gain, made, len(after) - now)
+            if gain >= least and (best is None or value > best[0]):
+                best = value, candidate, made, after
         if best is None:
             exhausted.add(_key(worst.mesh))
             if twin is not None:
                 exhausted.add(_key(twin.mesh))
             continue
         _, candidate, made, after = best
-        lopsided = candidate.start is not None or candidate.level is not None
-        lopsided &= abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
-        both = anatomy.mirror is not None and (twin is not None or lopsided)
+        both = anatomy.mirror is not None and (twin is not None or _is_lopsided(candidate, anatomy))
         side = 0 if not both else _side_of(worst.mesh, anatomy) if twin is not None else _across(candidate, anatomy)
         names = [_free_name(cloth, candidate, side)]
         made = replace(made, values={key: value for key, value in made.values.items() if not key.startswith("flat ")})
-        cloth = _renamed(made, f"trial of {candidate.name}", names[0])
+        cloth = _renamed(made, _TRIAL, names[0])
         if both:
-            # The other side is cut alike.
             names.append(_free_name(cloth, candidate, -side))
-            target = _mesh_at(cloth, twin.mesh if twin is not None else worst.mesh)
-            other = None if target is None else _cut(cloth, target, _mirrored(candidate, anatomy), names[1])
-            names = names if other is not None else names[:1]
-            cloth = other or cloth
+            if _MATE in cloth.seams:
+                cloth = _renamed(cloth, _MATE, names[1])
+            else:
+                target = None if twin is None else _mesh_at(cloth, twin.mesh)
+                other = None if target is None else _cut(cloth, target, _mirrored(candidate, anatomy), names[1])
+                names = names if other is not None else names[:1]
+                cloth = other or cloth
         before, pieces = pieces, _measured(cloth, anatomy, fabric, prepare, [*pieces, *after])
         gain = (sum(one.outside for one in before) - sum(one.outside for one in pieces)) / total
         released = sum(one.energy for one in before) - sum(one.energy for one in pieces)
@@ -238,16 +269,23 @@ def _priced(
         mate = other_side(name)
         both = [name, mate] if mate != name and mate in cloth.seams else [name]
         alike = anatomy.mirror is not None and len(both) == 2
+        if name.startswith(SOLID):
+            # What lies between equal pieces: they stay equal, and are drawn once.
+            long = _length(cloth, name)
+            both = [
+                one for one in cloth.seams if one.startswith(SOLID) and abs(_length(cloth, one) - long) < _EQUAL * long
+            ]
+            alike = True
         trial, after = _without(cloth, both[:1], pieces, anatomy, fabric, prepare)
-        found[name] = trial
-        if alike:
-            found[mate] = replace(trial, name=mate)
-        most = _NO_ENERGY * energy + _NO_DENSITY * area
+        for one in both if alike else both[:1]:
+            found[one] = replace(trial, name=one)
+        # What closed things are made of must lie within its limit, no more.
+        most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
         kept = name.startswith(_STRUCTURAL) or any(options.keeps(one) for one in both)
         if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
             continue
-        if len(both) == 2:
-            trial, after = _without(cloth, both, pieces, anatomy, fabric, prepare)
+        # Before it is closed, it is known well: the layout of what is joined is far from rest.
+        trial, after = _without(cloth, both, pieces, anatomy, fabric, prepare, energy_left=_TRIAL_LEFT)
         now = sum(one.outside for one in after)
         if (
             trial.released is None
@@ -263,7 +301,14 @@ def _priced(
 
 
 def _without(
-    cloth: Cloth, names: Sequence[str], pieces: list[_Measured], anatomy: Anatomy, fabric: Fabric, prepare: Prepare
+    cloth: Cloth,
+    names: Sequence[str],
+    pieces: list[_Measured],
+    anatomy: Anatomy,
+    fabric: Fabric,
+    prepare: Prepare,
+    *,
+    energy_left: float = _PRICE_LEFT,
 ) -> tuple[Trial, list[_Measured]]:
     """Return what seams do, by the pieces that there were without them, and these pieces."""
     closed = cloth
@@ -274,7 +319,7 @@ def _without(
         return needed, pieces
     try:
         # What costs much need not be known well: joined pieces are large, and far from rest.
-        after = _measured(closed, anatomy, fabric, prepare, pieces, energy_left=_PRICE_LEFT)
+        after = _measured(closed, anatomy, fabric, prepare, pieces, energy_left=energy_left)
     except InputError:
         return replace(needed, needed="cannot lie flat without it"), pieces
     if sum(one.result.overlap for one in after) > sum(one.result.overlap for one in pieces) + _OVERLAP:
@@ -301,7 +346,7 @@ def _measured(
     prepare: Prepare,
     known: Sequence[_Measured],
     *,
-    energy_left: float = 0.02,
+    energy_left: float = _TRIAL_LEFT,
 ) -> list[_Measured]:
     """Return the pieces, flattened coarsely; those that are as they were are taken over, and mirror images are flattened once.
 
@@ -310,10 +355,7 @@ def _measured(
     Raises:
         InputError: a piece cannot be flattened.
     """
-    # A trial need tell good from bad, no more.
-    trial_options = replace(
-        coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=5
-    )
+    trial_options = _trial_options(energy_left)
     axes = np.stack([anatomy.normal, anatomy.up, anatomy.front], axis=1)
     found: list[_Measured] = []
     for mesh in cloth.pieces():
@@ -356,13 +398,16 @@ def _measured(
     return found
 
 
-def _can_be_sewn(cloth: Cloth, candidate: _Candidate, before: _Measured, after: Sequence[_Measured]) -> bool:
-    """Return whether a dart opens wide enough to be sewn, and nothing lies over itself that did not before."""
+def _can_be_sewn(
+    cloth: Cloth, candidate: _Candidate, before: _Measured, after: Sequence[_Measured], size: float
+) -> bool:
+    """Return whether nothing lies over itself that did not before, a dart opens wide enough and not too wide, a piece is nowhere narrow."""
     if sum(piece.result.overlap for piece in after) > before.result.overlap + _OVERLAP:
         return False
     if candidate.parts:
-        return True
-    line = np.unique(cloth.seams[f"trial of {candidate.name}"])
+        least = min(_NARROW * size, _narrowest(before, _NARROW * size))
+        return all(_narrowest(piece, _NARROW * size) >= least for piece in after)
+    line = np.unique(cloth.seams[_TRIAL])
     widest = 0.0
     for piece in after:
         own = piece.mesh.vertex_of
@@ -371,7 +416,53 @@ def _can_be_sewn(cloth: Cloth, candidate: _Candidate, before: _Measured, after: 
         if len(twice):
             gap = piece.result.positions[order[twice]] - piece.result.positions[order[twice + 1]]
             widest = max(widest, float(np.linalg.norm(gap, axis=1).max()))
-    return widest >= _MOUTH
+    return _MOUTH <= widest <= _WIDE * _length(cloth, _TRIAL)
+
+
+def _trial_options(energy_left: float) -> RelaxOptions:
+    """Return options that tell good from bad, no more."""
+    return replace(coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=5)
+
+
+def _strained_by_sewing(cloth: Cloth, pieces: Sequence[_Measured]) -> float:
+    """Return how much more of the cloth is beyond its limit where the pieces beside a line on trial are sewn along it [m2]."""
+    beside = [one for one in pieces if not one.mirrored and len(_edges_of(one, cloth.seams[_TRIAL]))]
+    flat = [
+        replace(one.result, surface=replace(one.result.surface, name=f"piece {number}"))
+        for number, one in enumerate(beside)
+    ]
+    sewn = sew_pieces(flat, options=_trial_options(_TRIAL_LEFT), eased=True).pieces.values()
+    return sum(piece.fit.outside * one.area for piece, one in zip(sewn, beside, strict=True)) - sum(
+        one.outside for one in beside
+    )
+
+
+def _edges_of(piece: _Measured, seam: Ids) -> Ids:
+    """Return those edges of a seam of the cloth (#E by 2) that are a piece's border, as its own vertices."""
+    stride = np.int64(max(seam.max(), piece.mesh.vertex_of.max()) + 1)
+    loop = border_loops(piece.surface.faces)[0].astype(np.int64)
+    edges = np.stack([loop, np.roll(loop, -1)], axis=1)
+    own = np.sort(piece.mesh.vertex_of[edges], axis=1)
+    return np.asarray(edges[np.isin(own[:, 0] * stride + own[:, 1], seam[:, 0] * stride + seam[:, 1])])
+
+
+def _narrowest(piece: _Measured, width: float) -> float:
+    """Return the least width of a pattern between stretches of its border that are long compared with a width [m]; that width at most."""
+    from matplotlib.path import Path as Outline
+
+    flat = piece.result.positions
+    loop = flat[border_loops(piece.surface.faces)[0]]
+    arc = arc_lengths(np.concatenate([loop, loop[:1]]))
+    count = int(np.clip(4.0 * arc[-1] / width, 24, 400))
+    at = np.arange(count) * arc[-1] / count
+    points = points_at_lengths(np.concatenate([loop, loop[:1]]), at)
+    apart = np.abs(at[:, None] - at)
+    around = np.minimum(apart, arc[-1] - apart)
+    distance = np.linalg.norm(points[:, None] - points, axis=2)
+    one, other = np.nonzero((around > _BESIDE_NECK * width) & (distance < width))
+    # Across an open dart or a concave corner there is no cloth.
+    inside = Outline(points).contains_points(0.5 * (points[one] + points[other]))
+    return float(distance[one, other][inside].min(initial=width))
 
 
 def _with_layout(cloth: Cloth, piece: _Measured) -> Cloth:
@@ -442,21 +533,25 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
                 point=level * anatomy.up,
                 parts=True,
             )
-        # Further lines of the families to which centre and side belong, through the place that is strained the most.
+    if may_part and misfits:
+        # Further lines of the families to which centre and side belong: through the place that is strained the most, and half way.
         place = max(misfits, key=lambda one: one.area).vertex
         at = int(piece.mesh.vertex_of[place])
         for field, name in ((LEFT, "princess"), (FACING, "panel")):
-            value = float(cloth.values[field][at]) if field in cloth.values else 0.0
-            own = cloth.values[field][piece.mesh.vertex_of] if field in cloth.values else np.zeros(1)
+            if field not in cloth.values or (sleeve and field == LEFT):
+                continue
+            own = cloth.values[field][piece.mesh.vertex_of]
             low, high = np.quantile(own, [0.15, 0.85])
-            if low < value < high and (field == FACING or not whole or abs(across[place]) > 0.04 * size):
-                yield _Candidate(
-                    name=name,
-                    normal=anatomy.normal,
-                    point=surface.vertices[place],
-                    parts=True,
-                    level=(field, value),
-                )
+            half = own[own > 0.0] if whole and field == LEFT else own
+            for value in (float(cloth.values[field][at]), float(np.median(half))):
+                if low < value < high and (field == FACING or not whole or abs(across[place]) > 0.04 * size):
+                    yield _Candidate(
+                        name=name,
+                        normal=anatomy.normal,
+                        point=surface.vertices[place],
+                        parts=True,
+                        level=(field, value),
+                    )
     loop = border_loops(surface.faces)[0]
     rim = surface.vertices[loop]
     normals = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
@@ -518,6 +613,12 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
                     end=rim[k] + reach * size * way,
                     parts=False,
                 )
+
+
+def _is_lopsided(candidate: _Candidate, anatomy: Anatomy) -> bool:
+    """Return whether a line has a mirror image that is another one."""
+    lopsided = candidate.start is not None or candidate.level is not None
+    return lopsided and anatomy.mirror is not None and abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
 
 
 def _across(candidate: _Candidate, anatomy: Anatomy) -> float:
@@ -622,6 +723,15 @@ def _mesh_at(cloth: Cloth, mesh: PieceMesh) -> PieceMesh | None:
 
 def _length(cloth: Cloth, name: str) -> float:
     return float(np.linalg.norm(np.diff(cloth.vertices[cloth.seams[name]], axis=1), axis=2).sum())
+
+
+def _value(gain: float, cloth: Cloth, more: int) -> float:
+    """Return what a line on trial is worth: what it brings [m2], less its price, for each piece more; pieces are few."""
+    return (gain - _PRICE * 100.0 * _trial_length(cloth)) / max(more, 1)
+
+
+def _trial_length(cloth: Cloth) -> float:
+    return sum(_length(cloth, name) for name in (_TRIAL, _MATE) if name in cloth.seams)
 
 
 def _renamed(cloth: Cloth, old: str, new: str) -> Cloth:

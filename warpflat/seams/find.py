@@ -37,11 +37,14 @@ __all__ = ["GRAIN", "FoundSeam", "FoundSeams", "find_seams", "seam_words"]
 
 Ids = NDArray[np.int64]
 
-# Pieces are alike if their sizes and outlines agree within this share of the outline.
-_ALIKE = 0.01
+# Pieces are alike if sizes, outlines and extents agree within this share.
+_ALIKE = 0.015
 
 # A piece whose parts in front and behind differ by less than this share is of neither.
 _AROUND = 0.35
+
+# A piece is longer than wide from this ratio of the second moments of its length and width on.
+_LONG = 2.0
 
 #: The line of a piece along which its grain runs.
 GRAIN = "grain"
@@ -380,8 +383,9 @@ def _alike(pieces: Sequence[Surface]) -> list[str]:
     notes = []
     while left:
         first, *others = left
-        size = measures[first][1]
-        same = [first, *(k for k in others if np.abs(np.subtract(measures[k], measures[first])).max() < _ALIKE * size)]
+        size, around, *extents = measures[first]
+        off = _ALIKE * np.array([size, around, *[max(extents)] * 3])
+        same = [first, *(k for k in others if (np.abs(np.subtract(measures[k], measures[first])) < off).all())]
         left = [k for k in left if k not in same]
         names = [pieces[k].name for k in same]
         if len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
@@ -431,6 +435,10 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
     sleeves = anatomy.limbs_of("sleeve")
     along = sleeves[sleeve].along if 0 <= sleeve < len(sleeves) else anatomy.up
+    if anatomy.kind not in TAILORED:
+        # A gore, a strip: nothing but its own length says how it hangs.
+        spread, axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))
+        along = axes[:, 2] if spread[2] > _LONG * spread[1] else along
     a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     facing = normals.sum(axis=0)

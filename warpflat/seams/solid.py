@@ -21,9 +21,12 @@ from warpflat.seams.fields import Operators
 from warpflat.seams.tailor import tidied
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 
-__all__ = ["is_open", "is_panel", "part_solids", "wide_borders"]
+__all__ = ["SOLID", "is_open", "is_panel", "part_solids", "wide_borders"]
 
 Ids = NDArray[np.int64]
+
+#: Seams of closed things are called by this word and a number.
+SOLID = "seam"
 
 # A part lies flat, or nearly, below this strain by estimate; a ball falls into eight gores by it.
 _FLAT = 0.022
@@ -31,6 +34,10 @@ _FLAT = 0.022
 _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain.
 _SEAM = 0.005
+# Parts that are alike are drawn once: a cut of a round part that leaves others, larger by this share, counts as this strain more.
+_ALIKE, _UNLIKE = 0.03, 0.005
+# Axes along which a part is as long as along another within this share are none of its own: those of space serve.
+_ROUND = 0.05
 # Where cloth faces an axis by more than this (cosine) it is a base.
 _BASE = 0.6
 # The border of a panel squared is at least this share of a disk's; a cap's is shorter.
@@ -43,10 +50,11 @@ _LEAST = 0.02
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Way:
-    """A way of cutting a part: a field, positive on one side."""
+    """A way of cutting a part: a field, positive on one side; `round` if the part is round about an axis, and can fall into equal ones."""
 
     field: FloatArray
     name: str
+    round: bool
 
 
 def is_open(mesh: PieceMesh) -> bool:
@@ -94,7 +102,7 @@ def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[
         if not waiting:
             break
         _, _, key, mesh = max(waiting, key=lambda one: one[:2])
-        cut = _best_cut(cloth, mesh, f"seam {number + 1}", total)
+        cut = _best_cut(cloth, mesh, f"{SOLID} {number + 1}", total)
         if cut is None:
             done.add(key)
         else:
@@ -151,7 +159,19 @@ def _ways(cloth: Cloth, mesh: PieceMesh) -> Iterator[_Way]:
     middles, areas = cloth.vertices[cloth.faces[mesh.face_of]].mean(axis=1), cloth.face_areas[mesh.face_of]
     share = areas / areas.sum()
     centre = share @ middles
-    axes = np.linalg.eigh(((middles - centre) * share[:, None]).T @ (middles - centre))[1].T
+    values, vectors = np.linalg.eigh(((middles - centre) * share[:, None]).T @ (middles - centre))
+    axes = vectors.T
+    same = values[1:] <= (1.0 + _ROUND) * values[:-1]
+    if same.all():
+        axes = np.eye(3)
+    elif same.any():
+        # Round about one of its axes: the axis of space that is the farthest from that one, and the one at right angles to both.
+        own = axes[2 if same[0] else 0]
+        other = np.eye(3)[np.abs(own).argmin()]
+        other = other - (other @ own) * own
+        other /= np.linalg.norm(other)
+        round_ones = [other, np.cross(own, other)]
+        axes = np.array([*round_ones, own] if same[0] else [own, *round_ones])
     # Axes that nearly are those of space are taken as these: a garment is drawn upright.
     axes = np.array(
         [
@@ -162,7 +182,7 @@ def _ways(cloth: Cloth, mesh: PieceMesh) -> Iterator[_Way]:
         ]
     )
     for k in (1, 2, 0):
-        yield _Way(field=(cloth.vertices - centre) @ axes[k], name="across")
+        yield _Way(field=(cloth.vertices - centre) @ axes[k], name="across", round=bool(same.any()))
     _, normals = _smoothed_normals(cloth, mesh.face_of)
     operators_faces = cloth.faces[mesh.face_of]
     for axis in axes:
@@ -171,7 +191,7 @@ def _ways(cloth: Cloth, mesh: PieceMesh) -> Iterator[_Way]:
             weight = np.zeros(len(cloth.vertices))
             np.add.at(facing, operators_faces.ravel(), np.repeat(areas * (normals @ axis) * sign, 3))
             np.add.at(weight, operators_faces.ravel(), np.repeat(areas, 3))
-            yield _Way(field=facing / np.maximum(weight, 1e-300) - _BASE, name="base")
+            yield _Way(field=facing / np.maximum(weight, 1e-300) - _BASE, name="base", round=bool(same.any()))
 
 
 def _best_cut(cloth: Cloth, mesh: PieceMesh, name: str, total: float) -> Cloth | None:
@@ -199,13 +219,15 @@ def _best_cut(cloth: Cloth, mesh: PieceMesh, name: str, total: float) -> Cloth |
         ).with_seam(name, edges)
         cost = _SEAM * _seam_length(made, edges) / np.sqrt(area)
         part = components(made.faces.astype(np.int32), barrier=made.seam_edges().astype(np.int32))
+        areas = list[float]()
         for number in np.unique(part[within]):
             faces = np.flatnonzero(part == number)
-            own_area = float(made.face_areas[faces].sum())
-            if own_area < 0.3 * _LEAST * total:
+            areas.append(float(made.face_areas[faces].sum()))
+            if areas[-1] < 0.3 * _LEAST * total:
                 cost = np.inf
                 break
-            cost += _strain(made, faces) * own_area / area + _topology(made.faces[faces])
+            cost += _strain(made, faces) * areas[-1] / area + _topology(made.faces[faces])
+        cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
         if np.isfinite(cost) and (best is None or cost < best[0]):
             best = cost, made
     return None if best is None else best[1]

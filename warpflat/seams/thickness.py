@@ -84,7 +84,8 @@ def _turned(cloth: Cloth, loop: np.ndarray, axis: np.ndarray, size: float) -> Bo
         if rim is not None:
             return rim if facing > _UPRIGHT else None
         across = abs(float(((normals[layer] @ axis) * weight).sum())) / max(float(weight.sum()), 1e-300)
-        if not turned and abs(facing) < _OUTSIDE and across > _ACROSS and weight.sum() < _RIM * size * around:
+        lies_across = _INSIDE <= facing < _OUTSIDE and across > _ACROSS
+        if not turned and lies_across and weight.sum() < _RIM * size * around:
             rim = layer.copy()
         elif facing >= _OUTSIDE or (not turned and facing >= _INSIDE):
             break
