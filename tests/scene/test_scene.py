@@ -288,7 +288,7 @@ def made_light(scene: Scene) -> Scene:
     settings = scene.settings
     if settings.mannequin is not None and settings.mannequin.size is not None:
         settings = settings.model_copy(
-            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 40.0})}
+            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 25.0})}
         )
     if settings.marker is not None:
         settings = settings.model_copy(update={"marker": settings.marker.model_copy(update={"seconds": 1})})
@@ -309,6 +309,7 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
     for name, piece in result.metrics["pieces"].items():
         assert piece["stages"][-1]["converged"], name
         assert piece["flipped_faces"] == 0, name
+    assert "not_drawn" not in result.metrics["pattern"]
     if path.stem in ("cone", "cylinder"):
         assert result.metrics["pieces"][path.stem]["length_error"] < 1e-6
     for name in result.files:

@@ -23,12 +23,13 @@ def write(path, text):
 
 
 def refusal(path, **options):
-    with pytest.raises(InputError) as error:
+    """The line that refuses a file and begins with it; "" if there is none."""
+    try:
         read_surface(path, **options)
-    message = str(error.value)
-    assert "\n" not in message
-    assert message.startswith(f"{path}: ")
-    return message
+    except InputError as error:
+        message = str(error)
+        return message if message.startswith(f"{path}: ") and "\n" not in message else ""
+    return ""
 
 
 def obj_text(vertices, faces):
@@ -185,8 +186,8 @@ def test_path_that_is_no_mesh_file(tmp_path):
 def test_noise_emptiness_and_text_are_refused_in_one_line(tmp_path, suffix, capfd):
     noise = tmp_path / f"noise{suffix}"
     noise.write_bytes(np.random.default_rng(1).integers(0, 256, 4000, dtype=np.uint8).tobytes())
-    refusal(noise, units="m")
-    refusal(write(tmp_path / f"text{suffix}", "this is not a mesh\n" * 20), units="m")
+    assert refusal(noise, units="m")
+    assert refusal(write(tmp_path / f"text{suffix}", "this is not a mesh\n" * 20), units="m")
     assert "is empty" in refusal(write(tmp_path / f"empty{suffix}", ""), units="m")
     assert "Traceback" not in capfd.readouterr().err
 

@@ -27,12 +27,13 @@ def area(surface):
 
 
 def refusal(vertices, polygons, **options):
-    with pytest.raises(InputError) as error:
+    """The line that refuses a mesh and begins with its name; "" if there is none."""
+    try:
         make_surface(vertices, polygons, name="sleeve", **options)
-    message = str(error.value)
-    assert "\n" not in message
-    assert message.startswith("sleeve: ")
-    return message
+    except InputError as error:
+        message = str(error)
+        return message if message.startswith("sleeve: ") and "\n" not in message else ""
+    return ""
 
 
 @pytest.mark.parametrize(("tolerance", "found"), [(0.38, []), (0.40, [0])])
