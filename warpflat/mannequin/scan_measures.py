@@ -42,6 +42,10 @@ _BELOW_ARMPIT = 0.006
 # The fullest upper arm is sought from so far beyond the armpit, the thigh's tape lies so far below the crotch, both as
 # shares of the stature: nearer sections hold a part of the shoulder or of the seat.
 _BEYOND_ARMPIT, _BELOW_CROTCH = 0.02, 0.03
+# Just below an armpit's fold the trunk is no broader than by this share of the stature.
+_BESIDE_FOLD = 0.005
+# The palm's tape falls to this share where the fingers part.
+_FINGERS_PART = 0.92
 # A belly of the upper arm is one if it is so full, as a share of the fullest tape.
 _BELLY = 0.98
 # Girths [m] that a tape does not tell apart, and what noise of one metre adds to that; ISO 20685 lets a height differ by so much [m].
@@ -372,7 +376,11 @@ def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
 
     The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
     """
-    arm, armpit = body.arms[side], body.armpits[side]
+    arm, armpit = body.arms[side], body.armpits[side].copy()
+    # Just below the fold the trunk's skin stands out a little farther.
+    skin = np.concatenate([p.points[:, 0] for p in body.halves[side].cut(_UP, float(armpit[1]) - 0.001)])
+    skin = np.abs(skin)[np.abs(skin) < np.abs(armpit[0]) + _BESIDE_FOLD * body.stature]
+    armpit[0] = np.sign(armpit[0]) * max(float(skin.max(initial=0.0)), abs(float(armpit[0])))
     rows = (arm.s > 0.35 * arm.elbow) & (arm.s < arm.elbow - 0.02 * body.stature)
     way = arm.way[rows].mean(axis=0)
     way /= np.linalg.norm(way)
@@ -398,24 +406,34 @@ def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
 
 def _hand(scan: Slicer, body: BodySections, laid: StandingBody, side: str) -> ScanMeasure | None:
     """Return the tape around the palm halfway from where the thumb parts from it to where the fingers part; None without a hand."""
-    near = near_place(ARM_PLACES["hand"], side)
-    if not laid.shows(near[0]):
+    places, arm = model_places(), body.arms[side]
+    if not laid.shows(near_place(ARM_PLACES["hand"], side)[0]):
         return None
-    at, wrist = value_at(near, body.vertices), body.arms[side].frame(body.arms[side].wrist)[0]
-    along = np.where(model_places().strips[f"arm {side}"], model_places().along, 0.0)
-    axis = body.vertices[np.argmax(along)] - wrist
-    axis /= np.linalg.norm(axis)
-    reach = 0.06 * body.stature
-    parts = [
-        p
-        for p in scan.cut(axis, float(at @ axis))
-        if np.linalg.norm(p.points.mean(axis=0) - at) < reach and len(p.points) > 5
-    ]
-    if not parts:
+    wrist = arm.frame(arm.wrist)[0]
+    own = scan.vertices[np.unique(scan.triangles[(laid.shown >= 0) & places.arms[side][laid.shown]])]
+    beyond = own[(own - wrist) @ arm.way[-1] > 0.0]
+    if not len(beyond):
         return None
-    largest = max(parts, key=lambda p: tape_around(p.points, axis)[1])
-    height, girth = tape_around(largest.points, axis)
-    return ScanMeasure(height=height, girth=girth, guess=_HOLED if largest.is_holed else None)
+    reach = np.linalg.norm(beyond - wrist, axis=1)
+    axis = (beyond[np.argmax(reach)] - wrist) / reach.max()
+    tapes: list[tuple[int, tuple[float, float], bool]] = []
+    for at in wrist + np.arange(0.30, 0.64, 0.01)[:, None] * reach.max() * axis:
+        parts = [p for p in scan.cut(axis, float(at @ axis))
+                 if np.linalg.norm(p.points.mean(axis=0) - at) < 0.6 * reach.max() and len(p.points) > 5]  # fmt: skip
+        if parts:
+            largest = max(((tape_around(p.points, axis), p.is_holed) for p in parts), key=lambda each: each[0][1])
+            tapes.append((len(parts), *largest))
+    if not tapes:
+        return None
+    girths = np.array([tape[1] for _, tape, _ in tapes])
+    thumb = next((i for i, (count, *_) in enumerate(tapes) if count > 1), None)
+    first = thumb or 0
+    # Where the fingers part, the girth of the largest part falls.
+    falls = first + np.flatnonzero(girths[first + 1 :] < _FINGERS_PART * girths[first:-1])
+    _, (height, girth), _ = tapes[(first + int(falls[0] if len(falls) else len(tapes) - 1)) // 2]
+    holed = any(holed for *_, holed in tapes)
+    guess = _HOLED if holed else "no thumb stands off the palm" if thumb is None else None
+    return ScanMeasure(height=height, girth=girth, guess=guess)
 
 
 def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
