@@ -18,7 +18,7 @@ from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.stand_body import StandingBody
 from warpflat.mannequin.summit import summit
 
-__all__ = ["Level", "ScanMeasure", "body_measures", "find_levels", "guess_note", "missing_note"]
+__all__ = ["ScanLevel", "ScanMeasure", "body_measures", "find_levels", "guess_note", "missing_note"]
 
 _UP = np.array([0.0, 1.0, 0.0])
 _TRUNK = ("bust", "underbust", "waist", "hip")
@@ -76,14 +76,16 @@ class ScanMeasure:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Level:
+class ScanLevel:
     """A height above the floor [m], and why it is a guess; None where the shape shows it."""
 
     height: float
     guess: str | None = None
 
 
-def find_levels(body: BodySections, laid: StandingBody, noise: float, given: Mapping[str, float]) -> dict[str, Level]:
+def find_levels(
+    body: BodySections, laid: StandingBody, noise: float, given: Mapping[str, float]
+) -> dict[str, ScanLevel]:
     """Return the levels of trunk and legs, from low to high the closed ones, and of ``armpit``, ``front_neck``, ``side_neck``.
 
     Waist: narrowest near its landmark. Bust: fullest between the underbust and the armpits. Hip: where the seat stands out most near its
@@ -99,22 +101,22 @@ def find_levels(body: BodySections, laid: StandingBody, noise: float, given: Map
         InputError: if the levels do not come in a body's order.
     """
     t, size = body.trunk, body.stature
-    found: dict[str, Level] = {}
+    found: dict[str, ScanLevel] = {}
 
     def landmark(name: str, side: str = "left") -> float:
         return float(value_at(near_level(name, side), body.vertices[:, 1]))
 
-    def least(name: str, y: FloatArray, values: FloatArray, around: float, lacking: str) -> Level:
+    def least(name: str, y: FloatArray, values: FloatArray, around: float, lacking: str) -> ScanLevel:
         rows = np.flatnonzero(np.abs(y - around) < _REACH[name] * size)
         row = int(rows[np.argmin(values[rows])]) if len(rows) else 0
         if len(rows) < 3 or not rows[0] < row < rows[-1]:
-            return Level(height=around, guess=f"{lacking}; it is where the body model has it")
+            return ScanLevel(height=around, guess=f"{lacking}; it is where the body model has it")
         alike = y[_stretch(values < values[row] + _NOISE * noise, row)]
         moved = noise > 0.0 and float(np.abs(alike - y[row]).max()) > _ISO_HEIGHT
-        return Level(height=summit(y, values, row), guess=_noisy(noise) if moved else None)
+        return ScanLevel(height=summit(y, values, row), guess=_noisy(noise) if moved else None)
 
-    found["armpit"] = Level(height=min(float(place[1]) for place in body.armpits.values()))
-    armpit = found["armpit"].height
+    found["armpit"] = ScanLevel(height=min(float(place[1]) for place in body.armpits.values()))
+    armpit = given.get("armpit", found["armpit"].height)
     found["waist"] = least("waist", t.y, smooth(t.girth, 1.5), landmark("waist"), "the trunk has no narrowest section")
     found["hip"] = least("hip", t.y, t.back, landmark("hip"), "the seat does not stand out")
     # Under a full bust the outline over the bust points bends forward in a fold, lower than on the mean body.
@@ -129,26 +131,26 @@ def find_levels(body: BodySections, laid: StandingBody, noise: float, given: Map
         at = float(t.y[below[np.argmax(leap)]])
     elif below[0] < fold < below[-1] and bend[fold] > _FOLD and at - t.y[fold] > _FOLD_OFF * size:
         at = summit(t.y, bend, fold)
-    found["underbust"] = Level(height=at, guess=_noisy(noise) if noise > _NOISE_SURE else None)
-    low, high = found["underbust"].height + 0.01 * size, armpit - _BELOW_ARMPIT * size
+    found["underbust"] = ScanLevel(height=at, guess=_noisy(noise) if noise > _NOISE_SURE else None)
+    low, high = given.get("underbust", at) + 0.01 * size, armpit - _BELOW_ARMPIT * size
     rows = np.flatnonzero((t.y > low) & (t.y < high))
     row = int(rows[np.argmax(t.girth[rows])]) if len(rows) else 0
     above = (t.y > t.y[row]) & (t.y <= armpit - 0.003 * size)
     if not len(rows) or row == rows[-1]:
-        found["bust"] = Level(height=high, guess=f"the chest grows fuller up to the armpits at {armpit:.3f} m")
+        found["bust"] = ScanLevel(height=high, guess=f"the chest grows fuller up to the armpits at {armpit:.3f} m")
     elif row == rows[0]:
-        found["bust"] = Level(
+        found["bust"] = ScanLevel(
             height=landmark("bust"), guess="the chest is nowhere fullest; it is where the body model has it"
         )
     elif t.girth[above].max(initial=0.0) > t.girth[row]:
         why = f"the chest is as full again at the armpits at {armpit:.3f} m"
-        found["bust"] = Level(height=summit(t.y, t.girth, row), guess=why)
+        found["bust"] = ScanLevel(height=summit(t.y, t.girth, row), guess=why)
     else:
-        found["bust"] = Level(height=summit(t.y, t.girth, row))
+        found["bust"] = ScanLevel(height=summit(t.y, t.girth, row))
     waist, hip = (given.get(name, found[name].height) for name in ("waist", "hip"))
     between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
     belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
-    found["abdomen"] = Level(height=belly)
+    found["abdomen"] = ScanLevel(height=belly)
     # The outline turns from the shoulder into the neck where it is furthest inside the line between the two.
     low, at = landmark("front_neck"), landmark("side_neck")
     upper = np.flatnonzero((t.y > 0.80 * size) & (t.y < 0.91 * size))
@@ -159,8 +161,8 @@ def find_levels(body: BodySections, laid: StandingBody, noise: float, given: Map
     inside = np.interp(y, [y[0], y[-1]], [half[0], half[-1]]) - half
     row = int(np.argmax(np.where(np.abs(y - at) < _NECK * size, inside, -np.inf)))
     beside = summit(y, inside, row) if 0 < row < len(y) - 1 else at
-    found["front_neck"] = Level(height=low)
-    found["side_neck"] = Level(height=float(np.clip(beside, low + 0.008 * size, low + 0.035 * size)))
+    found["front_neck"] = ScanLevel(height=low)
+    found["side_neck"] = ScanLevel(height=float(np.clip(beside, low + 0.008 * size, low + 0.035 * size)))
     for name, fullest in (("knee", None), ("calf", True), ("ankle", False)):
         sides = []
         for side in ("left", "right"):
@@ -173,7 +175,7 @@ def find_levels(body: BodySections, laid: StandingBody, noise: float, given: Map
                 crease = float(y[np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf))])
                 moved = abs(crease - at) > _KNEE_SURE * size
                 sides.append(
-                    Level(
+                    ScanLevel(
                         height=at,
                         guess="the crease behind it lies elsewhere"
                         if moved
@@ -188,13 +190,15 @@ def find_levels(body: BodySections, laid: StandingBody, noise: float, given: Map
                 values = -girth if fullest else girth
                 sides.append(least(name, body.legs.y, values, landmark(name, side), "the legs do not show it"))
         guess = next((each.guess for each in sides if each.guess), None)
-        found[f"leg_{name}"] = Level(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
+        found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
         if name != "calf":
             found[name] = found[f"leg_{name}"]
-    found["leg_thigh"] = Level(height=body.crotch - _BELOW_CROTCH * size)
-    found["thigh"] = Level(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))
+    found["leg_thigh"] = ScanLevel(height=body.crotch - _BELOW_CROTCH * size)
+    found["thigh"] = ScanLevel(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))
     for name, height in given.items():
-        found[name] = Level(height=height)
+        found[name] = ScanLevel(height=height)
+        if name in ("knee", "ankle"):
+            found[f"leg_{name}"] = found[name]
     order = [
         "ankle",
         "knee",
@@ -217,7 +221,9 @@ def find_levels(body: BodySections, laid: StandingBody, noise: float, given: Map
     # A level is no surer than the body is there.
     for name in _TRUNK:
         if found[name].guess is None and name not in given:
-            found[name] = Level(height=found[name].height, guess=laid.unsure_near(near_level(name)[0], _FAR, _SHOWN))
+            found[name] = ScanLevel(
+                height=found[name].height, guess=laid.unsure_near(near_level(name)[0], _FAR, _SHOWN)
+            )
     return found
 
 
@@ -233,7 +239,7 @@ def _stretch(rows: np.ndarray, row: int) -> slice:
 
 
 def body_measures(
-    scan: Slicer, body: BodySections, laid: StandingBody, levels: Mapping[str, Level], neck: float
+    scan: Slicer, body: BodySections, laid: StandingBody, levels: Mapping[str, ScanLevel], neck: float
 ) -> dict[str, ScanMeasure]:
     """Return the tapes that the scan has room for, by name, from the head down.
 
@@ -321,7 +327,7 @@ def _is_possible(name: str, girth: float, stature: float) -> bool:
     return low * stature <= girth <= high * stature
 
 
-def guess_note(measures: Mapping[str, ScanMeasure], levels: Mapping[str, Level]) -> list[str]:
+def guess_note(measures: Mapping[str, ScanMeasure], levels: Mapping[str, ScanLevel]) -> list[str]:
     """Return one note for each level of the trunk that is a guess, and one that names all other tapes that are; none without any."""
     notes = [
         f"{n} = {levels[n].height:.3f} m is a guess: {levels[n].guess}" for n in reversed(_TRUNK) if levels[n].guess

@@ -58,7 +58,6 @@ class TrunkSections:
         length: #S, length of the section itself [m], hollows followed; of both legs below the crotch.
         left, right: #S, extent towards +x and -x [m].
         front, back: #S, extent forward and backward [m].
-        front_centre, back_centre: #S, z of the surface near the midplane [m].
         apex: #S, distance of the foremost points from the midplane [m].
         outlines: #S by 6, z of the front at six distances OUTLINES of the stature from the midplane, the mean of left and right [m].
         hulls: for each section its hull, counter-clockwise seen from below, #P by 2 (x, z) [m].
@@ -72,8 +71,6 @@ class TrunkSections:
     right: FloatArray
     front: FloatArray
     back: FloatArray
-    front_centre: FloatArray
-    back_centre: FloatArray
     apex: FloatArray
     outlines: FloatArray
     hulls: tuple[FloatArray, ...]
@@ -193,12 +190,14 @@ class BodySections:
         rows: list[list[float]] = []
         hulls: list[FloatArray] = []
         holed: list[bool] = []
+        leg_heights: list[float] = []
         of_legs: dict[str, list[FloatArray]] = {"left": [], "right": []}
         girths: dict[str, list[float]] = {"left": [], "right": []}
         for y in heights:
             of_sides = {side: half.cut(_UP, float(y)) for side, half in self.halves.items()}
             parts = [part for of_side in of_sides.values() for part in of_side]
             if y <= self.crotch and all(of_sides.values()):
+                leg_heights.append(float(y))
                 for side, of_side in of_sides.items():
                     flat = np.concatenate([p.points for p in of_side])[:, [0, 2]]
                     hull = ConvexHull(flat)
@@ -208,15 +207,12 @@ class BodySections:
                 raise InputError(f"scan: nothing of the body at {y:.2f} m above the floor; its mesh is broken there")
             flat = np.concatenate([p.points for p in parts])[:, [0, 2]]
             hull = ConvexHull(flat)
-            centre = np.abs(flat[:, 0]) < 0.02 * stature
             z_front, z_back = float(flat[:, 1].max()), float(flat[:, 1].min())
             ahead = flat[flat[:, 1] > 0.5 * (z_front + z_back)]
             ahead = ahead[np.argsort(ahead[:, 0])]
             outline = 0.5 * sum(np.interp(side * OUTLINES * stature, ahead[:, 0], ahead[:, 1]) for side in (1.0, -1.0))
             rows.append([
                 hull.area, sum(p.length for p in parts), flat[:, 0].max(), -flat[:, 0].min(), z_front, z_back,
-                float(flat[centre, 1].max()) if centre.any() else z_front,
-                float(flat[centre, 1].min()) if centre.any() else z_back,
                 float(np.abs(flat[flat[:, 1] > z_front - 0.004 * stature][:, 0]).mean()), *outline,
             ])  # fmt: skip
             hulls.append(flat[hull.vertices])
@@ -224,11 +220,10 @@ class BodySections:
         table = np.array(rows).T
         trunk = TrunkSections(
             y=heights, girth=table[0], length=table[1], left=table[2], right=table[3], front=table[4], back=table[5],
-            front_centre=table[6], back_centre=table[7], apex=table[8], outlines=table[9:].T, hulls=tuple(hulls), holed=np.array(holed),
+            apex=table[6], outlines=table[7:].T, hulls=tuple(hulls), holed=np.array(holed),
         )  # fmt: skip
-        y = heights[: len(of_legs["left"])]
         legs = LegSections(
-            y=y, hulls={side: tuple(each) for side, each in of_legs.items()},
+            y=np.array(leg_heights), hulls={side: tuple(each) for side, each in of_legs.items()},
             girths={side: np.array(each) for side, each in girths.items()},
         )  # fmt: skip
         return trunk, legs
