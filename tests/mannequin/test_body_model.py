@@ -12,10 +12,10 @@ from body_tapes import armpit_and_crotch
 from scans import needs_bodies, posed_body, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.body_model import BodyModel, Person, rotation
+from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.mannequin.fit_body import Mesh
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.stand_body import finer_body, stand_body
+from warpflat.mannequin.stand_body import stand_body
 
 
 def _person(random: np.random.Generator, spread: float, bend: float) -> Person:
@@ -87,7 +87,7 @@ def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     person = replace(person, bend=person.bend @ rotation(bend))
     wanted = model.vertices(person)
     wanted -= [0.0, wanted[:, 1].min(), 0.0]
-    stood = stand_body(wanted, model.triangles)
+    stood = stand_body(wanted, model.triangles, len(model.triangles))
     fit, plain = stood.fit, ~model.detail
     found = np.isfinite(fit.distance)
     assert found[plain].mean() > 0.98
@@ -102,7 +102,7 @@ def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     ("name", "wanted"),
     [
         ("gc_mean_female", {"bust": 0.974, "underbust": 0.807, "waist": 0.803}),
-        ("hanging_bust", {"underbust": 0.650, "hip": 1.002}),
+        ("hanging_bust", {"underbust": 0.650, "hip": 1.011}),
     ],
 )
 def test_bodies_whose_shape_does_not_show_the_levels_are_read_from_the_model(
@@ -111,7 +111,6 @@ def test_bodies_whose_shape_does_not_show_the_levels_are_read_from_the_model(
     body = scanned_body(name)
     for tape, girth in wanted.items():
         assert body.measures[tape].girth == pytest.approx(girth, abs=0.009), tape
-    assert sum("a body model laid on the scan" in note for note in body.notes) == 1
 
 
 def _without(which: Callable[[np.ndarray], np.ndarray], points: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -119,7 +118,9 @@ def _without(which: Callable[[np.ndarray], np.ndarray], points: np.ndarray, face
 
 
 @needs_bodies
-@pytest.mark.parametrize("case", ["arms as separate meshes", "no forearms", "legs apart", "floor", "T-pose"])
+@pytest.mark.parametrize(
+    "case", ["arms as separate meshes", "no forearms", "legs apart", "legs crossed", "floor", "T-pose"]
+)
 def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
     points, faces = scan("female")
     armpit, _, half = armpit_and_crotch(trimesh.Trimesh(points, triangles_of(faces), process=False))
@@ -135,11 +136,10 @@ def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
     elif case == "no forearms":
         reach = np.abs(points[:, 0]).max()
         faces = _without(lambda at: np.abs(at[:, 0]) > reach - 0.17, points, faces)
-    elif case == "legs apart":
-        # As far apart as the rules, which look for legs near the midplane, no longer find them.
+    elif case in ("legs apart", "legs crossed"):
         joint = np.array([0.0, 0.53 * points[:, 1].max(), 0.0])
         for sign in (1.0, -1.0):
-            c, s = np.cos(np.radians(12.0)), np.sin(np.radians(12.0))
+            c, s = np.cos(np.radians(12.0)), (-1.0 if case == "legs apart" else 1.0) * np.sin(np.radians(12.0))
             turn = np.array([[c, sign * s, 0.0], [-sign * s, c, 0.0], [0.0, 0.0, 1.0]])
             low = np.clip((joint[1] + 0.03 - points[:, 1]) / 0.12, 0.0, 1.0) * (sign * points[:, 0] > 0.0)
             low = low * (np.abs(points[:, 0]) < 0.26)
@@ -154,9 +154,8 @@ def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
         body = posed_body("female", "arms up")
     else:
         body = Mannequin.from_scan(points, faces, resolution_mm=20.0)
-    assert any("a body model laid on the scan" in note for note in body.notes)
     wanted = {"bust": 0.845, "underbust": 0.702, "waist": 0.652, "hip": 0.904}
-    if case == "legs apart":
+    if case.startswith("legs"):
         del wanted["hip"]
     for tape, girth in wanted.items():
         assert body.measures[tape].girth == pytest.approx(girth, abs=0.012), tape
@@ -176,5 +175,5 @@ def test_sleeves_of_a_t_pose_hang_from_the_shoulders() -> None:
 def test_one_arm_is_refused_in_one_line() -> None:
     points, faces = scan("female")
     faces = _without(lambda at: (at[:, 0] > 0.2) & (at[:, 1] > 0.5 * points[:, 1].max()), points, faces)
-    with pytest.raises(InputError, match="a body model does not fit, either: the scan does not show two upper arms"):
+    with pytest.raises(InputError, match="scan: the scan does not show two upper arms"):
         Mannequin.from_scan(points, faces, resolution_mm=20.0)

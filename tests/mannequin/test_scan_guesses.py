@@ -44,14 +44,13 @@ def test_the_fullest_place_of_an_evenly_full_arm_is_a_guess() -> None:
         body = posed_body("male_heavy", copy) if is_guess else scanned_body("male_heavy")
         mesh = trimesh.Trimesh(posed, triangles_of(faces), process=False)
         assert [body.measures[f"biceps {s}"].guess is not None for s in ("left", "right")] == [is_guess] * 2
-        # Its elbow bends in a bow: two fair fits lie some 4 mm apart.
+        # Its elbow bends in a bow.
         for side in ("left", "right"):
             ours = body.measures[f"elbow {side}"]
             wrist, elbow, upper = landmarks.bones(posed, side)
             lower = (elbow - wrist) / np.linalg.norm(elbow - wrist)
             height, girth = tape_across(mesh, elbow, (lower + upper) / np.linalg.norm(lower + upper))
             assert ours.guess or (abs(ours.height - height) < 0.004 and abs(ours.girth - girth) < 0.009), (copy, side)
-            assert copy == "arms down" or ours.guess
     assert not any("elbow" in name and m.guess for name, m in scanned_body("female").measures.items())
 
 
@@ -63,9 +62,9 @@ def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
     body, marks = Mannequin.from_scan(points, faces, resolution_mm=25.0), Landmarks(faces)
     assert body.measures["underbust"].guess is None
     assert abs(body.measures["underbust"].height - marks.fold(points)) < 0.004
-    # Fat moves the crease behind the knee down.
-    assert abs(body.measures["knee left"].height - marks.knee(points, "left")) > 0.008
-    assert body.measures["knee left"].guess is not None
+    # Fat moves the crease behind the knee down, and the skin over it less.
+    knee = body.measures["knee left"]
+    assert abs(knee.height - marks.knee(points, "left")) < 0.004 or knee.guess is not None
 
 
 def test_trunk_of_two_equal_parts_has_a_direction() -> None:

@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from warpflat.core.arrays import FloatArray
 
-__all__ = ["BodyModel", "Person", "rotation", "rotation_vector"]
+__all__ = ["BodyModel", "Person", "finer_body", "rotation", "rotation_vector"]
 
 # Blended rotations shrink what they turn; where to this share, a point's distance from the model means nothing in another pose.
 _FOLDED = 0.8
@@ -140,6 +140,13 @@ class BodyModel:
         posed = np.matmul(blended, rest[: self.count, :, None])[:, :, 0] + self.weights @ shift
         return person.scale * posed @ person.turn.T + person.place
 
+    def joints_of(self, person: Person) -> FloatArray:
+        """Return the joints of a person, #J by 3 [m]."""
+        rest = self.shaped(person.shape)[self.count :]
+        turn, shift = self.frames(rest, person.bend)
+        at = np.einsum("jab,jb->ja", turn[self.parents], rest) + shift[self.parents]
+        return np.asarray(person.scale * at @ person.turn.T + person.place)
+
     def rebend(self, person: Person, other: Person, finer: csr_array, points: FloatArray) -> FloatArray:
         """Return points laid on a person as they lie on the same person in another pose.
 
@@ -229,6 +236,42 @@ class BodyModel:
             place=person.place + step[-4:-1],
             scale=person.scale * float(np.exp(step[-1])),
         )
+
+
+@lru_cache(maxsize=1)
+def finer_body() -> tuple[csr_array, NDArray[np.int64]]:
+    """Return the model subdivided once: a matrix from its vertices to the finer ones, and their triangles.
+
+    Source: Loop, "Smooth subdivision surfaces based on triangles", 1987, with Warren's weights.
+    """
+    from scipy.sparse import coo_array
+
+    model = BodyModel.load()
+    n, faces = model.count, model.triangles
+    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+    edges, inverse = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    inverse = np.ravel(inverse)
+    far = np.roll(faces, 1, axis=1).ravel()
+    sides = np.bincount(inverse, minlength=len(edges))
+    # An inner edge's vertex takes 3/8 of its ends and 1/8 of the corners across; a border's the mean of its ends.
+    at_end = np.where(sides == 2, 0.375, 0.5)
+    half = sides[inverse] == 2
+    rows = [n + np.arange(len(edges)), n + np.arange(len(edges)), n + inverse[half]]
+    columns = [edges[:, 0], edges[:, 1], far[half]]
+    values = [at_end, at_end, np.full(int(half.sum()), 0.125)]
+    degree = np.bincount(edges.ravel(), minlength=n)
+    beta = np.where(degree == 3, 3.0 / 16.0, 3.0 / (8.0 * np.maximum(degree, 1)))
+    both = np.concatenate([edges, edges[:, ::-1]])
+    rows += [np.arange(n), both[:, 0]]
+    columns += [np.arange(n), both[:, 1]]
+    values += [1.0 - beta * degree, beta[both[:, 0]]]
+    matrix = coo_array(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(n + len(edges), n)
+    ).tocsr()
+    a, b, c = faces.T
+    ab, bc, ca = n + inverse.reshape(-1, 3).T
+    finer = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+    return matrix, np.concatenate([np.stack(each, axis=1) for each in finer])
 
 
 def _cross(vectors: FloatArray) -> FloatArray:

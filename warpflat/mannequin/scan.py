@@ -12,18 +12,18 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
+from warpflat.mannequin.body_model import finer_body
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.rays import ray_radii
-from warpflat.mannequin.scan_checks import check_girths
-from warpflat.mannequin.scan_legs import LegSections, leg_curves, plumb_legs, slice_legs
-from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
-from warpflat.mannequin.scan_limbs import UpperSections, slice_neck_and_arms, underarm_point, upper_curves
-from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, leg_levels, missing_note
+from warpflat.mannequin.scan_legs import leg_curves
+from warpflat.mannequin.scan_limbs import underarm_point, upper_curves
+from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, find_levels, guess_note, missing_note
 from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
-from warpflat.mannequin.scan_spread import guess_by_noise
+from warpflat.mannequin.scan_sections import BodySections
 from warpflat.mannequin.slicer import Slicer
-from warpflat.mannequin.stand_body import stand_body
+from warpflat.mannequin.stand_body import StandingBody, stand_body
 from warpflat.mannequin.table_body import PRINCESS
 
 __all__ = ["ScanFound", "blueprint_from_scan"]
@@ -33,12 +33,6 @@ _UP_SIGMA = 1.5
 _HARMONICS = 28
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
-# Arms raised from plumb by more than this [radians] are lowered.
-_RAISED = np.radians(70.0)
-# Armpits lie higher than this share of the stature.
-_ARMPIT = 0.73
-# Girths of the scan and of the model laid on it are alike within this share.
-_ALIKE = 0.10
 # How far a side seam follows the waves of front and back at the waist.
 _OFF_PLUMB = 0.5
 
@@ -65,7 +59,7 @@ class ScanFound:
 
 
 def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
-    """Slice a body scan into the curves that the grid is laid on.
+    """Fit the body model to a scan, lay it on the scan, and slice it into the curves that the grid is laid on.
 
     Args:
         vertices: #V by 3, any unit.
@@ -73,132 +67,85 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         options: what the user knows about the scan.
 
     Raises:
-        InputError: if the mesh is not a body that stands on two legs with its arms off the trunk, or has a measure that no body has.
+        InputError: if the mesh is not a body that stands on two legs, or has a measure that no body has.
     """
     from scipy.spatial import QhullError
 
-    slicer, notes = turn_scan_upright(vertices, faces, options)
-    refusal: InputError | None = None
-    body: _SlicedBody | None = None
+    scan, notes = turn_scan_upright(vertices, faces, options)
+    laid = stand_body(scan.vertices, scan.triangles, scan.scanned, faces_ahead=options.facing is not None)
+    if laid.unsure is not None:
+        raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
+    if laid.turned:
+        scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise, scan.scanned)
+        notes.append("the scan was found to face the other way by the body model")
     try:
-        body = _slice_body(slicer, options)
-    except InputError as error:
-        refusal = error
+        crotch = _crotch_height(scan, laid) - float(laid.posed[laid.crotch, 1])
+        moved = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned) if laid.moved else scan
+        stands = BodySections(laid.vertices, laid, moved, crotch)
+        body = BodySections(laid.posed, laid, scan, crotch) if laid.moved else stands
+        found = find_levels(body, laid, scan.noise, options.landmarks)
+        levels = {name: level.height for name, level in found.items()}
+        if laid.undone:
+            given = {name: laid.carried(height) for name, height in options.landmarks.items()}
+            levels = {name: level.height for name, level in find_levels(stands, laid, scan.noise, given).items()}
+        underarms = {side: underarm_point(stands, side, levels["underbust"]) for side in ("left", "right")}
+        profile = _profiles(stands, levels, underarms)
+        quarters, arms, collar, neck = upper_curves(stands, levels, profile, underarms)
+        blueprint = Blueprint(
+            profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
+            legs=leg_curves(stands, levels, profile(levels["hip"])), neck=neck, collar=collar,
+            attract=_attractor(stands, levels),
+        )  # fmt: skip
+        measures = body_measures(scan, body, laid, found, neck)
+    except InputError:
+        raise
     except (ValueError, IndexError, QhullError) as error:
         # Sections of a torn or twisted mesh may hold too few points for any step of the way.
-        refusal = InputError(f"scan: its plane sections are too broken to be measured ({error}); repair the mesh")
-    # What the shape alone does not show, or shows in a pose in which no tape is laid, the model fitted to the scan tells.
-    if body is None or _guesses(body) or max(_raised(body)) > _RAISED or _low(body):
-        stood = stand_body(slicer.vertices, slicer.triangles, slicer.scanned, faces_ahead=options.facing is not None)
-        fitted, unsure = None, stood.unsure
-        if unsure is None:
-            try:
-                fitted = _slice_body(stood.slicer(), options, fitted=True)
-            except (InputError, ValueError, IndexError, QhullError) as error:
-                unsure = f"laid on the scan it has no tapes: {str(error).removeprefix('scan: ')}"
-        if body is None and fitted is None:
-            raise InputError(f"{refusal}; a body model does not fit, either: {unsure}")
-        if fitted is not None and (
-            body is None or len(_guesses(fitted)) < len(_guesses(body)) or max(_raised(body)) > _RAISED or _low(body)
-        ):
-            why = (
-                str(refusal).removeprefix("scan: ").split(";")[0]
-                if body is None
-                else f"its arms are raised by {np.degrees(max(_raised(body))):.0f} degrees"
-                if max(_raised(body)) > _RAISED
-                else f"its shape leaves {' and '.join(_guesses(body))} a guess"
-                if _guesses(body)
-                else "a web joins its arms to the trunk"
-            )
-            notes.append(
-                f"the mannequin is that of a body model laid on the scan, standing ({why}); before, it lay "
-                f"{1000.0 * float(np.mean(stood.fit.distance[np.isfinite(stood.fit.distance)])):.1f} mm off the scan in the mean"
-            )
-            # A tape of the scan itself stays where the two agree.
-            tapes = dict(fitted.measures)
-            if body is not None:
-                of_scan = guess_by_noise(slicer, body.measures, lambda copy: _slice_body(copy, options).measures)
-                tapes |= {
-                    name: tape
-                    for name, tape in of_scan.items()
-                    if tape.guess is None and (name not in tapes or abs(tape.girth / tapes[name].girth - 1.0) < _ALIKE)
-                }
-            body, slicer = replace(fitted, measures=tapes), stood.slicer()
-    assert body is not None
-    trunk, legs, levels = body.trunk, body.legs, body.levels
-    plumb, apart = plumb_legs(trunk, legs)
-    profile = _profiles(plumb, levels, body.underarms)
-    quarters, arms = upper_curves(slicer, levels, profile, body.upper)
-    blueprint = Blueprint(
-        profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
-        legs=leg_curves(slicer, legs, levels, profile(levels["hip"])), neck=body.upper.neck, collar=body.upper.collar,
-        attract=_attractor(slicer, levels, trunk.armpits),
-    )  # fmt: skip
-    measures = guess_by_noise(slicer, body.measures, lambda copy: _slice_body(copy, options).measures)
-    sections = {level: float(np.interp(levels[level], trunk.y, trunk.length)) for level in RING_LEVELS}
+        raise InputError(f"scan: its plane sections are too broken to be measured ({error}); repair the mesh") from None
+    t = stands.trunk
+    if laid.undone:
+        # Raised arms lift the chest, and a bent trunk has folds.
+        for name in ("bust", "underbust", "waist", "hip"):
+            girth = float(np.interp(levels[name], t.y, t.girth))
+            measures[name] = ScanMeasure(height=found[name].height, girth=girth, guess=measures[name].guess)
+    if laid.together is not None:
+        more = [_around(vertices, levels["hip"]) for vertices in (laid.together, laid.vertices)]
+        hip = measures["hip"]
+        measures["hip, legs together"] = replace(hip, girth=hip.girth + more[0] - more[1])
+    told = [f"{name} was given: {height:.3f} m" for name, height in options.landmarks.items()]
     return ScanFound(
         blueprint=blueprint,
-        source=f"scan of a body {trunk.stature:.3f} m tall",
-        notes=(*notes, *body.notes, *apart, *guess_note(measures, body.notes), *missing_note(measures)),
-        sections=sections,
+        source=f"scan of a body {body.stature:.3f} m tall; the body model lies {1000.0 * laid.far:.1f} mm off it in the mean",
+        notes=(*notes, *laid.notes, *told, *guess_note(measures, found), *missing_note(measures)),
+        sections={level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
         measures=measures,
-        scan=(legs.move(slicer.vertices) if apart else slicer.vertices, slicer.triangles),
+        scan=(moved.vertices, scan.triangles),
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _SlicedBody:
-    """An upright scan's sections and levels, the tapes around it, and what was guessed."""
-
-    trunk: TrunkSections
-    legs: LegSections
-    upper: UpperSections
-    levels: Mapping[str, float]
-    underarms: Mapping[str, FloatArray]
-    measures: Mapping[str, ScanMeasure]
-    notes: tuple[str, ...]
+def _around(vertices: FloatArray, height: float) -> float:
+    """Return the girth [m] of the finer body model's trunk at a height [m]."""
+    parts = [p.points for p in Slicer(vertices, finer_body()[1]).cut(np.array([0.0, 1.0, 0.0]), height)]
+    return convex_girth(max((p[:, [0, 2]] for p in parts), key=lambda p: float(np.ptp(p[:, 0]))))
 
 
-def _guesses(body: _SlicedBody) -> list[str]:
-    """Return the levels of the trunk, but the bust, whose places the shape does not show."""
-    return [name for name in ("underbust", "waist", "hip") if body.measures[name].guess is not None]
-
-
-def _raised(body: _SlicedBody) -> list[float]:
-    """Return how far each upper arm is raised from plumb [radians]."""
-    found = []
-    for arm in body.upper.arms.values():
-        upper = arm.way[(arm.shares > 0.2) & (arm.shares < arm.elbow)].mean(axis=0)
-        found.append(float(np.arccos(np.clip(-upper[1] / np.linalg.norm(upper), -1.0, 1.0))))
-    return found
-
-
-def _low(body: _SlicedBody) -> bool:
-    """Return whether arms and trunk part so far down that a web or cloth must join them."""
-    return body.levels["armpit"] < _ARMPIT * body.trunk.stature
-
-
-def _slice_body(slicer: Slicer, options: ScanOptions, *, fitted: bool = False) -> _SlicedBody:
-    trunk = trunk_sections(slicer)
-    levels, notes = find_levels(trunk, options.landmarks)
-    check_girths(trunk, levels, leaps=not fitted)
-    legs = slice_legs(slicer, trunk, levels["hip"])
-    of_legs, _ = leg_levels(legs)
-    levels |= {name: of_legs[name] for name in ("knee", "ankle") if name not in options.landmarks}
-    levels |= {"leg_knee": levels["knee"], "leg_calf": of_legs["calf"], "leg_ankle": levels["ankle"]}
-    underarms = {side: underarm_point(slicer, trunk, side, levels["underbust"]) for side in ("left", "right")}
-    upper = slice_neck_and_arms(slicer, trunk, levels, underarms)
-    return _SlicedBody(
-        trunk=trunk, legs=legs, upper=upper, levels=levels, underarms=underarms, notes=tuple(notes),
-        measures=body_measures(slicer, trunk, levels, legs, upper.arms, upper.neck, notes, fitted=fitted),
-    )  # fmt: skip
+def _crotch_height(scan: Slicer, laid: StandingBody) -> float:
+    """Return the height [m] of the first level section of a scan, near the body's crotch, of which the largest part is of both legs."""
+    vertex, size = float(laid.posed[laid.crotch, 1]), float(laid.posed[:, 1].max())
+    for y in np.arange(vertex - 0.010 * size, vertex + 0.012 * size, 0.001):
+        parts = scan.cut(np.array([0.0, 1.0, 0.0]), float(y))
+        largest = max((p.points for p in parts), key=lambda p: float(np.ptp(p[:, 0]) * np.ptp(p[:, 2])), default=None)
+        if largest is not None and largest[:, 0].min() < -0.02 * size and largest[:, 0].max() > 0.02 * size:
+            return float(y)
+    return vertex
 
 
 def _profiles(
-    t: TrunkSections, levels: Mapping[str, float], underarms: Mapping[str, FloatArray]
+    body: BodySections, levels: Mapping[str, float], underarms: Mapping[str, FloatArray]
 ) -> Callable[[float], Profile]:
     from scipy.ndimage import gaussian_filter1d
 
+    t = body.trunk
     rows = np.flatnonzero(t.y < levels["armpit"] - 0.002)
     count = 720
     middle_z = 0.5 * (t.front + t.back)[rows]
@@ -272,23 +219,21 @@ def _share(quarter: FloatArray, wished: float) -> float:
     return float(np.clip(np.interp(wished, rising, s) / s[-1], 0.2, 0.7))
 
 
-def _attractor(
-    slicer: Slicer, levels: Mapping[str, float], armpits: Mapping[str, tuple[float, float, float]]
-) -> Callable[[FloatArray], FloatArray]:
+def _attractor(body: BodySections, levels: Mapping[str, float]) -> Callable[[FloatArray], FloatArray]:
     """Return the nearest place on the scan for every point, hollows between bust points and along the spine bridged.
 
     As tape and cloth bridge them: all the way at the bust, less and less up to the pit of the neck.
     """
     from scipy.interpolate import RegularGridInterpolator
 
-    points, triangles = slicer.vertices, slicer.triangles
+    slicer, points, triangles = body.slicer, body.vertices, body.slicer.triangles
     upper = points[triangles][:, :, 1].mean(axis=1) > 0.6 * points[:, 1].max()
     # The arms are no part of chest and shoulders: what lies beyond planes that lean outward from the armpits.
     middle = points[triangles].mean(axis=1)
-    height, half = min((y, abs(x)) for y, x, _ in armpits.values())
+    height, half = min((y, abs(x)) for x, y, _ in body.armpits.values())
     inside = np.abs(middle[:, 0]) < half + np.tan(_ARM_LEAN) * np.maximum(middle[:, 1] - height, 0.0) + 0.004
     closest = Closest(points, triangles[upper & inside])
-    reach = 0.95 * min(abs(a[1]) for a in armpits.values())
+    reach = 0.95 * min(abs(a[0]) for a in body.armpits.values())
     x = np.linspace(-reach, reach, 61)
     y = np.linspace(levels["bust"] - 0.02, levels["front_neck"], 24)
     fronts, backs = np.zeros((len(y), len(x))), np.zeros((len(y), len(x)))

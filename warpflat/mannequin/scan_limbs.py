@@ -1,9 +1,8 @@
-"""Neck, shoulders, armholes and arms of a scanned body."""
+"""Neck, shoulders, armholes and arms of a scanned body, for the grid."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,11 +11,10 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length, resample
 from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
-from warpflat.mannequin.scan_arms import ScanArm, slice_arm
-from warpflat.mannequin.scan_levels import TrunkSections
+from warpflat.mannequin.scan_sections import ArmSections, BodySections
 from warpflat.mannequin.slicer import Slicer
 
-__all__ = ["UpperSections", "slice_neck_and_arms", "underarm_point", "upper_curves"]
+__all__ = ["underarm_point", "upper_curves"]
 
 #: How far the armhole's plane leans outward from the armpit up.
 _LEAN = np.radians(9.0)
@@ -33,64 +31,26 @@ _ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
 _NOTCH = 0.22
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class UpperSections:
-    """Neck, armholes and arms of a scan.
-
-    Attributes:
-        neckline: #P by 3, the base of the neck, closed, from the front over the left [m].
-        collar: #P by 3, the curve around the neck above it [m].
-        holes: by side #P by 3, the closed armhole from its lowest point forward [m].
-        arms: the sliced arms, by side.
-    """
-
-    neckline: FloatArray
-    collar: FloatArray
-    holes: Mapping[str, FloatArray]
-    arms: Mapping[str, ScanArm]
-
-    @property
-    def neck(self) -> float:
-        """Length of the neck base [m]."""
-        return polyline_length(self.neckline, closed=True)
-
-
-def slice_neck_and_arms(
-    slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], underarms: Mapping[str, FloatArray]
-) -> UpperSections:
-    """Slice neck, armholes and arms.
+def upper_curves(
+    body: BodySections,
+    levels: Mapping[str, float],
+    profile: Callable[[float], Profile],
+    underarms: Mapping[str, FloatArray],
+) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], FloatArray, float]:
+    """Return the curves of the quarters above the bust, those of the arms, the collar (#P by 3 [m]), and the neck base's length [m].
 
     Args:
-        slicer: the upright scan.
-        trunk: its horizontal sections.
-        levels: heights [m] of the levels and landmarks.
+        body: its sections.
+        levels: heights [m] of the levels.
+        profile: the trunk's profile at a height [m].
         underarms: the left and the right armhole's lowest point (see :func:`underarm_point`).
 
     Raises:
         InputError: if the neck or an arm cannot be sliced.
     """
-    neckline, collar = _neck(slicer, trunk, levels)
-    holes = {side: _armhole(slicer, trunk, side, underarms[side]) for side in ("left", "right")}
-    return UpperSections(
-        neckline=np.roll(neckline, -int(np.argmax(neckline[:, 2])), axis=0),
-        collar=np.roll(collar, -int(np.argmax(collar[:, 2])), axis=0),
-        holes=holes,
-        arms={side: slice_arm(slicer, hole, 1.0 if side == "left" else -1.0, side) for side, hole in holes.items()},
-    )
-
-
-def upper_curves(
-    slicer: Slicer, levels: Mapping[str, float], profile: Callable[[float], Profile], upper: UpperSections
-) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves]]:
-    """Return the curves of the quarters above the bust, and those of the arms.
-
-    Args:
-        slicer: the upright scan.
-        levels: heights [m] of the levels.
-        profile: the trunk's profile at a height [m].
-        upper: its neck, armholes and arms.
-    """
-    neckline = upper.neckline
+    slicer = body.slicer
+    neckline, collar = (np.roll(ring, -int(np.argmax(ring[:, 2])), axis=0) for ring in _neck(body, levels))
+    holes = {side: _armhole(body, side, underarms[side]) for side in ("left", "right")}
     back = int(np.argmin(np.abs(neckline[:, 0]) + 10.0 * (neckline[:, 2] > neckline[:, 2].mean())))
     bust = profile(levels["bust"])
     quarters: dict[str, QuarterCurves] = {}
@@ -98,7 +58,7 @@ def upper_curves(
         around = neckline if sign > 0 else np.vstack([neckline[:1], neckline[:0:-1]])
         end = back if sign > 0 else len(neckline) - back
         corner = int(np.argmax(sign * around[: end + 1, 0]))
-        hole = upper.holes[side]
+        hole = holes[side]
         tip = int(np.argmax(hole[:, 1]))
         # The loop runs from the underarm forward: its first half is the front.
         halves = {"front": hole[tip::-1], "back": np.vstack([hole[tip:], hole[:1]])}
@@ -115,8 +75,9 @@ def upper_curves(
                 neckline=line, bend=0.52, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
                 centre=_centre(slicer, bottom, row[0], line[0], face),
             )  # fmt: skip
-    arms = {side: _arm_curves(arm, upper.holes[side]) for side, arm in upper.arms.items()}
-    return {name: quarters[name] for name in QUARTERS}, arms
+    arms = {side: _arm_curves(arm, holes[side]) for side, arm in body.arms.items()}
+    neck = polyline_length(neckline, closed=True)
+    return {name: quarters[name] for name in QUARTERS}, arms, collar, neck
 
 
 def _loop(
@@ -154,12 +115,17 @@ def _loop(
     return np.asarray(origin + np.outer(plane[:, 0], first) + np.outer(plane[:, 1], second))
 
 
-def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+def _neck(body: BodySections, levels: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
     """Return neck base and collar, from the front over the left."""
-    front = np.array([0.0, levels["front_neck"], float(np.interp(levels["front_neck"], t.y, t.front_centre))])
-    side_z = 0.5 * float(
-        np.interp(levels["side_neck"], t.y, t.front_centre) + np.interp(levels["side_neck"], t.y, t.back_centre)
-    )
+
+    def middle(height: float) -> FloatArray:
+        """Return z [m] of the scan in the midplane at a height."""
+        points = np.concatenate([p.points for p in body.scan.cut(np.array([0.0, 1.0, 0.0]), height)])
+        return np.asarray(points[np.abs(points[:, 0]) < 0.02 * body.stature, 2])
+
+    front = np.array([0.0, levels["front_neck"], middle(levels["front_neck"]).max()])
+    at_side = middle(levels["side_neck"])
+    side_z = 0.5 * float(at_side.min() + at_side.max())
     slope = (levels["side_neck"] - front[1]) / max(front[2] - side_z, 0.02)
     slope = float(np.clip(slope, 0.15, 0.65))
     normal = np.array([0.0, 1.0, slope]) / np.hypot(1.0, slope)
@@ -167,7 +133,7 @@ def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tupl
     left = np.array([1.0, 0.0, 0.0])
 
     def ring(lift: float) -> FloatArray:
-        parts = [p for p in slicer.cut(normal, float(front @ normal) + lift)
+        parts = [p for p in body.scan.cut(normal, float(front @ normal) + lift)
                  if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]  # fmt: skip
         if not parts:
             raise InputError(
@@ -185,31 +151,30 @@ def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tupl
     return base, top
 
 
-def underarm_point(slicer: Slicer, t: TrunkSections, side: str, underbust: float) -> FloatArray:
+def underarm_point(body: BodySections, side: str, underbust: float) -> FloatArray:
     """Return the lowest point of an armhole: on the trunk's side, 25 mm below the armpit on an adult.
 
     As deep as a woven block needs it, and at least halfway from the underbust up; midway between the armhole's front and back.
 
     Args:
-        slicer: the upright scan.
-        t: its horizontal sections.
+        body: its sections.
         side: ``left`` or ``right``.
         underbust: height of the underbust [m].
 
     Raises:
         InputError: if there is no armhole.
     """
-    armpit, x, z = t.armpits[side]
+    t, (_, armpit, z) = body.trunk, body.armpits[side]
     sign = 1.0 if side == "left" else -1.0
-    height = max(armpit - _DROP * t.stature, 0.5 * (underbust + armpit))
-    ring = _hole_points(slicer, t, side, np.array([x, armpit, z]), _LEAN, 0.004)
+    height = max(armpit - _DROP * body.stature, 0.5 * (underbust + armpit))
+    ring = _hole_points(body, side, body.armpits[side], _LEAN, 0.004)
     # Between the middle of the armhole and where the side seam comes from below.
     middles = (
         ring[:, 2].min() + ring[:, 2].max(),
         np.interp(underbust, t.y, t.front) + np.interp(underbust, t.y, t.back),
     )
     z = 0.25 * float(sum(middles))
-    points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), height)])
+    points = np.concatenate([p.points for p in body.slicer.cut(np.array([0.0, 1.0, 0.0]), height)])
     reach = float(np.interp(height, t.y, t.left if sign > 0 else t.right))
     beside = points[
         (np.abs(points[:, 2] - z) < 0.006) & (sign * points[:, 0] > 0.0) & (sign * points[:, 0] < reach + 0.002)
@@ -217,14 +182,11 @@ def underarm_point(slicer: Slicer, t: TrunkSections, side: str, underbust: float
     return np.array([sign * (float((sign * beside[:, 0]).max()) if len(beside) else reach), height, z])
 
 
-def _hole_points(
-    slicer: Slicer, t: TrunkSections, side: str, through: FloatArray, lean: float, outward: float
-) -> FloatArray:
+def _hole_points(body: BodySections, side: str, through: FloatArray, lean: float, outward: float) -> FloatArray:
     """Return the part of the scan's section above `through` in the plane through it that leans `lean` outward.
 
     Args:
-        slicer: the upright scan.
-        t: its horizontal sections.
+        body: its sections.
         side: ``left`` or ``right``.
         through: a point of the plane [m].
         lean: of the plane, from plumb [radians].
@@ -234,33 +196,34 @@ def _hole_points(
         InputError: if there is none.
     """
     sign = 1.0 if side == "left" else -1.0
-    armpit = t.armpits[side][0]
+    armpit = body.armpits[side][1]
     normal = np.array([sign * np.cos(lean), -np.sin(lean), 0.0])
     near = [
-        p.points[p.points[:, 1] > through[1] - 0.002] for p in slicer.cut(normal, float(through @ normal) + outward)
+        p.points[p.points[:, 1] > through[1] - 0.002]
+        for p in body.slicer.cut(normal, float(through @ normal) + outward)
     ]
     near = [
-        p for p in near if len(p) > 8 and armpit + 0.03 * t.stature < p[:, 1].max() < 0.95 * t.stature
+        p for p in near if len(p) > 8 and armpit + 0.03 * body.stature < p[:, 1].max() < 0.95 * body.stature
     ]  # fmt: skip
     if not near:
         raise InputError(f"scan: no {side} armhole above the armpit at {armpit:.2f} m; arms must stand off the body")
     return max(near, key=len)
 
 
-def _armhole(slicer: Slicer, t: TrunkSections, side: str, under: FloatArray) -> FloatArray:
+def _armhole(body: BodySections, side: str, under: FloatArray) -> FloatArray:
     """Return the closed armhole in the plane through the underarm point and the shoulder, from the underarm forward."""
     sign = 1.0 if side == "left" else -1.0
-    armpit, x, _ = t.armpits[side]
+    x, armpit, _ = body.armpits[side]
     # The plane passes the shoulder where one that leans `_LEAN` from the armpit would.
-    rise = _SHOULDER_HEIGHT * t.stature
+    rise = _SHOULDER_HEIGHT * body.stature
     lean = float(np.arctan2(sign * (x - under[0]) + rise * np.tan(_LEAN), rise + armpit - under[1]))
     normal = np.array([sign * np.cos(lean), -np.sin(lean), 0.0])
     up = np.array([sign * np.sin(lean), np.cos(lean), 0.0])
-    ring = _hole_points(slicer, t, side, under, lean, 0.001)
+    ring = _hole_points(body, side, under, lean, 0.001)
     # From just above the armpit a quarter of an ellipse runs down to the underarm point, front and back.
-    level = armpit + _SCOOP * t.stature
+    level = armpit + _SCOOP * body.stature
     points = [ring[ring[:, 1] > level]]
-    near = ring[np.abs(ring[:, 1] - level) < 0.005 * t.stature]
+    near = ring[np.abs(ring[:, 1] - level) < 0.005 * body.stature]
     turn = np.linspace(0.0, 0.5 * np.pi, 24)[:, None]
     for end in (near[np.argmin(near[:, 2])], near[np.argmax(near[:, 2])]):
         across, down = np.array([0.0, 0.0, end[2] - under[2]]), (level - under[1]) / up[1] * up
@@ -328,17 +291,20 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
     return np.column_stack([np.zeros_like(y), y, z])
 
 
-def _arm_curves(arm: ScanArm, hole: FloatArray) -> ArmCurves:
+def _arm_curves(arm: ArmSections, hole: FloatArray) -> ArmCurves:
     """Return the curves at biceps, elbow and wrist; they turn with the arm and are not wrung against the armhole `hole`."""
-    biceps = float(np.clip(max(arm.under, arm.tip) + _SHORTEST_SLEEVE / arm.reach, 0.10, arm.elbow - 0.10))
+    top = hole[int(np.argmax(hole[:, 1]))]
+    axis = (arm.line[-1] - hole.mean(axis=0)) / np.linalg.norm(arm.line[-1] - hole.mean(axis=0))
+    beyond = max(float(point @ axis) for point in (hole[0], top)) + _SHORTEST_SLEEVE
+    biceps = float(np.clip(np.interp(beyond, arm.line @ axis, arm.s), arm.s[4], arm.elbow - 0.10 * arm.s[-1]))
     places = sorted({0.0, 1.0, 2.0, *_ARM_PLACES})
-    shares = np.interp(places, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
+    along = np.interp(places, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
     # From the armhole's lowest to its highest point, carried along the arm without a twist.
-    up = hole[int(np.argmax(hole[:, 1]))] - hole[0]
+    up = top - hole[0]
     side = np.sign(hole[0, 0])
     rings: dict[float, FloatArray] = {}
-    for place, share in zip(places, shares, strict=True):
-        at, across = arm.frame(float(share))
+    for place, s in zip(places, along, strict=True):
+        at, across = arm.frame(float(s))
         up = up - across * float(across @ up)
         up /= np.linalg.norm(up)
         cut = arm.cut(at, across)

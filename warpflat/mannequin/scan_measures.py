@@ -1,53 +1,63 @@
-"""Tape measures of a scan itself, at the places that ISO 8559-1 names."""
+"""Levels and tapes of a scan: at the landmarks of the body laid on it, moved to what is fullest or narrowest near them (ISO 8559-1)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.mannequin.body_landmarks import ARM_PLACES, model_places, near_level, near_place, value_at
+from warpflat.mannequin.measurements import size_tables
 from warpflat.mannequin.profiles import convex_girth
-from warpflat.mannequin.scan_arms import ScanArm, tape_around
-from warpflat.mannequin.scan_legs import LegSections
-from warpflat.mannequin.scan_levels import TrunkSections, leg_sections, smooth
+from warpflat.mannequin.scan_sections import OUTLINES, BodySections, smooth, tape_around
 from warpflat.mannequin.slicer import Slicer
+from warpflat.mannequin.stand_body import StandingBody
 from warpflat.mannequin.summit import summit
 
-__all__ = ["ScanMeasure", "body_measures", "guess_note", "leg_levels", "missing_note"]
+__all__ = ["ScanLevel", "ScanMeasure", "body_measures", "find_levels", "guess_note", "missing_note"]
 
-_TRUNK = ("bust", "underbust", "waist", "hip")
 _UP = np.array([0.0, 1.0, 0.0])
-# Height of the hip joints as a share of the stature (Drillis and Contini 1966).
-_HIP_JOINT = 0.530
+_TRUNK = ("bust", "underbust", "waist", "hip")
+# So far up and down from its landmark the extreme of a level lies, as a share of the stature.
+_REACH = {"waist": 0.036, "hip": 0.030, "calf": 0.016, "ankle": 0.013}
+# Bust points lie a fifth of the bust apart. A fold bends the outline by so much over a way of one stature. It lies so far below the
+# landmark at most, and is nearer to it than this only if it is the landmark, as shares of the stature.
+_BUST_POINT, _FOLD, _FOLD_BELOW, _FOLD_OFF = 0.1, 14.0, 0.05, 0.007
+# Under a bust that hangs the tape lies where the girth leaps by more than this share from one section to the next.
+_LEAP = 0.06
+# More noise than this [m] moves a landmark by more than ISO 20685 allows.
+_NOISE_SURE = 0.0012
+# So far up and down the corner between neck and shoulder lies from its landmark, as a share of the stature.
+_NECK = 0.014
+# The crease behind the knee is sought so far from the knee, which is sure if the crease lies so near, as shares of the stature.
+_CREASE, _KNEE_SURE = 0.03, 0.003
+# How far from its landmark a wrist may be narrowest, on the mean body [m].
+_WRIST = 0.013
+# How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
+_BELOW_ARMPIT = 0.006
 # The fullest upper arm is sought from so far beyond the armpit, the thigh's tape lies so far below the crotch, both as
 # shares of the stature: nearer sections hold a part of the shoulder or of the seat.
 _BEYOND_ARMPIT, _BELOW_CROTCH = 0.02, 0.03
-# A belly of the upper arm is one if it is so full, as a share of the fullest tape.
-_BELLY = 0.98
+# Just below an armpit's fold the trunk is no broader than by this share of the stature.
+_BESIDE_FOLD = 0.005
 # The palm's tape falls to this share where the fingers part.
 _FINGERS_PART = 0.92
-# Shares of the crotch's height between which an ankle and a calf lie.
-_ANKLE, _CALF = (0.10, 0.30), (0.32, 0.60)
-# The knee lies so far above the leg's narrowest place over the calf; its crease is trusted so near to there, both as
-# shares of the crotch's height. The fat of a knee moves the crease down by up to 0.05.
-_OVER_NARROW, _KNEE_SURE = 0.075, 0.012
-# On a noisy scan a cubic finds the calf over so much of the crotch's height up and down.
-_WIDE = 0.12
+# A belly of the upper arm is one if it is so full, as a share of the fullest tape.
+_BELLY = 0.98
+# Girths [m] that a tape does not tell apart, and what noise of one metre adds to that; ISO 20685 lets a height differ by so much [m].
+_ALIKE, _NOISE, _ISO_HEIGHT = 0.001, 0.5, 0.004
+# A tape is a guess where the body model lies farther off the scan [m] in the mean, or the scan shows less than a share of it.
+_FAR, _SHOWN = 0.015, 0.75
+_HOLED = "it runs over a hole in the scan"
 # Girths [m] per metre of stature that bodies have, from infants to the heaviest.
 _POSSIBLE = {
     "head": (0.25, 0.55), "biceps": (0.08, 0.40), "elbow": (0.07, 0.32), "wrist": (0.05, 0.20), "hand": (0.07, 0.22),
     "thigh": (0.17, 0.60), "knee": (0.13, 0.45), "calf": (0.12, 0.42), "ankle": (0.07, 0.28), "foot": (0.09, 0.24),
 }  # fmt: skip
-
-
-# Girths [m] that a tape does not tell apart, and how far ISO 20685 lets a scan's height and girth differ from a tape's [m].
-_ALIKE = 0.001
-_ISO_HEIGHT, _ISO_GIRTH = 0.004, 0.009
-
-_HOLED = "it runs over a hole in the scan"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,126 +75,268 @@ class ScanMeasure:
     guess: str | None = None
 
 
-def leg_levels(legs: LegSections) -> tuple[dict[str, float], dict[str, str]]:
-    """Return heights [m] of knee, calf and ankle, the mean of both legs, and why some are guesses.
+@dataclass(frozen=True, kw_only=True)
+class ScanLevel:
+    """A height above the floor [m], and why it is a guess; None where the shape shows it."""
 
-    Ankle: narrowest above the foot. Calf: fullest below the knee. Knee: over the kneecap and at the crease behind it,
-    where the back of the leg is furthest inside the line from calf to thigh.
+    height: float
+    guess: str | None = None
+
+
+def find_levels(
+    body: BodySections, laid: StandingBody, noise: float, given: Mapping[str, float]
+) -> dict[str, ScanLevel]:
+    """Return the levels of trunk and legs, from low to high the closed ones, and of ``armpit``, ``front_neck``, ``side_neck``.
+
+    Waist: narrowest near its landmark. Bust: fullest between the underbust and the armpits. Hip: where the seat stands out most near its
+    landmark. Underbust and knee lie at their landmarks. Calf: fullest, ankle: narrowest, the mean of both legs.
 
     Args:
-        legs: their sections as scanned.
+        body: the sections as scanned.
+        laid: the body on the scan.
+        noise: how far noise moved the scan's vertices before it was smoothed [m].
+        given: landmarks [m] that are taken as they are.
+
+    Raises:
+        InputError: if the levels do not come in a body's order.
     """
-    found = [_places_of_leg(legs, side) for side in ("left", "right")]
-    guesses = {name: why for _, of_leg in found for name, why in of_leg.items()}
-    return {name: 0.5 * (found[0][0][name] + found[1][0][name]) for name in found[0][0]}, guesses
+    t, size = body.trunk, body.stature
+    found: dict[str, ScanLevel] = {}
+
+    def landmark(name: str, side: str = "left") -> float:
+        return float(value_at(near_level(name, side), body.vertices[:, 1]))
+
+    def least(name: str, y: FloatArray, values: FloatArray, around: float, lacking: str) -> ScanLevel:
+        rows = np.flatnonzero(np.abs(y - around) < _REACH[name] * size)
+        row = int(rows[np.argmin(values[rows])]) if len(rows) else 0
+        if len(rows) < 3 or not rows[0] < row < rows[-1]:
+            return ScanLevel(height=around, guess=f"{lacking}; it is where the body model has it")
+        alike = y[_stretch(values < values[row] + _NOISE * noise, row)]
+        moved = noise > 0.0 and float(np.abs(alike - y[row]).max()) > _ISO_HEIGHT
+        return ScanLevel(height=summit(y, values, row), guess=_noisy(noise) if moved else None)
+
+    found["armpit"] = ScanLevel(height=min(float(place[1]) for place in body.armpits.values()))
+    armpit = given.get("armpit", found["armpit"].height)
+    found["waist"] = least("waist", t.y, smooth(t.girth, 1.5), landmark("waist"), "the trunk has no narrowest section")
+    found["hip"] = least("hip", t.y, t.back, landmark("hip"), "the seat does not stand out")
+    # Under a full bust the outline over the bust points bends forward in a fold, lower than on the mean body.
+    at, bust = min(landmark("underbust"), armpit - 0.02 * size), landmark("bust")
+    apart = _BUST_POINT * float(np.interp(bust, t.y, t.girth)) / size
+    outline = smooth(np.array([np.interp(apart, OUTLINES, row) for row in t.outlines]), 2.0)
+    bend = np.gradient(np.gradient(outline, t.y), t.y) * size
+    below = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at))
+    fold = int(below[np.argmax(bend[below])])
+    leap = np.diff(t.girth[below]) / t.girth[below[:-1]]
+    if leap.max() > _LEAP:
+        at = float(t.y[below[np.argmax(leap)]])
+    elif below[0] < fold < below[-1] and bend[fold] > _FOLD and at - t.y[fold] > _FOLD_OFF * size:
+        at = summit(t.y, bend, fold)
+    found["underbust"] = ScanLevel(height=at, guess=_noisy(noise) if noise > _NOISE_SURE else None)
+    low, high = given.get("underbust", at) + 0.01 * size, armpit - _BELOW_ARMPIT * size
+    rows = np.flatnonzero((t.y > low) & (t.y < high))
+    row = int(rows[np.argmax(t.girth[rows])]) if len(rows) else 0
+    above = (t.y > t.y[row]) & (t.y <= armpit - 0.003 * size)
+    if not len(rows) or row == rows[-1]:
+        found["bust"] = ScanLevel(height=high, guess=f"the chest grows fuller up to the armpits at {armpit:.3f} m")
+    elif row == rows[0]:
+        found["bust"] = ScanLevel(
+            height=landmark("bust"), guess="the chest is nowhere fullest; it is where the body model has it"
+        )
+    elif t.girth[above].max(initial=0.0) > t.girth[row]:
+        why = f"the chest is as full again at the armpits at {armpit:.3f} m"
+        found["bust"] = ScanLevel(height=summit(t.y, t.girth, row), guess=why)
+    else:
+        found["bust"] = ScanLevel(height=summit(t.y, t.girth, row))
+    waist, hip = (given.get(name, found[name].height) for name in ("waist", "hip"))
+    between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
+    belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
+    found["abdomen"] = ScanLevel(height=belly)
+    # The outline turns from the shoulder into the neck where it is furthest inside the line between the two.
+    low, at = landmark("front_neck"), landmark("side_neck")
+    upper = np.flatnonzero((t.y > 0.80 * size) & (t.y < 0.91 * size))
+    narrow = float(t.y[upper[np.argmin(t.girth[upper])]])
+    y = t.y[(t.y >= armpit + 0.55 * (narrow - armpit)) & (t.y <= narrow)]
+    wide = [np.concatenate([p.points[:, 0] for p in body.scan.cut(_UP, float(each))]) for each in y]
+    half = smooth(np.array([0.5 * float(np.ptp(x)) for x in wide]), 1.0)
+    inside = np.interp(y, [y[0], y[-1]], [half[0], half[-1]]) - half
+    row = int(np.argmax(np.where(np.abs(y - at) < _NECK * size, inside, -np.inf)))
+    beside = summit(y, inside, row) if 0 < row < len(y) - 1 else at
+    found["front_neck"] = ScanLevel(height=low)
+    found["side_neck"] = ScanLevel(height=float(np.clip(beside, low + 0.008 * size, low + 0.035 * size)))
+    for name, fullest in (("knee", None), ("calf", True), ("ankle", False)):
+        sides = []
+        for side in ("left", "right"):
+            if fullest is None:
+                # Fat moves the skin over a knee: its crease behind, furthest inside the line from calf to thigh, then lies elsewhere.
+                y, back = body.legs.y, smooth(np.array([hull[:, 1].min() for hull in body.legs.hulls[side]]), 3.0)
+                calf, at = landmark("calf", side), landmark(name, side)
+                ends = [calf, 0.86 * body.crotch]
+                inside = back - np.interp(y, ends, np.interp(ends, y, back))
+                crease = float(y[np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf))])
+                moved = abs(crease - at) > _KNEE_SURE * size
+                sides.append(
+                    ScanLevel(
+                        height=at,
+                        guess="the crease behind it lies elsewhere"
+                        if moved
+                        else _noisy(noise)
+                        if noise > _NOISE_SURE
+                        else None,
+                    )
+                )
+            else:
+                # Smoothed little, or the calf, which is rounder above than below, would be moved.
+                girth = smooth(body.legs.girths[side], 3.0 if noise else 1.0)
+                values = -girth if fullest else girth
+                sides.append(least(name, body.legs.y, values, landmark(name, side), "the legs do not show it"))
+        guess = next((each.guess for each in sides if each.guess), None)
+        found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
+        if name != "calf":
+            found[name] = found[f"leg_{name}"]
+    found["leg_thigh"] = ScanLevel(height=body.crotch - _BELOW_CROTCH * size)
+    found["thigh"] = ScanLevel(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))
+    for name, height in given.items():
+        found[name] = ScanLevel(height=height)
+        if name in ("knee", "ankle"):
+            found[f"leg_{name}"] = found[name]
+    order = [
+        "ankle",
+        "knee",
+        "thigh",
+        "hip",
+        "abdomen",
+        "waist",
+        "underbust",
+        "bust",
+        "armpit",
+        "front_neck",
+        "side_neck",
+    ]
+    for under, over in itertools.pairwise(order):
+        if found[over].height - found[under].height < 0.004 * size:
+            raise InputError(
+                f"scan: {over} ({found[over].height:.3f} m) does not lie above {under} ({found[under].height:.3f} m); "
+                "give landmarks"
+            )
+    # A level is no surer than the body is there.
+    for name in _TRUNK:
+        if found[name].guess is None and name not in given:
+            found[name] = ScanLevel(
+                height=found[name].height, guess=laid.unsure_near(near_level(name)[0], _FAR, _SHOWN)
+            )
+    return found
 
 
-def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict[str, str]]:
-    y, guesses = legs.y, {}
-    # Smoothed little, or the calf, which is rounder above than below, would be moved.
-    girth = smooth(legs.girths[side], 3.0 if legs.noise else 1.0)
-    back = smooth(np.array([h[:, 1].min() for h in legs.hulls[side]]), 3.0)
-
-    def extreme(name: str, values: FloatArray, between: tuple[float, float], share: float) -> float:
-        low, high = between
-        rows = np.flatnonzero((y > low) & (y < high))
-        row = int(rows[np.argmin(values[rows])]) if len(rows) > 2 else -1
-        if len(rows) > 2 and rows[0] < row < rows[-1]:
-            return summit(y, values, row)
-        guesses[name] = f"the legs do not show it; it is {share:g} of the crotch's height"
-        return share * legs.crotch
-
-    calf = extreme("calf", -girth, (_CALF[0] * legs.crotch, _CALF[1] * legs.crotch), 0.44)
-    if legs.noise and "calf" not in guesses:
-        calf = _fullest(y, legs.girths[side], calf, _WIDE * legs.crotch)
-    ankle = extreme("ankle", girth, (_ANKLE[0] * legs.crotch, _ANKLE[1] * legs.crotch), 0.16)
-    low, high = calf, 0.86 * legs.crotch
-    line = np.interp(y, [low, high], np.interp([low, high], y, back))
-    knee = extreme("knee", line - back, (low + 0.25 * (high - low), high - 0.25 * (high - low)), 0.63)
-    below = np.flatnonzero((y > low + 0.1 * (high - low)) & (y < high))
-    narrow = float(y[below[np.argmin(girth[below])]]) if len(below) else 0.0
-    if abs(narrow + _OVER_NARROW * legs.crotch - knee) > _KNEE_SURE * legs.crotch:
-        guesses.setdefault("knee", "the crease behind it and the narrowest place below it do not agree")
-    return {"knee": knee, "calf": calf, "ankle": ankle}, guesses
+def _noisy(noise: float) -> str:
+    return f"the scan's noise of {1000.0 * noise:.1f} mm moves it"
 
 
-def _fullest(y: FloatArray, girth: FloatArray, near: float, reach: float) -> float:
-    """Return the height where the cubic that fits the girths within `reach` [m] is fullest, started from `near`.
-
-    Noise moves the fullest of girths that differ by little; a cubic over more of the leg averages it.
-    """
-    for _ in range(4):
-        rows = np.abs(y - near) < reach
-        cubic = np.polynomial.Polynomial.fit(y[rows], girth[rows], 3)
-        fine = np.linspace(y[rows][0], y[rows][-1], 200)
-        near = 0.5 * (near + float(fine[int(np.argmax(cubic(fine)))]))
-    return near
+def _stretch(rows: np.ndarray, row: int) -> slice:
+    """Return the stretch of true rows around `row`, which is true."""
+    off = np.flatnonzero(~rows)
+    before, after = off[off < row], off[off > row]
+    return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(rows))
 
 
 def body_measures(
-    slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], legs: LegSections, arms: Mapping[str, ScanArm],
-    neck: float, notes: Sequence[str], *, fitted: bool = False,
-) -> dict[str, ScanMeasure]:  # fmt: skip
+    scan: Slicer, body: BodySections, laid: StandingBody, levels: Mapping[str, ScanLevel], neck: float
+) -> dict[str, ScanMeasure]:
     """Return the tapes that the scan has room for, by name, from the head down.
 
     Args:
-        slicer: the upright scan.
-        trunk: its sections as scanned.
-        levels: heights [m] of the levels.
-        legs: sections of the legs.
-        arms: the sliced arms, by side.
+        scan: the upright scan, around which the tapes of head, hands and feet are laid.
+        body: the sections of the body on it.
+        laid: that body.
+        levels: of trunk and legs.
         neck: length of the neck base [m].
-        notes: what was found so far, guesses of the trunk's levels among it.
-        fitted: whether the body is a model laid on the scan: its fingers and toes may not be the scan's.
 
     Raises:
         InputError: for a girth that no body has, with its place.
     """
-    guessed = {note.split(" = ")[0]: note.partition(" is a guess: ")[2] for note in notes if " is a guess: " in note}
+    t, size, noise = body.trunk, body.stature, scan.noise
     found: dict[str, ScanMeasure] = {}
-    head = _head(slicer, trunk.stature)
+    head = _head(scan, size)
     if head is not None:
         found["head"] = head
-    found["neck"] = ScanMeasure(height=0.5 * (levels["front_neck"] + levels["side_neck"]), girth=neck)
-    for level in _TRUNK:
-        height = _bust(trunk, levels) if level == "bust" and "bust" in guessed else levels[level]
-        holed = trunk.holed[int(np.argmin(np.abs(trunk.y - height)))]
-        found[level] = ScanMeasure(
-            height=height, girth=float(np.interp(height, trunk.y, trunk.girth)),
-            guess=guessed.get(level, _HOLED if holed else None),
+    found["neck"] = ScanMeasure(
+        height=0.5 * (levels["front_neck"].height + levels["side_neck"].height), girth=neck,
+        guess=laid.unsure_near(near_level("side_neck")[0], _FAR, _SHOWN),
+    )  # fmt: skip
+    for name in _TRUNK:
+        level = levels[name]
+        height = level.height
+        if name == "bust" and level.guess:
+            # A chest that grows fuller up to the armpits is fullest there.
+            chest = np.flatnonzero((t.y > levels["underbust"].height) & (t.y <= levels["armpit"].height))
+            height = float(t.y[chest[np.argmax(t.girth[chest])]])
+        holed = t.holed[int(np.argmin(np.abs(t.y - height)))]
+        found[name] = ScanMeasure(
+            height=height, girth=float(np.interp(height, t.y, t.girth)),
+            guess=level.guess or (_HOLED if holed else None),
         )  # fmt: skip
-    together = _hip_legs_together(slicer, trunk, legs, levels["hip"])
-    if together is not None:
-        found["hip, legs together"] = ScanMeasure(height=levels["hip"], girth=together)
-    for side, arm in arms.items():
-        found |= {f"{name} {side}": measure for name, measure in _arm(arm, trunk, side).items()}
-        hand = _hand(slicer, arm)
-        # A stump of a hand, cut off by a hole, is none.
-        if hand is not None and hand.girth > _POSSIBLE["hand"][0] * trunk.stature:
+    for side, arm in body.arms.items():
+        places = {"elbow": arm.elbow, "wrist": arm.wrist}
+        # The wrist is narrowest near its landmark.
+        ahead = np.arange(arm.wrist - _WRIST * size, arm.wrist + _WRIST * size, 0.0015 * size)
+        places["wrist"] = float(ahead[np.argmin([arm.tape(s)[1] for s in ahead])])
+        found[f"biceps {side}"] = _biceps(body, side, noise)
+        for name, s in places.items():
+            height, girth = arm.tape(s)
+            guess = laid.unsure_near(near_place(ARM_PLACES[name], side)[0], _FAR, _SHOWN)
+            guess = guess or (_noisy(noise) if noise > _NOISE_SURE else None)
+            found[f"{name} {side}"] = ScanMeasure(height=height, girth=girth, guess=guess)
+        hand = _hand(scan, body, laid, side)
+        if hand is not None and _is_possible("hand", hand.girth, size):
             found[f"hand {side}"] = hand
-    crotch = _crotch(slicer, trunk)
     for side in ("left", "right"):
-        found |= {
-            f"{name} {side}": measure
-            for name, measure in _leg(legs, side, crotch - _BELOW_CROTCH * trunk.stature).items()
-        }
-        foot = _foot(slicer, trunk.stature, side)
+        for name in ("thigh", "knee", "calf", "ankle"):
+            level = levels[f"leg_{name}"]
+            rows = np.flatnonzero(
+                model_places().strips[f"leg {side}"] & (np.abs(body.vertices[:, 1] - level.height) < 0.012 * size)
+            )
+            found[f"{name} {side}"] = ScanMeasure(
+                height=level.height, girth=float(np.interp(level.height, body.legs.y, body.legs.girths[side])),
+                guess=level.guess or laid.unsure_near(rows, _FAR, _SHOWN),
+            )  # fmt: skip
+        foot = _foot(scan, size, side) if laid.shows(near_level("foot", side)[0]) else None
+        if foot is None or not _is_possible("foot", foot.girth, size):
+            # On a floor the model's foot tells more.
+            of_model = _foot(body.slicer, size, side) if foot is not None else None
+            foot = None if of_model is None else replace(of_model, guess="it is the body model's: the scan has a floor")
         if foot is not None:
             found[f"foot {side}"] = foot
-    if fitted:
-        ends = [name for name in found if name.startswith(("hand", "foot"))]
-        found = {n: m for n, m in found.items() if n not in ends or _is_possible(n, m, trunk.stature)}
-    _check(found, trunk.stature)
+    for name, measure in found.items():
+        low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
+        if not _is_possible(name, measure.girth, size):
+            raise InputError(
+                f"scan: {name} {measure.girth:.3f} m at {measure.height:.2f} m above the floor, of a body {size:.2f} m tall: "
+                f"{low * size:.2f} to {high * size:.2f} m is possible; repair the mesh there"
+            )
+    for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
+        if {top, bottom} <= set(_TRUNK) and not low <= found[top].girth / found[bottom].girth <= high:
+            raise InputError(
+                f"scan: {top} {found[top].girth:.2f} m at {found[top].height:.2f} m above the floor does not go with {bottom} "
+                f"{found[bottom].girth:.2f} m at {found[bottom].height:.2f} m: {low * found[bottom].girth:.2f} to "
+                f"{high * found[bottom].girth:.2f} m is possible; repair the mesh or give landmarks"
+            )
     return found
 
 
-def guess_note(measures: Mapping[str, ScanMeasure], notes: Sequence[str]) -> list[str]:
-    """Return one note that names the tapes whose places are guesses and that have no note of their own; none without any."""
-    guesses = {n: m.guess for n, m in measures.items() if m.guess and not any(k.startswith(f"{n} = ") for k in notes)}
-    if not guesses:
-        return []
+def _is_possible(name: str, girth: float, stature: float) -> bool:
+    low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
+    return low * stature <= girth <= high * stature
+
+
+def guess_note(measures: Mapping[str, ScanMeasure], levels: Mapping[str, ScanLevel]) -> list[str]:
+    """Return one note for each level of the trunk that is a guess, and one that names all other tapes that are; none without any."""
+    notes = [
+        f"{n} = {levels[n].height:.3f} m is a guess: {levels[n].guess}" for n in reversed(_TRUNK) if levels[n].guess
+    ]
+    guesses = {n: m.guess for n, m in measures.items() if m.guess and not (n in _TRUNK and levels[n].guess)}
     names = {why: [n for n, w in guesses.items() if w == why] for why in guesses.values()}
-    return ["guessed: " + "; ".join(f"{' and '.join(names[why])} ({why})" for why in names)]
+    if guesses:
+        notes.append("guessed: " + "; ".join(f"{' and '.join(names[why])} ({why})" for why in names))
+    return notes
 
 
 def missing_note(measures: Mapping[str, ScanMeasure]) -> list[str]:
@@ -195,28 +347,6 @@ def missing_note(measures: Mapping[str, ScanMeasure]) -> list[str]:
         return []
     floor = "; heights count from its lowest point" if {"foot left", "foot right"} <= set(missing) else ""
     return [f"the scan shows no {' and no '.join(missing)}{floor}"]
-
-
-def _is_possible(name: str, measure: ScanMeasure, stature: float) -> bool:
-    low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
-    return low * stature <= measure.girth <= high * stature
-
-
-def _check(found: Mapping[str, ScanMeasure], stature: float) -> None:
-    for name, measure in found.items():
-        low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
-        if not _is_possible(name, measure, stature):
-            raise InputError(
-                f"scan: {name} {measure.girth:.3f} m at {measure.height:.2f} m above the floor, of a body {stature:.2f} m tall: "
-                f"{low * stature:.2f} to {high * stature:.2f} m is possible; repair the mesh there"
-            )
-
-
-def _bust(trunk: TrunkSections, levels: Mapping[str, float]) -> float:
-    """Return the height where a chest that grows fuller up to the armpits is fullest; a belly is no chest."""
-    middle = 0.5 * (levels["waist"] + levels["armpit"])
-    rows = np.flatnonzero((trunk.y > middle) & (trunk.y <= levels["armpit"]))
-    return float(trunk.y[rows[np.argmax(trunk.girth[rows])]])
 
 
 def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
@@ -239,7 +369,7 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
         holed.append(largest.is_holed)
     values = smooth(np.array(girths), 1.0)
     row = int(np.argmax(values))
-    if row < len(values) - 1 and row > 0:
+    if 0 < row < len(values) - 1:
         guess = _HOLED if holed[row] else None
         return ScanMeasure(height=summit(heights, values, row), girth=girths[row], guess=guess)
     return ScanMeasure(
@@ -247,123 +377,69 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
     )
 
 
-def _hip_legs_together(slicer: Slicer, trunk: TrunkSections, legs: LegSections, hip: float) -> float | None:
-    """Return the hip's girth [m] after the legs are turned plumb about the hip joints; None where they stand together.
-
-    Flesh moves inwards by the legs' slope times its depth below the joints, in proportion to its distance from the
-    midplane as far as the joints.
-    """
-    if legs.slope <= 0.01:
-        return None
-    parts = [p.points for p in slicer.cut(_UP, hip) if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]
-    flat = max(parts, key=lambda p: float(np.ptp(p[:, 0])))[:, [0, 2]].copy()
-    top = len(legs.y) - 1
-    joint = 0.25 * float(sum(np.ptp(legs.hulls[side][top][:, 0]) for side in ("left", "right")))
-    depth = max(0.0, _HIP_JOINT * trunk.stature - hip)
-    flat[:, 0] -= legs.slope * depth * np.clip(flat[:, 0] / joint, -1.0, 1.0)
-    return convex_girth(flat)
-
-
-def _arm(arm: ScanArm, trunk: TrunkSections, side: str) -> dict[str, ScanMeasure]:
-    armpit, x, z = trunk.armpits[side]
-    elbow, wrist = arm.tape(arm.elbow), arm.tape(arm.wrist)
-    wide = arm.tape(arm.wide)
-    guess = "the arm is straight; it is a share of its length" if not arm.bent else None
-    if guess is None and (abs(wide[0] - elbow[0]) > _ISO_HEIGHT or abs(wide[1] - elbow[1]) > _ISO_GIRTH):
-        guess = "the arm bends in a bow, not at one place"
-    return {
-        "biceps": _biceps(arm, np.array([x, armpit, z]), _BEYOND_ARMPIT * trunk.stature),
-        "elbow": ScanMeasure(height=elbow[0], girth=elbow[1], guess=guess),
-        "wrist": ScanMeasure(height=wrist[0], girth=wrist[1]),
-    }
-
-
-def _biceps(arm: ScanArm, armpit: FloatArray, beyond: float) -> ScanMeasure:
-    """Return the fullest tape across the upper arm's bone, from `beyond` [m] off the armpit to the elbow.
+def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
+    """Return the fullest tape across the upper arm's bone, from beyond the armpit to the elbow.
 
     The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
     """
-    rows = (arm.shares > 0.2) & (arm.shares < arm.elbow - 0.04)
-    if not rows.any():
-        raise InputError(f"scan: no upper arm between the armpit at {armpit[1]:.2f} m and the elbow; give landmarks")
+    arm, armpit = body.arms[side], body.armpits[side].copy()
+    # Just below the fold the trunk's skin stands out a little farther.
+    skin = np.concatenate([p.points[:, 0] for p in body.halves[side].cut(_UP, float(armpit[1]) - 0.001)])
+    skin = np.abs(skin)[np.abs(skin) < np.abs(armpit[0]) + _BESIDE_FOLD * body.stature]
+    armpit[0] = np.sign(armpit[0]) * max(float(skin.max(initial=0.0)), abs(float(armpit[0])))
+    rows = (arm.s > 0.35 * arm.elbow) & (arm.s < arm.elbow - 0.02 * body.stature)
     way = arm.way[rows].mean(axis=0)
     way /= np.linalg.norm(way)
     middle = arm.line[rows].mean(axis=0)
     end = float((arm.frame(arm.elbow)[0] - middle) @ way) - 0.02
-    tapes = []
-    for at in np.arange(float((armpit - middle) @ way) + beyond, end, 0.002):
-        tapes.append(tape_around(arm.cut(middle + at * way, way), way))
+    tapes = [
+        tape_around(arm.cut(middle + at * way, way), way)
+        for at in np.arange(float((armpit - middle) @ way) + _BEYOND_ARMPIT * body.stature, end, 0.002)
+    ]
+    if len(tapes) < 3:
+        raise InputError(f"scan: no upper arm between the armpit at {armpit[1]:.2f} m and the elbow; give landmarks")
     girths = smooth(np.array([girth for _, girth in tapes]), 1.0)
     bellies = 1 + np.flatnonzero((girths[1:-1] >= girths[:-2]) & (girths[1:-1] > girths[2:]))
     bellies = bellies[girths[bellies] > _BELLY * girths.max()]
     row = int(bellies[np.argmax(girths[bellies])]) if len(bellies) else int(np.argmax(girths))
     heights = np.array([height for height, _ in tapes])
-    alike = heights[_stretch(girths > girths[row] - _ALIKE, row)]
+    alike = heights[_stretch(girths > girths[row] - max(_ALIKE, _NOISE * noise), row)]
     guess = (
         "the arm is as full a way up and down from there" if np.abs(alike - heights[row]).max() > _ISO_HEIGHT else None
     )
     return ScanMeasure(height=tapes[row][0], girth=tapes[row][1], guess=guess)
 
 
-def _stretch(rows: BoolArray, row: int) -> slice:
-    """Return the stretch of true rows around `row`, which is true."""
-    off = np.flatnonzero(~rows)
-    before, after = off[off < row], off[off > row]
-    return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(rows))
-
-
-def _hand(slicer: Slicer, arm: ScanArm) -> ScanMeasure | None:
+def _hand(scan: Slicer, body: BodySections, laid: StandingBody, side: str) -> ScanMeasure | None:
     """Return the tape around the palm halfway from where the thumb parts from it to where the fingers part; None without a hand."""
-    wrist, way = arm.frame(arm.wrist)
-    beyond = arm.limb[(arm.limb - wrist) @ way > 0.0]
+    places, arm = model_places(), body.arms[side]
+    if not laid.shows(near_place(ARM_PLACES["hand"], side)[0]):
+        return None
+    wrist = arm.frame(arm.wrist)[0]
+    own = scan.vertices[np.unique(scan.triangles[(laid.shown >= 0) & places.arms[side][laid.shown]])]
+    beyond = own[(own - wrist) @ arm.way[-1] > 0.0]
     if not len(beyond):
         return None
     reach = np.linalg.norm(beyond - wrist, axis=1)
-    length = float(reach.max())
-    if length < 0.18 * arm.reach:
-        return None
-    axis = (beyond[int(np.argmax(reach))] - wrist) / length
-    counts: list[int] = []
-    tapes: list[tuple[float, float]] = []
-    holed = False
-    for share in np.arange(0.30, 0.64, 0.01):
-        at = wrist + share * length * axis
-        parts = [p for p in slicer.cut(axis, float(at @ axis))
-                 if np.linalg.norm(p.points.mean(axis=0) - at) < 0.6 * length and len(p.points) > 5]  # fmt: skip
+    axis = (beyond[np.argmax(reach)] - wrist) / reach.max()
+    tapes: list[tuple[int, tuple[float, float], bool]] = []
+    for at in wrist + np.arange(0.30, 0.64, 0.01)[:, None] * reach.max() * axis:
+        parts = [p for p in scan.cut(axis, float(at @ axis))
+                 if np.linalg.norm(p.points.mean(axis=0) - at) < 0.6 * reach.max() and len(p.points) > 5]  # fmt: skip
         if parts:
-            counts.append(len(parts))
-            holed |= any(p.is_holed for p in parts)
-            tapes.append(max((tape_around(p.points, axis) for p in parts), key=lambda t: t[1]))
+            largest = max(((tape_around(p.points, axis), p.is_holed) for p in parts), key=lambda each: each[0][1])
+            tapes.append((len(parts), *largest))
     if not tapes:
         return None
-    girths = np.array([girth for _, girth in tapes])
-    thumb = next((i for i, count in enumerate(counts) if count > 1), None)
+    girths = np.array([tape[1] for _, tape, _ in tapes])
+    thumb = next((i for i, (count, *_) in enumerate(tapes) if count > 1), None)
     first = thumb or 0
     # Where the fingers part, the girth of the largest part falls.
     falls = first + np.flatnonzero(girths[first + 1 :] < _FINGERS_PART * girths[first:-1])
-    height, girth = tapes[(first + int(falls[0] if len(falls) else len(tapes) - 1)) // 2]
+    _, (height, girth), _ = tapes[(first + int(falls[0] if len(falls) else len(tapes) - 1)) // 2]
+    holed = any(holed for *_, holed in tapes)
     guess = _HOLED if holed else "no thumb stands off the palm" if thumb is None else None
     return ScanMeasure(height=height, girth=girth, guess=guess)
-
-
-def _crotch(slicer: Slicer, trunk: TrunkSections) -> float:
-    """Return the height where the legs part [m], between two of the trunk's sections."""
-    low, high = trunk.crotch, trunk.crotch + float(trunk.y[1] - trunk.y[0])
-    for _ in range(5):
-        middle = 0.5 * (low + high)
-        apart = len(leg_sections(slicer, middle, trunk.stature)) == 2
-        low, high = (middle, high) if apart else (low, middle)
-    return low
-
-
-def _leg(legs: LegSections, side: str, thigh: float) -> dict[str, ScanMeasure]:
-    # Noise moves the places on each leg by itself: their mean moves less.
-    places, guesses = leg_levels(legs) if legs.noise else _places_of_leg(legs, side)
-    places = {"thigh": thigh, **places}
-    return {
-        name: ScanMeasure(height=y, girth=float(np.interp(y, legs.y, legs.girths[side])), guess=guesses.get(name))
-        for name, y in places.items()
-    }
 
 
 def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
@@ -376,12 +452,18 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
         corners = low[ConvexHull(low).vertices]
     except (QhullError, ValueError):
         return None
-    axis = _long_way(corners)
-    length = float(np.ptp(low @ axis[[0, 2]]))
+    # The length runs along which the box around the foot is narrowest.
+    edges = np.roll(corners, -1, axis=0) - corners
+    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
+    edges *= np.where(edges[:, 1:] < 0.0, -1.0, 1.0)
+    breadth = np.ptp(corners @ np.array([edges[:, 1], -edges[:, 0]]), axis=0)
+    along = edges[int(np.argmin(breadth))]
+    axis = np.array([along[0], 0.0, along[1]])
+    length = float(np.ptp(low @ along))
     if length < 0.10 * stature:
         return None
     across = np.array([axis[2], 0.0, -axis[0]])
-    start = float((low @ axis[[0, 2]]).min())
+    start = float((low @ along).min())
     best: tuple[float, FloatArray] | None = None
     holed = False
     for share in np.arange(0.60, 0.82, 0.01):
@@ -390,21 +472,11 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
         if parts:
             holed |= any(p.is_holed for p in parts)
             points = np.concatenate([p.points for p in parts])
-            breadth = float(np.ptp(points @ across))
-            if best is None or breadth > best[0]:
-                best = breadth, points
+            breadth_here = float(np.ptp(points @ across))
+            if best is None or breadth_here > best[0]:
+                best = breadth_here, points
     if best is None:
         return None
     # The foot stands on the floor, also where a scan has no sole.
-    guess = _HOLED if holed else None
+    guess = _HOLED if holed else _noisy(slicer.noise) if slicer.noise > _NOISE_SURE else None
     return ScanMeasure(height=0.5 * float(best[1][:, 1].max()), girth=tape_around(best[1], axis)[1], guess=guess)
-
-
-def _long_way(corners: FloatArray) -> FloatArray:
-    """Return the level unit direction, forward, along which the box around a hull's corners (x, z) is narrowest."""
-    edges = np.roll(corners, -1, axis=0) - corners
-    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
-    edges *= np.where(edges[:, 1:] < 0.0, -1.0, 1.0)
-    breadth = np.ptp(corners @ np.array([edges[:, 1], -edges[:, 0]]), axis=0)
-    along = edges[int(np.argmin(breadth))]
-    return np.array([along[0], 0.0, along[1]])

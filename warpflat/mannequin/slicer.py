@@ -52,18 +52,21 @@ class Slicer:
         self.vertices = vertices
         self.triangles = triangles
         self._corners = np.ascontiguousarray(triangles.T)
+        self._along: tuple[bytes, FloatArray, FloatArray, FloatArray] | None = None
 
     def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
         """Return the connected parts of the section where normal . x = offset, longest first."""
-        d = self.vertices @ normal - offset
-        d[d == 0.0] = 1e-12
-        above = d > 0.0
-        first, second, third = (above[corners] for corners in self._corners)
-        faces = np.flatnonzero((first != second) | (first != third))
+        # Bodies are sliced many times across one direction.
+        if self._along is None or self._along[0] != normal.tobytes():
+            along = self.vertices @ normal
+            corners = along[self._corners]
+            self._along = normal.tobytes(), along, corners.min(axis=0), corners.max(axis=0)
+        _, along, low, high = self._along
+        faces = np.flatnonzero((low <= offset) & (high > offset))
         if not len(faces):
             return []
+        first, second, third = (along[corners[faces], None] > offset for corners in self._corners)
         # Two of a cut triangle's edges cross the plane: which two, by the one that does not.
-        first, second, third = first[faces, None], second[faces, None], third[faces, None]
         edges = self.face_edges[faces]
         pairs = np.where(
             first == second, edges[:, [1, 2]], np.where(second == third, edges[:, [0, 2]], edges[:, [0, 1]])
@@ -71,7 +74,7 @@ class Slicer:
         used, local = np.unique(pairs, return_inverse=True)
         local = np.ravel(local).reshape(-1, 2)
         a, b = self.edges[used].T
-        t = (d[a] / (d[a] - d[b]))[:, None]
+        t = ((along[a] - offset) / (along[a] - along[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
         label = _part_labels(len(used), local)
         segments = np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1)

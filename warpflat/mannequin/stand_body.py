@@ -6,6 +6,7 @@ carried on smoothly. So each scan becomes one closed mesh whose vertices are the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -14,28 +15,39 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.sparse import factor_symmetric
-from warpflat.mannequin.body_model import BodyModel
+from warpflat.mannequin.body_landmarks import meeting, model_places, near_level, value_at
+from warpflat.mannequin.body_model import BodyModel, finer_body, rotation_vector
 from warpflat.mannequin.fit_body import FittedBody, Mesh, fit_body, vertex_normals
-from warpflat.mannequin.slicer import Slicer
 
-__all__ = ["StandingBody", "finer_body", "lay_on_scan", "stand_body"]
+__all__ = ["StandingBody", "lay_on_scan", "stand_body"]
 
 # Moves onto the scan: how stiff the move is, and how far a place may lie [m].
 _STAGES = ((0.5, 0.03), (0.1, 0.025), (0.02, 0.02), (0.004, 0.02), (0.004, 0.02))
+# The last move, which is not smooth, is no longer than this [m]; steps of conjugate gradients for each smooth one.
+_LAST, _MOST_STEPS = 0.002, 300
+# A triangle of the scan so near to the body [m] is of the body.
+_ON = 0.008
 # How much the model counts where the scan shows nothing.
 _HOME = 0.02
 # Where arms join the trunk a place may lie so much less far, as a share.
 _WEB = 0.7
 # Head, hands and feet have few vertices, which follow the scan's lips, fingers and toes not so closely: so much stiffer.
 _DETAIL = 30.0
-# A standing body's joints are bent by no more than this [rad].
+# Where arms are raised from plumb by more than this, or a joint is bent by more, no tape is laid, and nothing is sewn [rad].
+_RAISED, _FAR_BENT = np.radians(70.0), np.radians(40.0)
+# Then a standing body's joints are bent by no more than this [rad].
 _BENT = np.radians(8.0)
+# Legs within this slope of the plumb line stand together [m per m]. Legs moved together stay so far off the midplane [m]. Below the
+# first of these heights on the mean body they do not join; above the second one, the hip's, nothing moves.
+_TOGETHER, _BETWEEN, _CROTCH, _HIP = 0.01, 0.001, 0.462, 0.505
+# Height of the hip joints as a share of the stature (Drillis and Contini 1966).
+_HIP_JOINT = 0.530
 # A fit is no good beyond a mean distance [m]; if less than a share of the scan lies beside it [m]; or if the scan shows less than a
 # share of a limb, or of a band [m] of the trunk with more than a few vertices.
 _FAR, _BESIDE, _FLOOR, _SHARED, _SEEN, _BAND, _FEW = 0.012, 0.08, 0.05, 0.7, 0.5, 0.02, 12
 _PARTS = {
-    "spine03": "the chest", "pelvis": "the pelvis", "neck01": "a head", "clavicle": "two shoulders", "upperarm01": "two upper arms",
+    "neck01": "its head: the head is missing",
+    "spine03": "the chest", "pelvis": "the pelvis", "clavicle": "two shoulders", "upperarm01": "two upper arms",
     "upperleg01": "two thighs", "lowerleg01": "two calves",
 }  # fmt: skip
 # Surfaces face the same way where their normals' product is larger than this.
@@ -44,68 +56,69 @@ _ALIKE = 0.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StandingBody:
-    """A scan's body in nearly the standard pose, facing +Z, the pelvis in the midplane, its lowest point at y = 0.
+    """A scan's body on the scan, and as its mannequin stands, its lowest point at y = 0.
 
     Attributes:
-        vertices: #V by 3 [m]. triangles: #T by 3.
-        posed: #V by 3 [m], the same vertices on the scan.
-        weights: #V by #J + 1, share of each joint in a vertex.
+        posed: #V by 3 [m], vertices of the finer body model on the scan.
+        vertices: #V by 3 [m], as the mannequin stands; `posed` itself where the scan stands so.
         seen: #V, whether the scan shows the body there.
+        armpits: by side, the vertex at which an arm joins the trunk.
+        crotch: the lowest vertex between the legs in the midplane.
+        shown: by triangle of the scan, the body's that it shows; -1 for hair, clothes, a floor and patches over holes.
         fit: of the model.
         unsure: why the scan is no such body; None if it is.
+        together: #V by 3 [m], `vertices` with the hip's flesh moved with the legs, as a tape with the legs together asks; None where they
+            stand so.
+        undone: whether arms or joints were bent so far that their pose is undone.
+        notes: on the pose, one sentence each.
         turned: whether the scan faces -Z.
     """
 
-    vertices: FloatArray
-    triangles: NDArray[np.int64]
     posed: FloatArray
-    weights: FloatArray
+    vertices: FloatArray
     seen: BoolArray
+    armpits: Mapping[str, int]
+    crotch: int
+    shown: NDArray[np.int64]
     fit: FittedBody
     unsure: str | None
+    together: FloatArray | None = None
+    undone: bool = False
+    notes: tuple[str, ...] = ()
     turned: bool = False
 
-    def slicer(self) -> Slicer:
-        """Return the plane sections of the standing body; what the scan does not show counts as patches over holes."""
-        shown = self.seen[self.triangles].any(axis=1)
-        order = np.argsort(~shown, kind="stable")
-        return Slicer(self.vertices, self.triangles[order], scanned=int(shown.sum()))
+    @property
+    def moved(self) -> bool:
+        """Whether the mannequin stands otherwise than the scan."""
+        return self.vertices is not self.posed
 
+    @property
+    def far(self) -> float:
+        """The mean distance of the model from what the scan shows of it [m]."""
+        return float(np.mean(self.fit.distance[np.isfinite(self.fit.distance)]))
 
-@lru_cache(maxsize=1)
-def finer_body() -> tuple[csr_array, NDArray[np.int64]]:
-    """Return the model subdivided once: a matrix from its vertices to the finer ones, and their triangles.
+    def shows(self, rows: NDArray[np.int64]) -> bool:
+        """Return whether the scan shows the most of some vertices."""
+        return bool(self.seen[rows].mean() > 0.5)
 
-    Source: Loop, "Smooth subdivision surfaces based on triangles", 1987, with Warren's weights.
-    """
-    from scipy.sparse import coo_array
+    def unsure_near(self, rows: NDArray[np.int64], far: float, shown: float) -> str | None:
+        """Return why a place amid some vertices is a guess: the scan shows less than a share of them, or the model lies `far` [m] off."""
+        if self.seen[rows].mean() < shown:
+            return "the scan does not show the body there"
+        distance = self.fit.distance[rows[rows < len(self.fit.distance)]]
+        mean = float(np.mean(np.minimum(distance, 2.0 * far))) if len(distance) else 0.0
+        return f"the body model lies {1000.0 * mean:.0f} mm off the scan there" if mean > far else None
 
-    model = BodyModel.load()
-    n, faces = model.count, model.triangles
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    edges, inverse = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    inverse = np.ravel(inverse)
-    far = np.roll(faces, 1, axis=1).ravel()
-    sides = np.bincount(inverse, minlength=len(edges))
-    # An inner edge's vertex takes 3/8 of its ends and 1/8 of the corners across; a border's the mean of its ends.
-    at_end = np.where(sides == 2, 0.375, 0.5)
-    half = sides[inverse] == 2
-    rows = [n + np.arange(len(edges)), n + np.arange(len(edges)), n + inverse[half]]
-    columns = [edges[:, 0], edges[:, 1], far[half]]
-    values = [at_end, at_end, np.full(int(half.sum()), 0.125)]
-    degree = np.bincount(edges.ravel(), minlength=n)
-    beta = np.where(degree == 3, 3.0 / 16.0, 3.0 / (8.0 * np.maximum(degree, 1)))
-    both = np.concatenate([edges, edges[:, ::-1]])
-    rows += [np.arange(n), both[:, 0]]
-    columns += [np.arange(n), both[:, 1]]
-    values += [1.0 - beta * degree, beta[both[:, 0]]]
-    matrix = coo_array(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(n + len(edges), n)
-    ).tocsr()
-    a, b, c = faces.T
-    ab, bc, ca = n + inverse.reshape(-1, 3).T
-    finer = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
-    return matrix, np.concatenate([np.stack(each, axis=1) for each in finer])
+    def carried(self, height: float) -> float:
+        """Return the height [m] at which what lies at a height of the scan's trunk lies on the mannequin."""
+        rows = np.flatnonzero(model_places().strips["trunk"])
+        rows = rows[np.argsort(np.abs(self.posed[rows, 1] - height))[:60]]
+        return height + float(np.mean(self.vertices[rows, 1] - self.posed[rows, 1]))
+
+    def stood(self, points: FloatArray) -> FloatArray:
+        """Return points on or near the scan (#P by 3 [m]) as they lie on the mannequin."""
+        face, weight, _ = Mesh(self.posed, finer_body()[1]).closest(points)
+        return points + np.einsum("pk,pka->pa", weight, (self.vertices - self.posed)[finer_body()[1][face]])
 
 
 @lru_cache(maxsize=1)
@@ -132,6 +145,7 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
         patched: by triangle of the scan, whether it closes a hole.
     """
     from scipy.sparse import diags_array
+    from scipy.sparse.linalg import cg
 
     finer, triangles = finer_body()
     bending, points, seen = _bending(), start, np.zeros(len(start), dtype=bool)
@@ -156,20 +170,26 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
         # What the scan does not show goes back to the model.
         along = np.where(seen, along, np.einsum("va,va->v", start - points, normals))
         weight = np.where(seen, 1.0 / (1.0 + (far / reach) ** 2) ** 2, _HOME)
-        system = diags_array(weight) + stiffness * bending
-        points = points + factor_symmetric(system)(weight * along)[:, None] * normals
+        # Diagonal preconditioning suffices: the move is wanted to a tenth of a millimetre, and the last step is exact.
+        system = (diags_array(weight) + stiffness * bending).tocsr()
+        inverse = diags_array(1.0 / system.diagonal())
+        points = points + cg(system, weight * along, rtol=1e-3, maxiter=_MOST_STEPS, M=inverse)[0][:, None] * normals
+    # Tapes are laid on the scan itself.
+    found, _, place = mesh.closest(points)
+    near = seen & (np.linalg.norm(place - points, axis=1) < _LAST)
+    points[near] = place[near]
     return points, seen
 
 
 def stand_body(
-    vertices: FloatArray, triangles: NDArray[np.int64], scanned: int | None = None, *, faces_ahead: bool = False
+    vertices: FloatArray, triangles: NDArray[np.int64], scanned: int, *, faces_ahead: bool = False
 ) -> StandingBody:
-    """Fit the model to an upright scan, lay it on the scan, and undo its pose.
+    """Fit the model to an upright scan, lay it on the scan, and undo its pose where no tape is laid in it.
 
     Args:
         vertices: #V by 3 [m].
         triangles: #T by 3, their normals all outward or all inward.
-        scanned: triangles from this one on close holes; None for none.
+        scanned: triangles from this one on close holes.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
     """
     corners = vertices[triangles]
@@ -186,19 +206,101 @@ def stand_body(
     return found
 
 
-def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], scanned: int | None) -> StandingBody:
-    model, (finer, faces) = BodyModel.load(), finer_body()
-    weights = finer @ model.weights
-    patched = np.arange(len(triangles)) >= (len(triangles) if scanned is None else scanned)
+def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], scanned: int) -> StandingBody:
+    from scipy.ndimage import gaussian_filter1d
+
+    model, (finer, faces), places = BodyModel.load(), finer_body(), model_places()
     mesh = Mesh(vertices, triangles)
-    posed, seen = lay_on_scan(finer @ model.vertices(fit.person), mesh, patched)
-    other = fit.person.standing(_BENT)
-    standing = model.rebend(fit.person, other, finer, posed)
-    standing -= [float(fit.person.place[0]), standing[:, 1].min(), 0.0]
-    unsure = _unsure(fit, mesh, model.vertices(fit.person), standing, weights, seen)
-    return StandingBody(
-        vertices=standing, triangles=faces, posed=posed, weights=weights, seen=seen, fit=fit, unsure=unsure
+    posed, seen = lay_on_scan(finer @ model.vertices(fit.person), mesh, np.arange(len(triangles)) >= scanned)
+    # A triangle of the scan shows the body's nearest one, if it lies on it and faces the same way.
+    on = Mesh(posed, faces)
+    middles = vertices[triangles].mean(axis=1)
+    shown, _, place = on.closest(middles)
+    beside = (np.linalg.norm(place - middles, axis=1) < _ON) & (
+        np.einsum("ta,ta->t", on.normals[shown], mesh.normals) > _ALIKE
     )
+    shown = np.where(beside & (np.arange(len(triangles)) < scanned), shown, -1)
+    relaxed = fit.person.standing(_BENT)
+    standing = model.rebend(fit.person, relaxed, finer, posed)
+    unsure = _unsure(fit, mesh, model.vertices(fit.person), standing, finer @ model.weights, seen)
+    armpits = {side: meeting(standing, places.mean, sign) for side, sign in (("left", 1.0), ("right", -1.0))}
+    between = places.middle[(places.mean[places.middle, 1] > 0.40) & (places.mean[places.middle, 1] < 0.52)]
+    notes = []
+    # Sleeves hang, and a tape is laid, with arms lowered and no joint bent far.
+    joints = model.joints_of(fit.person)
+    ends = [(model.joints.index(f"upperarm01.{side}"), model.joints.index(f"lowerarm01.{side}")) for side in "LR"]
+    upper = [joints[elbow] - joints[shoulder] for shoulder, elbow in ends]
+    raised = max(float(np.arccos(np.clip(-way[1] / np.linalg.norm(way), -1.0, 1.0))) for way in upper)
+    bends = np.linalg.norm(rotation_vector(fit.person.bend), axis=1)
+    bent = [
+        name
+        for name, bend in zip(model.joints, bends, strict=True)
+        if bend > _FAR_BENT and not name.startswith("upperarm")
+    ]
+    other, stands, together = fit.person, posed, None
+    if raised > _RAISED or bent:
+        other, stands = relaxed, standing - [float(fit.person.place[0]), standing[seen, 1].min(), 0.0]
+        why = (
+            f"its arms are raised by {np.degrees(raised):.0f} degrees"
+            if raised > _RAISED
+            else f"bent: {', '.join(bent)}"
+        )
+        notes.append(f"the mannequin is that of the body standing, arms lowered and joints straight ({why})")
+    # A tape around both legs of a scan measures how far apart the feet stand.
+    apart = _legs_apart(stands)
+    if apart >= _TOGETHER:
+        joint, size = (
+            model.joints_of(other)[[model.joints.index(f"upperleg01.{side}") for side in "LR"], 0],
+            np.ptp(stands[:, 1]),
+        )
+        half = 0.5 * abs(joint[0] - joint[1])
+        hip = float(value_at(near_level("hip"), stands[:, 1]))
+        before, stands, together = stands, stands.copy(), stands.copy()
+        bins = np.linspace(0.0, _CROTCH, 46)
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            x, y = sign * before[:, 0], before[:, 1]
+            # Level moves only, so that every height stays, and never farther than there is room.
+            which = np.digitize(places.mean[:, 1], bins)
+            bands = [places.strips[f"leg {side}"] & (which == band) for band in range(1, len(bins))]
+            heights = np.array([y[band].mean() for band in bands])
+            room = np.array([x[band].min() for band in bands]) - _BETWEEN
+            inwards = gaussian_filter1d(np.minimum(apart * (hip - heights), room), 1.0, mode="nearest")
+            inwards = np.minimum(inwards, room)
+            # From the crotch up flesh follows less and less, and in proportion to its distance from the midplane.
+            rows = (places.mean[:, 1] < 0.56) & (sign * places.mean[:, 0] > 0.0) & ~places.strips[f"arm {side}"]
+            rise = np.clip((places.mean[:, 1] - _CROTCH) / (_HIP - _CROTCH), 0.0, 1.0)
+            follows = np.where(rise > 0.0, np.clip(x / half, 0.0, 1.0), 1.0)
+            stands[rows, 0] -= sign * (np.interp(y, heights, inwards) * (1.0 - rise) * follows)[rows]
+            plumb = np.where(rise > 0.0, apart * np.maximum(_HIP_JOINT * size - y, 0.0), np.interp(y, heights, inwards))
+            together[rows, 0] -= sign * (plumb * follows)[rows]
+        notes.append(
+            f"the legs stand {2.0 * np.degrees(np.arctan(apart)):.0f} degrees apart; below the crotch they are moved together until "
+            "they hang plumb or touch"
+        )
+    return StandingBody(
+        posed=posed,
+        vertices=stands,
+        seen=seen,
+        armpits=armpits,
+        crotch=int(between[np.argmin(posed[between, 1])]),
+        shown=shown,
+        fit=fit,
+        unsure=unsure,
+        together=together,
+        undone=other is relaxed,
+        notes=tuple(notes),
+    )
+
+
+def _legs_apart(vertices: FloatArray) -> float:
+    """Return how far the legs' middles run apart per metre down the leg."""
+    places, y, apart = model_places(), [], []
+    for height in np.linspace(0.09, _CROTCH, 20):
+        near = np.abs(places.mean[:, 1] - height) < 0.012
+        x = [vertices[places.strips[f"leg {side}"] & near, 0] for side in ("left", "right")]
+        y.append(vertices[(places.strips["leg left"] | places.strips["leg right"]) & near, 1].mean())
+        apart.append(0.25 * (x[0].min() + x[0].max() - x[1].min() - x[1].max()))
+    return max(0.0, -float(np.polyfit(y, apart, 1)[0]))
 
 
 def _unsure(
