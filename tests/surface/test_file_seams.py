@@ -257,3 +257,13 @@ def test_a_suit_is_cut_where_its_maker_unwrapped_it() -> None:
     area = sum(Layer(piece.vertices, piece.faces).area for piece in result.pieces)
     whole = sum(Layer(layer.vertices, layer.faces).area for layer in read_garment(path, units="dm").layers)
     assert whole - area == pytest.approx(0.0087, abs=2e-4)
+
+
+@pytest.mark.skipif(not os.environ.get("WARPFLAT_DATA"), reason="WARPFLAT_DATA is not set: no real meshes")
+def test_a_narrow_strip_along_the_waist_is_a_waistband() -> None:
+    path = Path(os.environ["WARPFLAT_DATA"]) / "garments" / "Women_Skirt.usd"
+    result = found_seams(make_scene({"surface": {"file": str(path)}}, name="skirt", folder=path.parent, where="here"))
+    assert result is not None
+    assert {piece.name for piece in result.pieces} == {"front", "back", "front_waistband", "back_waistband"}
+    front, back = (next(p for p in result.pieces if p.name == f"{side}_waistband") for side in ("front", "back"))
+    assert front.vertices[:, 2].mean() > back.vertices[:, 2].mean()

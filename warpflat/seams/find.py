@@ -37,6 +37,11 @@ __all__ = ["GRAIN", "FoundSeam", "FoundSeams", "find_seams", "seam_words"]
 
 Ids = NDArray[np.int64]
 
+# A band has no more than this share of the cloth, and its border, squared, is so many times its area: 4.5 times as long as wide.
+_BAND_AREA, _BAND = 0.12, 27.0
+#: What a band is called, by the border along which it runs.
+BANDS = {"waist": "waistband", "neck": "neck_band", "sleeve": "cuff", "leg": "cuff"}
+
 # Pieces are alike if sizes, outlines and extents agree within this share.
 _ALIKE = 0.015
 
@@ -354,6 +359,12 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
             name = anatomy.kind if anatomy.kind not in ("other", "closed") else "piece"
         else:
             name = "piece"
+        if band := _band(cloth, mesh):
+            # What lies ahead of the middle is in front, whichever way the faces of a band point.
+            middle = (cloth.vertices[corners].mean(axis=1) * weight[:, None]).sum(axis=0) / weight.sum()
+            ahead = float((middle - 0.5 * (cloth.vertices.min(axis=0) + cloth.vertices.max(axis=0))) @ anatomy.front)
+            part = side_word(side) if lopsided else "front" if ahead > 0.0 else "back"
+            name = f"{part}_{band}" if sum(_band(cloth, other) == band for other in meshes) > 1 else band
         plain.append(name)
         both_sides[name] += 1
     seen = Counter[str]()
@@ -362,6 +373,21 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
         seen[name] += 1
         names.append(f"{name}_{seen[name]}" if both_sides[name] > 1 else name)
     return names
+
+
+def _band(cloth: Cloth, mesh: PieceMesh) -> str:
+    """Return what a piece is called that is a narrow strip along the waist, the neck, a sleeve's or a leg's end; "" for others."""
+    area = float(cloth.face_areas[mesh.face_of].sum())
+    around = sum(
+        float(np.linalg.norm(np.diff(mesh.vertices[np.append(loop, loop[0])], axis=0), axis=1).sum())
+        for loop in border_loops(mesh.faces.astype(np.int32))
+    )
+    if "role" not in cloth.values or area > _BAND_AREA * float(cloth.face_areas.sum()) or around**2 < _BAND * area:
+        return ""
+    roles = np.round(cloth.values["role"][mesh.vertex_of]).astype(int)
+    names = [ROLES[number - 1] for number in roles[roles > 0].tolist()]
+    most = max(BANDS, key=names.count)
+    return BANDS[most] if names.count(most) > 2 else ""
 
 
 def _alike(pieces: Sequence[Surface]) -> list[str]:
