@@ -151,6 +151,8 @@ def _paths(
     edge = surface.vertices[cloths[layer].half_edges.edges]
     drawn = np.array([*given, given[0]] if cut.closed else given)
     length = arc_lengths(drawn)
+    if length[-1] == 0.0:
+        raise InputError("all points of its line are one place; a line has two or more")
     step = max(_STEP * float(np.linalg.norm(edge[:, 1] - edge[:, 0], axis=1).mean()), float(length[-1]) / _MOST_STEPS)
     # The corners of the line, and places between them.
     fine = [np.linspace(a, b, max(1, round(float(b - a) / step)), endpoint=False) for a, b in pairwise(length) if b > a]
