@@ -137,3 +137,9 @@ def test_a_band_that_is_shorter_than_its_edge_is_stretched():
         if "bands" in step and "edges" in step
     ]
     assert step.endswith("stretch the neck band).")
+
+
+def test_nothing_ends_at_a_zip_that_is_not_there():
+    facing = Finishing(kind="facing", edge="neck", width=0.05)
+    pattern = finish_edges(top(SeamOpening(kind="buttons", length=0.2)), [facing], gaps=["centre back"])
+    assert not any("zip" in step for step in sewing_steps(draft_garment(pattern), ""))

@@ -13,6 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.mannequin.body_landmarks import ARM_PLACES, model_places, near_level, near_place, value_at
 from warpflat.mannequin.measurements import size_tables
 from warpflat.mannequin.profiles import convex_girth
+from warpflat.mannequin.scan_pose import LANDMARKS
 from warpflat.mannequin.scan_sections import OUTLINES, BodySections, smooth, tape_around
 from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.stand_body import StandingBody
@@ -199,20 +200,7 @@ def find_levels(
         found[name] = ScanLevel(height=height)
         if name in ("knee", "ankle"):
             found[f"leg_{name}"] = found[name]
-    order = [
-        "ankle",
-        "knee",
-        "thigh",
-        "hip",
-        "abdomen",
-        "waist",
-        "underbust",
-        "bust",
-        "armpit",
-        "front_neck",
-        "side_neck",
-    ]
-    for under, over in itertools.pairwise(order):
+    for under, over in itertools.pairwise(LANDMARKS):
         if found[over].height - found[under].height < 0.004 * size:
             raise InputError(
                 f"scan: {over} ({found[over].height:.3f} m) does not lie above {under} ({found[under].height:.3f} m); "

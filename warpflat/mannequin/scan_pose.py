@@ -17,12 +17,13 @@ from warpflat.mannequin.slicer import Slicer
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
-__all__ = ["ScanOptions", "turn_scan_upright"]
+__all__ = ["LANDMARKS", "ScanOptions", "turn_scan_upright"]
 
 _UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 _AXES = {s + a: sign * np.eye(3)["xyz".index(a)] for s, sign in (("+", 1.0), ("-", -1.0)) for a in "xyz"}
 _STATURE = (0.9, 2.3)
-_LANDMARKS = (
+#: Levels that a user may give, from the floor up.
+LANDMARKS = (
     "ankle",
     "knee",
     "thigh",
@@ -72,8 +73,8 @@ class ScanOptions:
         if self.up and self.facing and self.up[1] == self.facing[1]:
             raise InputError(f"scan: up {self.up} and facing {self.facing} lie on one axis; give two different ones")
         for name, height in self.landmarks.items():
-            if name not in _LANDMARKS:
-                raise InputError(f"scan landmark {name!r} is unknown: {nearest(name, _LANDMARKS)}")
+            if name not in LANDMARKS:
+                raise InputError(f"scan landmark {name!r} is unknown: {nearest(name, LANDMARKS)}")
             if not 0.0 < height < _STATURE[1]:
                 raise InputError(f"scan landmark {name} = {height:g} m: a height above the floor, 0 to {_STATURE[1]} m")
 

@@ -165,7 +165,13 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     # Edges of linings and facings that no seam takes: they end at a zip, are caught in a binding, or are finished by themselves.
     free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
     shell = {piece.name: piece.piece for piece in pieces if piece.piece.role == "shell"}
-    zipped = {side.edge for seam in garment.garment.seams for row in seam.sides for side in row if seam.openings}
+    zipped = {
+        side.edge
+        for seam in garment.garment.seams
+        for row in seam.sides
+        for side in row
+        if any(each.kind == "zip" for each in seam.openings)
+    }
     bound = {
         without_side(side.edge)
         for seam in garment.garment.seams

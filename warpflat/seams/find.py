@@ -332,9 +332,9 @@ def _faces_beside(cloth: Cloth) -> Mapping[tuple[int, int], list[int]]:
 def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[str]:
     """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
     area = cloth.face_areas
-    plain = []
+    plain, bands = [], [_band(cloth, mesh) for mesh in meshes]
     both_sides = Counter[str]()
-    for mesh in meshes:
+    for mesh, band in zip(meshes, bands, strict=True):
         weight = area[mesh.face_of]
         corners = cloth.faces[mesh.face_of]
         facing = cloth.values.get(FACING, np.zeros(len(cloth.vertices)))
@@ -359,12 +359,12 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
             name = anatomy.kind if anatomy.kind not in ("other", "closed") else "piece"
         else:
             name = "piece"
-        if band := _band(cloth, mesh):
+        if band:
             # What lies ahead of the middle is in front, whichever way the faces of a band point.
             middle = (cloth.vertices[corners].mean(axis=1) * weight[:, None]).sum(axis=0) / weight.sum()
             ahead = float((middle - 0.5 * (cloth.vertices.min(axis=0) + cloth.vertices.max(axis=0))) @ anatomy.front)
             part = side_word(side) if lopsided else "front" if ahead > 0.0 else "back"
-            name = f"{part}_{band}" if sum(_band(cloth, other) == band for other in meshes) > 1 else band
+            name = f"{part}_{band}" if bands.count(band) > 1 else band
         plain.append(name)
         both_sides[name] += 1
     seen = Counter[str]()
