@@ -3,8 +3,9 @@
     python benchmarks/gpu.py [--device cuda:0] [--sizes 40000 160000 1000000] [--blocks 1 32 256] [--skip-tests] [--json FILE]
 
 Every figure is the second of two runs, in wall-clock seconds, since the first one compiles. A difference of energies is relative to the
-CPU's; above 1e-4 it ends with 1. Of a drape it is the mean distance to the designed surface [m]. `block` is the basic block of EU 38: flattened and sewn, so many times; then one of them draped. What no
-kernel does stays on the host on any device: reading, development, the factor and its solutions (SciPy), topology, drafting and files.
+CPU's; above 1e-4 it ends with 1. Of a drape it is the mean distance to the designed surface [m]. `block` is the basic block of EU 38:
+flattened and sewn, so many times; then one of them is draped. What no kernel does stays on the host on any device: reading, development,
+the factor and its solutions (SciPy), topology, drafting and files.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -96,11 +98,14 @@ def main() -> int:
     print(f"{'':28} {'CPU [s]':>9} {'device [s]':>11} {'ratio':>6} {'energy [J]':>12} {'apart':>8}")
     for name, job in jobs(chosen.sizes, chosen.blocks):
         (on_cpu, (_, energy)), (on_device, (_, other)) = (
-            second_of_two(lambda device=device: job(device)) for device in ("cpu", chosen.device)
+            second_of_two(partial(job, device)) for device in ("cpu", chosen.device)
         )
         apart = abs(other / energy - 1.0)
         failed |= apart > TOLERANCE
-        print(f"{name:28} {on_cpu:9.2f} {on_device:11.2f} {on_cpu / on_device:6.2f} {energy:12.6g} {apart:8.1e}", flush=True)
+        print(
+            f"{name:28} {on_cpu:9.2f} {on_device:11.2f} {on_cpu / on_device:6.2f} {energy:12.6g} {apart:8.1e}",
+            flush=True,
+        )
         rows.append({"job": name, "cpu_s": on_cpu, "device_s": on_device, "energy_j": energy, "apart": apart})
     if chosen.json:
         chosen.json.write_text(json.dumps(rows, indent=1) + "\n")
