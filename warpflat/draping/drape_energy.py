@@ -149,9 +149,10 @@ class DrapeEnergy:
 
         Args:
             positions: #V by 3, where the cloth is [m].
-            near: whether rest is near, for steps by Newton's method; else the metric is stiffer, for L-BFGS.
+            near: whether rest is near; else the metric is stiffer.
         """
-        factor = factor_symmetric(self.stiffness(positions, near=near))
+        # Single precision takes two thirds of the time.
+        factor = factor_symmetric(self.stiffness(positions, near=near), dtype=np.float32)
         self._solve = lambda force: factor(force.ravel()).reshape(-1, 3)
 
     def stiffness(self, positions: FloatArray, *, near: bool = True) -> csc_array:
