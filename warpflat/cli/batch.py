@@ -28,7 +28,7 @@ _BAR = "{desc}: {n_fmt}/{total_fmt} tasks |{bar:20}| [{elapsed}, {remaining} lef
 
 @click.command(cls=ComputingCommand, epilog=f"{_FILES}\n\n{EXIT_CODES}")
 @click.argument("file", metavar="BATCH.toml", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder.  [default: out/NAME]")
+@click.option("--out", "-o", type=click.Path(path_type=Path), metavar="DIR", help="Folder.  [default: out/NAME]")
 @click.option(
     "--workers", type=click.IntRange(1, 1000), default=1, metavar="N", help="Processes on this machine.  [default: 1]"
 )

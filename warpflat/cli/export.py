@@ -38,6 +38,7 @@ __all__ = ["export"]
 )
 @click.option(
     "--out",
+    "-o",
     type=click.Path(path_type=Path),
     metavar="DIR",
     help="Folder for the files.  [default: the run's, or out/NAME of a file of GarmentCode]",

@@ -31,7 +31,7 @@ __all__ = ["mannequin"]
 @click.option(
     "--resolution", type=click.FloatRange(2, 40), metavar="MM", help="Wished edge of the quads.  [default: 10]"
 )
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="[default: out/mannequin]")
+@click.option("--out", "-o", type=click.Path(path_type=Path), metavar="DIR", help="[default: out/mannequin]")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 @click.option("--json", "as_json", is_flag=True, help="Print metrics.json on standard output, nothing else.")
 def mannequin(

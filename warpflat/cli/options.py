@@ -70,6 +70,7 @@ def output_options(
     options = [
         click.option(
             "--out",
+            "-o",
             type=click.Path(path_type=Path),
             metavar="DIR",
             help=f"Folder for the files.  [default: {folder}]",

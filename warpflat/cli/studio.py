@@ -30,6 +30,7 @@ _BLOCK = {
 @click.option("--port", type=click.IntRange(1, 65535), default=8220, show_default=True, help="Port to serve on.")
 @click.option(
     "--out",
+    "-o",
     type=click.Path(path_type=Path),
     default=Path("out"),
     metavar="DIR",
