@@ -293,12 +293,16 @@ class Cloth:
         seam = self.seam_edges()
         return components(self.faces.astype(np.int32), barrier=seam.astype(np.int32)).astype(np.int64)
 
-    def pieces(self) -> Iterator[PieceMesh]:
-        """Yield the pieces that the seams leave, vertices doubled where a seam has cloth of one piece on both sides."""
+    def pieces(self, among: BoolArray | None = None) -> Iterator[PieceMesh]:
+        """Yield the pieces that the seams leave, vertices doubled where a seam has cloth of one piece on both sides.
+
+        Args:
+            among: #F, only those pieces that have some of these faces; all if not given.
+        """
         part, seam = self.parts(), self.seam_edges()
         stride = np.int64(len(self.vertices))
         cut = set((seam[:, 0] * stride + seam[:, 1]).tolist())
-        for number in range(int(part.max()) + 1):
+        for number in np.unique(part if among is None else part[among]).tolist():
             chosen = np.flatnonzero(part == number)
             faces = self.faces[chosen]
             # Corners at a vertex are one vertex where faces share an edge there that is not cut.
