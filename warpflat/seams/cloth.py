@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -59,7 +60,7 @@ class Cloth:
     labels: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     seams: Mapping[str, Ids] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def half_edges(self) -> HalfEdges:
         """The half-edges of the faces."""
         return half_edges(self.faces.astype(np.int32))

@@ -295,22 +295,28 @@ def _priced(
         mate = other_side(name)
         return [name, mate] if mate != name and mate in cloth.seams else [name]
 
+    def of_equal_price(name: str) -> list[str]:
+        return group_of(name) if anatomy.mirror is not None or name.startswith(SOLID) else [name]
+
     waiting = list[str]()
     for name in sorted(cloth.seams, key=lambda one: _length(cloth, one), reverse=True):
-        of_equal_price = group_of(name) if anatomy.mirror is not None or name.startswith(SOLID) else [name]
-        if not any(one in waiting for one in of_equal_price):
+        if not any(one in waiting for one in of_equal_price(name)):
             waiting.append(name)
     closed = True
     while waiting and closed:
         closed = False
         cloth = _remembered(cloth, pieces)
+        for name in waiting:
+            found |= {
+                one: Trial(name=one, released=None, outside=0.0, needed="opens a tube") for one in of_equal_price(name)
+            }
+        waiting = [name for name in waiting if not _opens_a_tube(cloth, [name])]
         price = partial(_without, cloth, pieces=pieces, anatomy=anatomy, fabric=fabric, prepare=prepare)
         # Until one of them is closed, no price depends on another.
         for name, (trial, new) in zip(tuple(waiting), two_at_a_time(price, [[name] for name in waiting]), strict=False):
             waiting.remove(name)
             both = group_of(name)
-            for one in both if anatomy.mirror is not None or name.startswith(SOLID) else both[:1]:
-                found[one] = replace(trial, name=one)
+            found |= {one: replace(trial, name=one) for one in of_equal_price(name)}
             # What closed things are made of must lie within its limit, no more.
             most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
             kept = name.startswith(_STRUCTURAL) or any(options.keeps(one) for one in both)
@@ -355,15 +361,10 @@ def _without(
         energy_left: how well the energy is known, as a share.
     """
     report_activity(f"seams: what {names[0]} is worth")
-    closed = cloth
-    for name in names:
-        closed = closed.without_seam(name)
     needed = Trial(name=names[0], released=None, outside=0.0, needed="opens a tube")
-    ends = np.concatenate([cloth.seams[name] for name in names])
-    beside = np.isin(cloth.faces, ends).sum(axis=1) >= 2
-    joined = set(cloth.labels[_OWNER][beside].tolist())
-    if any(not _is_disk(mesh.faces) for mesh in closed.pieces(np.isin(cloth.labels[_OWNER], list(joined)))):
+    if _opens_a_tube(cloth, names):
         return needed, []
+    closed, joined = _closed(cloth, names)
     before = [piece for number, piece in enumerate(pieces) if number in joined]
     try:
         # What costs much need not be known well: joined pieces are large, and far from rest.
@@ -376,6 +377,20 @@ def _without(
     total = sum(one.area for one in pieces)
     gain = (sum(one.outside for one in after) - sum(one.outside for one in before)) / total
     return Trial(name=names[0], released=released, outside=gain), after
+
+
+def _closed(cloth: Cloth, names: Sequence[str]) -> tuple[Cloth, set[int]]:
+    """Return the cloth with seams closed, and the numbers of the pieces beside them (see `_remembered`)."""
+    beside = np.isin(cloth.faces, np.concatenate([cloth.seams[name] for name in names])).sum(axis=1) >= 2
+    for name in names:
+        cloth = cloth.without_seam(name)
+    return cloth, set(cloth.labels[_OWNER][beside].tolist())
+
+
+def _opens_a_tube(cloth: Cloth, names: Sequence[str]) -> bool:
+    """Return whether the cloth without seams has a piece that is no disk."""
+    closed, joined = _closed(cloth, names)
+    return not all(_is_disk(mesh.faces) for mesh in closed.pieces(np.isin(cloth.labels[_OWNER], list(joined))))
 
 
 def _remembered(cloth: Cloth, pieces: Sequence[_Measured]) -> Cloth:
