@@ -123,12 +123,19 @@ class Beside(Generic[Result]):
 
 def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
     """Yield what a function makes of items, in their order, every other one in a process of its own."""
+
+    def on_one_core(item: Item) -> Result:
+        from warpflat.core.launch import on_one_thread
+
+        with on_one_thread():
+            return function(item)
+
     rest = iter(items)
     for item in rest:
         following = list(islice(rest, 1))
         with ExitStack() as stack:
-            others = [stack.enter_context(Beside(partial(function, other))) for other in following]
-            yield function(item)
+            others = [stack.enter_context(Beside(partial(on_one_core, other))) for other in following]
+            yield (on_one_core if any(other.process for other in others) else function)(item)
             for other in others:
                 yield other.result()
 
