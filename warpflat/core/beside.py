@@ -10,9 +10,11 @@ import os
 import pickle
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -21,8 +23,9 @@ from warpflat.core.input_files import listening_to_reads, note_read
 from warpflat.core.output import leave_out, listening_to_left_out
 from warpflat.core.threads import thread_count
 
-__all__ = ["Beside", "work_beside"]
+__all__ = ["Beside", "two_at_a_time", "work_beside"]
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 # PR_SET_PDEATHSIG of Linux's prctl.
@@ -116,6 +119,25 @@ class Beside(Generic[Result]):
         os.close(self._pipe)
         with suppress(ChildProcessError):
             os.waitpid(child, 0)
+
+
+def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Yield what a function makes of items, in their order, every other one in a process of its own."""
+
+    def on_one_core(item: Item) -> Result:
+        from warpflat.core.launch import on_one_thread
+
+        with on_one_thread():
+            return function(item)
+
+    rest = iter(items)
+    for item in rest:
+        following = list(islice(rest, 1))
+        with ExitStack() as stack:
+            others = [stack.enter_context(Beside(partial(on_one_core, other))) for other in following]
+            yield (on_one_core if any(other.process for other in others) else function)(item)
+            for other in others:
+                yield other.result()
 
 
 def _can_fork() -> bool:

@@ -16,8 +16,9 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
+from contextlib import contextmanager
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -28,7 +29,7 @@ import warp as wp
 from warpflat.core.compile import compile_common_modules, kernel_cache_errors, start_warp
 from warpflat.core.threads import thread_count
 
-__all__ = ["Launch", "Sequence", "launch_each", "record", "split_range"]
+__all__ = ["Launch", "Sequence", "launch_each", "on_one_thread", "record", "split_range"]
 
 Command = Callable[[], None]
 
@@ -218,6 +219,18 @@ def _error_of(command: Command) -> BaseException | None:
 
 
 _pool = _Pool()
+
+
+@contextmanager
+def on_one_thread() -> Iterator[None]:
+    """Run kernels on the caller's thread in the block: for processes that work beside each other."""
+    pool = _pool
+    mine = pool.busy.acquire(blocking=False)
+    try:
+        yield
+    finally:
+        if mine:
+            pool.busy.release()
 
 
 def _begin_anew() -> None:

@@ -30,7 +30,7 @@ still the matrix of the approximate implicit step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -112,6 +112,11 @@ class SpringNetwork:
     cloth: Cloth | None = field(init=False, default=None)
     seams: Seams | None = field(init=False, default=None)
     bonds: Bonds = field(init=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let another process have it, which makes the structs anew."""
+        given = {each.name: getattr(self, each.name) for each in fields(self) if each.init and each.name != "device"}
+        return _make_network, (self.device.alias, given)
 
     @classmethod
     def build(
@@ -331,6 +336,10 @@ class SpringNetwork:
     def spring_count(self) -> int:
         """The number of springs, #S."""
         return self.spring_arrays.count
+
+
+def _make_network(device: str, given: dict[str, Any]) -> SpringNetwork:
+    return SpringNetwork(device=wp.get_device(device), **given)
 
 
 def _on(device: wp.Device, values: NDArray[np.generic], dtype: type) -> wp.array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -59,7 +60,7 @@ class Cloth:
     labels: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     seams: Mapping[str, Ids] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def half_edges(self) -> HalfEdges:
         """The half-edges of the faces."""
         return half_edges(self.faces.astype(np.int32))
@@ -293,12 +294,16 @@ class Cloth:
         seam = self.seam_edges()
         return components(self.faces.astype(np.int32), barrier=seam.astype(np.int32)).astype(np.int64)
 
-    def pieces(self) -> Iterator[PieceMesh]:
-        """Yield the pieces that the seams leave, vertices doubled where a seam has cloth of one piece on both sides."""
+    def pieces(self, among: BoolArray | None = None) -> Iterator[PieceMesh]:
+        """Yield the pieces that the seams leave, vertices doubled where a seam has cloth of one piece on both sides.
+
+        Args:
+            among: #F, only those pieces that have some of these faces; all if not given.
+        """
         part, seam = self.parts(), self.seam_edges()
         stride = np.int64(len(self.vertices))
         cut = set((seam[:, 0] * stride + seam[:, 1]).tolist())
-        for number in range(int(part.max()) + 1):
+        for number in np.unique(part if among is None else part[among]).tolist():
             chosen = np.flatnonzero(part == number)
             faces = self.faces[chosen]
             # Corners at a vertex are one vertex where faces share an edge there that is not cut.

@@ -5,14 +5,17 @@ Seams that cost nothing are closed again; darts and seams that release enough ar
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.beside import two_at_a_time
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.cutting.ledger import coarse_options
@@ -27,7 +30,9 @@ from warpflat.seams.solid import SOLID
 from warpflat.seams.symmetric import other_side
 from warpflat.seams.tailor import FACING, LEFT, side_word
 from warpflat.solver.options import RelaxOptions
+from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.surface.injective import is_injective
 from warpflat.surface.mesh import Surface
 
 __all__ = ["Trial", "cut_by_energy"]
@@ -74,6 +79,8 @@ _NOTHING, _NO_ENERGY, _NO_DENSITY = 1.5e-3, 0.02, 1e-2
 _EQUAL = 0.015
 # Seams that a garment keeps even so: it is put together at them.
 _STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm")
+# Labels of faces: the number that each had when its piece was measured, and that piece's.
+_FACE, _OWNER = "face before", "piece before"
 # Names of a seam on trial, and of its mirror image.
 _TRIAL, _MATE = "on trial", "on trial, mirrored"
 # Prices are known to this share, what is made to the second.
@@ -120,7 +127,10 @@ class _Candidate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Measured:
-    """A piece, flattened coarsely; `mirrored` if it was its mirror image that was flattened."""
+    """A piece, flattened coarsely; `mirrored` if it was its mirror image that was flattened.
+
+    `mesh` is that of the cloth as it was when the piece was measured (see `_remembered`).
+    """
 
     mesh: PieceMesh
     surface: Surface
@@ -158,7 +168,7 @@ def cut_by_energy(
         # What is as tight as a skin has a panel more in each leg, a jacket two in each sleeve.
         most += 2
     for _ in range(_MOST_ROUNDS):
-        beyond, energy = sum(piece.outside for piece in pieces), sum(piece.energy for piece in pieces)
+        beyond = sum(piece.outside for piece in pieces)
         if beyond <= options.limit * total:
             break
         worst = next(
@@ -180,56 +190,67 @@ def cut_by_energy(
             break
         twin, now = _twin(worst, pieces, anatomy), len(pieces)
         good = list[tuple[float, _Candidate, Cloth, list[_Measured]]]()
-
-        laid = _with_layout(cloth, worst)
+        cloth = _remembered(cloth, pieces)
         least = max(_WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
-        for candidate in _candidates(cloth, worst, anatomy, may_part=parting and now < most):
-            if options.forbids(candidate.name):
-                continue
-            tried += 1
+        number = next(k for k, piece in enumerate(pieces) if piece is worst)
+        candidates = [
+            candidate
+            for candidate in _candidates(cloth, worst, anatomy, may_part=parting and now < most)
+            if not options.forbids(candidate.name)
+        ]
+
+        def on_trial(
+            candidate: _Candidate, worst: _Measured = worst, twin: _Measured | None = twin, number: int = number,
+            cloth: Cloth = cloth, pieces: Sequence[_Measured] = pieces,
+        ) -> tuple[Cloth, list[_Measured]] | None:  # fmt: skip
             report_activity(f"seams: trying {candidate.name}")
-            made = _cut(laid, worst.mesh, candidate, _TRIAL)
+            made = _cut(cloth, worst.mesh, candidate, _TRIAL)
             if made is None:
-                continue
+                return None
             if twin is None and _is_lopsided(candidate, anatomy):
                 # Both sides of a piece are cut alike.
                 target = _mesh_at(made, worst.mesh)
                 made = (None if target is None else _cut(made, target, _mirrored(candidate, anatomy), _MATE)) or made
             # Where a twin is cut alike, it adds as many.
-            more = (int(made.parts().max()) + 1 - now) * (1 if twin is None else 2)
-            if more and now + more > most:
-                continue
+            more = (int(made.parts().max()) + 1 - len(pieces)) * (1 if twin is None else 2)
+            if more and len(pieces) + more > most:
+                return None
             try:
-                after = _measured(made, anatomy, fabric, prepare, pieces)
+                return made, _measured(made, anatomy, fabric, prepare, pieces, changed={number})
             except InputError:
+                return None
+
+        for candidate, trial in zip(candidates, two_at_a_time(on_trial, candidates), strict=False):
+            tried += 1
+            if trial is None:
                 continue
-            new = [piece for piece in after if all(piece.result is not one.result for one in pieces)]
-            if sum(piece.energy for piece in after) >= energy:
+            made, new = trial
+            if sum(piece.energy for piece in new) >= worst.energy:
                 continue
             if not _can_be_sewn(made, candidate, worst, new, anatomy.size):
                 continue
-            gain = beyond - sum(piece.outside for piece in after)
+            gain = worst.outside - sum(piece.outside for piece in new)
             if gain >= least:
-                good.append((gain, candidate, made, after))
+                good.append((gain, candidate, made, new))
                 if gain >= _ENOUGH * worst.outside and not candidate.parts:
                     break
         best: tuple[float, _Candidate, Cloth, list[_Measured]] | None = None
-        good.sort(key=lambda one: _value(one[0], one[2], len(one[3]) - now), reverse=True)
-        for gain, candidate, made, after in good[:_SEWN_ON_TRIAL]:
-            gain -= _strained_by_sewing(made, after)
-            value = _value(gain, made, len(after) - now)
-            if gain >= least and (best is None or value > best[0]):
-                best = value, candidate, made, after
+        good.sort(key=lambda one: _value(one[0], one[2], len(one[3]) - 1), reverse=True)
+        chosen = good[:_SEWN_ON_TRIAL]
+        strained = two_at_a_time(lambda one: _strained_by_sewing(one[2], one[3]), chosen)
+        for (gain, candidate, made, new), loss in zip(chosen, strained, strict=True):
+            value = _value(gain - loss, made, len(new) - 1)
+            if gain - loss >= least and (best is None or value > best[0]):
+                best = value, candidate, made, new
         if best is None:
             exhausted.add(_key(worst.mesh))
             if twin is not None:
                 exhausted.add(_key(twin.mesh))
             continue
-        _, candidate, made, after = best
+        _, candidate, made, new = best
         both = anatomy.mirror is not None and (twin is not None or _is_lopsided(candidate, anatomy))
         side = 0 if not both else _side_of(worst.mesh, anatomy) if twin is not None else _across(candidate, anatomy)
         names = [_free_name(cloth, candidate, side)]
-        made = replace(made, values={key: value for key, value in made.values.items() if not key.startswith("flat ")})
         cloth = _renamed(made, _TRIAL, names[0])
         if both:
             names.append(_free_name(cloth, candidate, -side))
@@ -240,11 +261,12 @@ def cut_by_energy(
                 other = None if target is None else _cut(cloth, target, _mirrored(candidate, anatomy), names[1])
                 names = names if other is not None else names[:1]
                 cloth = other or cloth
-        before, pieces = pieces, _measured(cloth, anatomy, fabric, prepare, [*pieces, *after])
+        before, pieces = pieces, _measured(cloth, anatomy, fabric, prepare, [*pieces, *new])
         gain = (sum(one.outside for one in before) - sum(one.outside for one in pieces)) / total
         released = sum(one.energy for one in before) - sum(one.energy for one in pieces)
         trials += [Trial(name=name, released=released / len(names), outside=gain / len(names)) for name in names]
-    return cloth, trials, sum(piece.outside for piece in pieces) / total
+    labels = {key: label for key, label in cloth.labels.items() if key not in (_FACE, _OWNER)}
+    return replace(cloth, labels=labels), trials, sum(piece.outside for piece in pieces) / total
 
 
 def _priced(
@@ -262,72 +284,186 @@ def _priced(
     area, energy = sum(one.area for one in pieces), sum(one.energy for one in pieces)
     outside = sum(one.outside for one in pieces)
     found: dict[str, Trial] = {}
-    for name in sorted(cloth.seams, key=lambda one: _length(cloth, one), reverse=True):
-        if name in found or name not in cloth.seams:
-            continue
-        report_activity(f"seams: what {name} is worth")
-        mate = other_side(name)
-        both = [name, mate] if mate != name and mate in cloth.seams else [name]
-        alike = anatomy.mirror is not None and len(both) == 2
+
+    def group_of(name: str) -> list[str]:
+        """Return the seams that are closed together with one."""
         if name.startswith(SOLID):
             # What lies between equal pieces: they stay equal, and are drawn once.
             long = _length(cloth, name)
-            both = [
-                one for one in cloth.seams if one.startswith(SOLID) and abs(_length(cloth, one) - long) < _EQUAL * long
-            ]
-            alike = True
-        trial, after = _without(cloth, both[:1], pieces, anatomy, fabric, prepare)
-        for one in both if alike else both[:1]:
-            found[one] = replace(trial, name=one)
-        # What closed things are made of must lie within its limit, no more.
-        most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
-        kept = name.startswith(_STRUCTURAL) or any(options.keeps(one) for one in both)
-        if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
-            continue
-        # Before it is closed, it is known well: the layout of what is joined is far from rest.
-        trial, after = _without(cloth, both, pieces, anatomy, fabric, prepare, energy_left=_TRIAL_LEFT)
-        now = sum(one.outside for one in after)
-        if (
-            trial.released is None
-            or trial.released > len(both) * most
-            or now > max(outside + _NOTHING * area, options.limit * area)
-        ):
-            continue
-        for one in both:
-            cloth = cloth.without_seam(one)
-            found.pop(one, None)
-        pieces, outside, energy = after, now, energy + trial.released
+            alike = [one for one in cloth.seams if one.startswith(SOLID) and one != name]
+            return [name, *(one for one in alike if abs(_length(cloth, one) - long) < _EQUAL * long)]
+        mate = other_side(name)
+        return [name, mate] if mate != name and mate in cloth.seams else [name]
+
+    def of_equal_price(name: str) -> list[str]:
+        return group_of(name) if anatomy.mirror is not None or name.startswith(SOLID) else [name]
+
+    waiting = list[str]()
+    for name in sorted(cloth.seams, key=lambda one: _length(cloth, one), reverse=True):
+        if not any(one in waiting for one in of_equal_price(name)):
+            waiting.append(name)
+    closed = True
+    while waiting and closed:
+        closed = False
+        cloth = _remembered(cloth, pieces)
+        for name in waiting:
+            found |= {
+                one: Trial(name=one, released=None, outside=0.0, needed="opens a tube") for one in of_equal_price(name)
+            }
+        waiting = [name for name in waiting if not _opens_a_tube(cloth, [name])]
+        price = partial(_without, cloth, pieces=pieces, anatomy=anatomy, fabric=fabric, prepare=prepare)
+        # Until one of them is closed, no price depends on another.
+        for name, (trial, new) in zip(tuple(waiting), two_at_a_time(price, [[name] for name in waiting]), strict=False):
+            waiting.remove(name)
+            both = group_of(name)
+            found |= {one: replace(trial, name=one) for one in of_equal_price(name)}
+            # What closed things are made of must lie within its limit, no more.
+            most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
+            kept = name.startswith(_STRUCTURAL) or any(options.keeps(one) for one in both)
+            if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
+                continue
+            # Before it is closed, it is known well: the layout of what is joined is far from rest.
+            trial, new = price(both, energy_left=_TRIAL_LEFT)
+            now = outside + trial.outside * area
+            if (
+                trial.released is None
+                or trial.released > len(both) * most
+                or now > max(outside + _NOTHING * area, options.limit * area)
+            ):
+                continue
+            for one in both:
+                cloth = cloth.without_seam(one)
+                found.pop(one, None)
+            pieces = _measured(cloth, anatomy, fabric, prepare, [*pieces, *new])
+            outside, energy = sum(one.outside for one in pieces), sum(one.energy for one in pieces)
+            waiting, closed = [one for one in waiting if one in cloth.seams], True
+            break
     return cloth, pieces, [found[name] for name in cloth.seams if name in found]
 
 
 def _without(
     cloth: Cloth,
     names: Sequence[str],
-    pieces: list[_Measured],
+    *,
+    pieces: Sequence[_Measured],
     anatomy: Anatomy,
     fabric: Fabric,
     prepare: Prepare,
-    *,
     energy_left: float = _PRICE_LEFT,
 ) -> tuple[Trial, list[_Measured]]:
-    """Return what seams do, by the pieces that there were without them, and these pieces."""
-    closed = cloth
-    for name in names:
-        closed = closed.without_seam(name)
+    """Return what seams do, by the pieces that there were without them, and those pieces that are new.
+
+    Args:
+        cloth: as the pieces remember it (see `_remembered`).
+        names: of the seams.
+        pieces: all of it.
+        anatomy, fabric, prepare: see `cut_by_energy`.
+        energy_left: how well the energy is known, as a share.
+    """
+    report_activity(f"seams: what {names[0]} is worth")
     needed = Trial(name=names[0], released=None, outside=0.0, needed="opens a tube")
-    if any(not _is_disk(mesh.faces) for mesh in closed.pieces()):
-        return needed, pieces
+    if _opens_a_tube(cloth, names):
+        return needed, []
+    closed, joined = _closed(cloth, names)
+    before = [piece for number, piece in enumerate(pieces) if number in joined]
     try:
         # What costs much need not be known well: joined pieces are large, and far from rest.
-        after = _measured(closed, anatomy, fabric, prepare, pieces, energy_left=energy_left)
+        after = _measured(closed, anatomy, fabric, prepare, pieces, changed=joined, energy_left=energy_left)
     except InputError:
-        return replace(needed, needed="cannot lie flat without it"), pieces
-    if sum(one.result.overlap for one in after) > sum(one.result.overlap for one in pieces) + _OVERLAP:
-        return replace(needed, needed="lies over itself without it"), pieces
-    released = sum(one.energy for one in after) - sum(one.energy for one in pieces)
+        return replace(needed, needed="cannot lie flat without it"), []
+    if sum(one.result.overlap for one in after) > sum(one.result.overlap for one in before) + _OVERLAP:
+        return replace(needed, needed="lies over itself without it"), []
+    released = sum(one.energy for one in after) - sum(one.energy for one in before)
     total = sum(one.area for one in pieces)
-    gain = (sum(one.outside for one in after) - sum(one.outside for one in pieces)) / total
+    gain = (sum(one.outside for one in after) - sum(one.outside for one in before)) / total
     return Trial(name=names[0], released=released, outside=gain), after
+
+
+def _closed(cloth: Cloth, names: Sequence[str]) -> tuple[Cloth, set[int]]:
+    """Return the cloth with seams closed, and the numbers of the pieces beside them (see `_remembered`)."""
+    beside = np.isin(cloth.faces, np.concatenate([cloth.seams[name] for name in names])).sum(axis=1) >= 2
+    for name in names:
+        cloth = cloth.without_seam(name)
+    return cloth, set(cloth.labels[_OWNER][beside].tolist())
+
+
+def _opens_a_tube(cloth: Cloth, names: Sequence[str]) -> bool:
+    """Return whether the cloth without seams has a piece that is no disk."""
+    closed, joined = _closed(cloth, names)
+    return not all(_is_disk(mesh.faces) for mesh in closed.pieces(np.isin(cloth.labels[_OWNER], list(joined))))
+
+
+def _remembered(cloth: Cloth, pieces: Sequence[_Measured]) -> Cloth:
+    """Return the cloth with the number of each face, and of its piece, as labels, by which what is cut or joined has its old layout."""
+    owner = np.full(len(cloth.faces), -1, dtype=np.int64)
+    for number, piece in enumerate(pieces):
+        owner[piece.mesh.face_of] = number
+    return replace(cloth, labels={**cloth.labels, _FACE: np.arange(len(owner)), _OWNER: owner})
+
+
+def _corners_laid(piece: _Measured, anatomy: Anatomy) -> FloatArray:
+    """Return where the corners of a piece's faces lie in its layout, #F by 3 by 2 [m]."""
+    faces = piece.surface.faces[:, :3]
+    flat = piece.result.positions[faces]
+    if not piece.mirrored:
+        return flat
+    there, here = piece.surface.vertices[faces], piece.mesh.vertices[piece.mesh.faces]
+    there = there - 2.0 * (there @ anatomy.normal - anatomy.offset)[..., None] * anatomy.normal
+    face = cKDTree(there.mean(axis=1)).query(here.mean(axis=1))[1]
+    corner = np.linalg.norm(here[:, :, None] - there[face][:, None], axis=3).argmin(axis=2)
+    return np.asarray(flat[face[:, None], corner] * [-1.0, 1.0])
+
+
+def _layout_before(
+    cloth: Cloth, mesh: PieceMesh, surface: Surface, pieces: Sequence[_Measured], anatomy: Anatomy
+) -> FloatArray | None:
+    """Return the layout that a piece had before it was cut, or those of two that were joined, side by side; None if there is none.
+
+    Each vertex lies in its face as it did: both sides of a new cut lie on each other.
+    """
+    if _OWNER not in cloth.labels or (cloth.labels[_OWNER][mesh.face_of] < 0).any():
+        return None
+    owner, face = cloth.labels[_OWNER][mesh.face_of], cloth.labels[_FACE][mesh.face_of]
+    numbers, areas = np.unique(owner), np.bincount(owner, cloth.face_areas[mesh.face_of])
+    laid = np.full((len(mesh.vertices), 2), np.nan)
+    for number in sorted(numbers.tolist(), key=lambda one: -areas[one]):
+        old, chosen = pieces[number], owner == number
+        place = np.searchsorted(old.mesh.face_of, face[chosen])
+        a, b, c = old.mesh.vertices[old.mesh.faces[place]].transpose(1, 0, 2)
+        way = mesh.vertices[mesh.faces[chosen]] - a[:, None]
+        ab, ac = b - a, c - a
+        # Barycentric coordinates in the plane of the face.
+        uu, uv, vv = (np.einsum("ij,ij->i", p, q)[:, None] for p, q in ((ab, ab), (ab, ac), (ac, ac)))
+        wu, wv = np.einsum("ikj,ij->ik", way, ab), np.einsum("ikj,ij->ik", way, ac)
+        least = np.maximum(uu * vv - uv * uv, 1e-30)
+        share = np.stack([(vv * wu - uv * wv) / least, (uu * wv - uv * wu) / least], axis=2)
+        share = np.concatenate([1.0 - share.sum(axis=2, keepdims=True), share], axis=2)
+        corners = np.einsum("ikj,ijd->ikd", share, _corners_laid(old, anatomy)[place]).reshape(-1, 2)
+        # Of the faces at a vertex, the one in which it lies the deepest.
+        at, depth = mesh.faces[chosen].ravel(), share.min(axis=2).ravel()
+        order = np.lexsort((-depth, at))
+        vertices, first = np.unique(at[order], return_index=True)
+        own = corners[order[first]]
+        both = np.isfinite(laid[vertices, 0])
+        if np.isfinite(laid).any():
+            if both.sum() < 2:
+                return None
+            # It is turned and shifted onto the others along what they share.
+            here, there = own[both], laid[vertices[both]]
+            middle, goal = here.mean(axis=0), there.mean(axis=0)
+            u, _, v = np.linalg.svd((here - middle).T @ (there - goal))
+            turn = u @ np.diag([1.0, np.sign(np.linalg.det(u @ v))]) @ v
+            own = (own - middle) @ turn + goal
+            own[both] = 0.5 * (own[both] + there)
+        laid[vertices] = own
+    p = laid[mesh.faces]
+    double = (p[:, 1, 0] - p[:, 0, 0]) * (p[:, 2, 1] - p[:, 0, 1]) - (p[:, 1, 1] - p[:, 0, 1]) * (
+        p[:, 2, 0] - p[:, 0, 0]
+    )
+    if len(numbers) == 1 and (np.all(double > 0.0) or np.all(double < 0.0)):
+        return laid
+    unfolded = as_rigid_layout(surface, laid)
+    return unfolded if unfolded is not None and is_injective(surface, unfolded) else None
 
 
 def _is_disk(faces: Ids) -> bool:
@@ -346,11 +482,19 @@ def _measured(
     prepare: Prepare,
     known: Sequence[_Measured],
     *,
+    changed: Collection[int] | None = None,
     energy_left: float = _TRIAL_LEFT,
 ) -> list[_Measured]:
     """Return the pieces, flattened coarsely; those that are as they were are taken over, and mirror images are flattened once.
 
     The energy is right to a share of `energy_left`, from above.
+
+    Args:
+        cloth: cut.
+        anatomy, fabric, prepare: see `cut_by_energy`.
+        known: pieces that are known, first those by whose numbers the cloth is labelled (see `_remembered`).
+        changed: only what was of the pieces of these numbers is returned; all if not given.
+        energy_left: how well the energy is known, as a share.
 
     Raises:
         InputError: a piece cannot be flattened.
@@ -358,7 +502,7 @@ def _measured(
     trial_options = _trial_options(energy_left)
     axes = np.stack([anatomy.normal, anatomy.up, anatomy.front], axis=1)
     found: list[_Measured] = []
-    for mesh in cloth.pieces():
+    for mesh in cloth.pieces(None if changed is None else np.isin(cloth.labels[_OWNER], list(changed))):
         # By the sums of their coordinates in the garment's own axes: those of a mirror image differ in one sign.
         place = (mesh.vertices @ axes - [anatomy.offset, 0.0, 0.0]).sum(axis=0)
         alike = [one for one in (*known, *found) if len(one.mesh.faces) == len(mesh.faces)]
@@ -376,11 +520,7 @@ def _measured(
             # A tube is opened when all seams are known.
             continue
         datum = "grain" if "grain" in surface.lines else None
-        start = None
-        if "flat 0" in cloth.values:
-            laid = np.stack([cloth.values["flat 0"], cloth.values["flat 1"]], axis=1)[mesh.vertex_of]
-            # Where the piece was laid before, both sides of the new cut on each other.
-            start = laid if np.isfinite(laid).all() else None
+        start = _layout_before(cloth, mesh, surface, known, anatomy)
         result = flatten(surface, fabric=fabric, datum=datum, start=start, relax=trial_options)
         fit = result.fit
         area = float(fit.area.sum())
@@ -463,18 +603,6 @@ def _narrowest(piece: _Measured, width: float) -> float:
     # Across an open dart or a concave corner there is no cloth.
     inside = Outline(points).contains_points(0.5 * (points[one] + points[other]))
     return float(distance[one, other][inside].min(initial=width))
-
-
-def _with_layout(cloth: Cloth, piece: _Measured) -> Cloth:
-    """Return the cloth with a piece's layout as fields, not a number elsewhere; without where seams within the piece lie open."""
-    if len(np.unique(piece.mesh.vertex_of)) < len(piece.mesh.vertex_of):
-        return cloth
-    flat = {}
-    for k in (0, 1):
-        value = np.full(len(cloth.vertices), np.nan)
-        value[piece.mesh.vertex_of] = piece.result.positions[:, k]
-        flat[f"flat {k}"] = value
-    return replace(cloth, values={**cloth.values, **flat})
 
 
 def _key(mesh: PieceMesh) -> int:
