@@ -17,6 +17,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 import warpflat
 from warpflat.core.errors import InputError
 from warpflat.flattening.flatten_all import flatten_all
-from warpflat.garment.sew_pieces import sew_pieces
+from warpflat.garment.sew_pieces import Bands, sew_pieces
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.io.file_seams import file_seams
 from warpflat.surface.io.read import RawMesh, read_mesh_file
@@ -159,11 +160,11 @@ def peers(panel: Panel) -> dict[str, FloatArray]:
     return {"ARAP": np.asarray(igl.arap_solve(lscm[pin].copy(), data, lscm))[:, :2], "LSCM": lscm}
 
 
-def layouts(panels: Sequence[Panel], fabric: str) -> dict[str, list[FloatArray]]:
-    """Return each way of flattening with its layout of every panel."""
+def layouts(panels: Sequence[Panel], fabric: str, bands: Bands = "auto") -> dict[str, list[FloatArray]]:
+    """Return each way of flattening with its layout of every panel; `bands` of those that are sewn are cut straight."""
     surfaces = [panel.surface for panel in panels]
     alone = flatten_all(surfaces, fabric=fabric)
-    sewn = sew_pieces(alone, eased=True)
+    sewn = sew_pieces(alone, eased=True, bands=bands)
     found = {
         "sewn": [sewn.pieces[surface.name].positions for surface in surfaces],
         "springs": [piece.positions for piece in alone],
@@ -203,6 +204,7 @@ def main() -> int:
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--units", help="of the files, where they do not say")
     parser.add_argument("--fabric", default="woven")
+    parser.add_argument("--bands", default="auto", choices=get_args(Bands), help="that are cut straight")
     given = parser.parse_args()
     files = given.files
     if not files:
@@ -216,8 +218,8 @@ def main() -> int:
         except (InputError, ValueError) as error:
             print(f"{file.name}: left out: {error}")
             continue
-        print(f"{file.name}: mean, 95 %, 95 % of the outline [mm], fabric {given.fabric}")
-        print("\n".join(table(panels, layouts(panels, given.fabric))), flush=True)
+        print(f"{file.name}: mean, 95 %, 95 % of the outline [mm], fabric {given.fabric}, bands {given.bands}")
+        print("\n".join(table(panels, layouts(panels, given.fabric, given.bands))), flush=True)
         done += 1
     if not done:
         print("no garment whose texture is its pattern; give files, or set WARPFLAT_DATA", file=sys.stderr)
