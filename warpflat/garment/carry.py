@@ -111,9 +111,10 @@ def carry(surface: Surface, before: FloatArray, after: FloatArray, triangles: ND
     mass = np.maximum(np.bincount(corners.ravel(), np.repeat(area / 3.0, 3), minlength=len(moved)), 1e-12)
     trust = mass / (1.0 + (far / _OFF) ** 2)
     system = diags_array(trust) + _SMOOTH**4 * (stiff @ diags_array(1.0 / mass) @ stiff)
-    move = factor_symmetric(system.tocsc())(trust[:, None] * (moved - surface.vertices))
-    carried = surface.vertices + move
-    return _flat_borders(surface, carried)
+    # Smoothness bends what grows evenly at borders, so the even part of the move is taken out before.
+    given = np.column_stack([surface.vertices, np.ones(len(moved))])
+    even = given @ np.linalg.lstsq(trust[:, None] ** 0.5 * given, trust[:, None] ** 0.5 * moved, rcond=None)[0]
+    return _flat_borders(surface, even + factor_symmetric(system.tocsc())(trust[:, None] * (moved - even)))
 
 
 def _flat_borders(surface: Surface, carried: FloatArray) -> FloatArray:
