@@ -97,6 +97,13 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     metavar="[PIECE:]DEGREES",
     help="Turns the warp from the datum; 45 is the bias.",
 )
+@click.option(
+    "--bands",
+    metavar="HOW",
+    help="Long strips of even width: straight: cut them straight, to be stretched as they are sewn; as worn: curved as they lie; auto: "
+    "straight where a slender ring is sewn along one side, as a neck band.  [default: auto]",
+)
+@click.option("--bands-shorter", type=float, metavar="SHARE", help="Cut straight bands shorter still, as rib is: 0.1.")
 @click.option("--model", metavar="NAME", help="springs, or membrane: the cloth measured as worn.  [default: springs]")
 @click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
 @click.option("--stretch-weft", type=float, metavar="SHARE", help="The same along the weft.")
@@ -175,7 +182,7 @@ def flatten(
     tables["seams_cut"] = [_drawn_seam(text) for text in options["cut_seams"]]
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
-    for key in ("name", "fabric", "start", "model"):
+    for key in ("name", "fabric", "start", "model", "bands", "bands_shorter"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])
@@ -211,6 +218,7 @@ def flatten(
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
     except InputError as error:
         message = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
+        message = message.replace("command line: bands", "--bands").replace("--bands_shorter", "--bands-shorter")
         message = re.sub(
             r"command line: seams_cut\[(\d+)\]",
             lambda found: f"--cut-seam {options['cut_seams'][int(found[1])]!r}",

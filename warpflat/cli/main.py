@@ -19,6 +19,7 @@ from warpflat.cli.cuts import cuts
 from warpflat.cli.drape import drape
 from warpflat.cli.export import export
 from warpflat.cli.fabrics import fabrics
+from warpflat.cli.fit import fit
 from warpflat.cli.flatten import flatten
 from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.mannequin import mannequin
@@ -88,7 +89,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
+for _command in (run, flatten, fit, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
     cli.add_command(_command)
 
 

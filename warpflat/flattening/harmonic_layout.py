@@ -15,11 +15,19 @@ from warpflat.surface.tubes import tube_borders
 __all__ = ["harmonic_layout", "refuse_tubes"]
 
 
-def harmonic_layout(surface: Surface) -> FloatArray:
-    """Lay out a piece without folds: the border on a circle, every other vertex a convex mean of its neighbours (Floater 1997).
+def harmonic_layout(surface: Surface, *, border: FloatArray | None = None) -> FloatArray:
+    """Lay out a piece without folds: the border on a convex curve, every other vertex a convex mean of its neighbours (Floater 1997).
 
     Mean value weights (Floater 2003), which are positive on any triangles. Holes are closed by a vertex each while the
-    map is computed. Scaled to the surface's area. #V by 2 [m].
+    map is computed.
+
+    Args:
+        surface: one piece.
+        border: places of the vertices of its outer border, in the order of `border_loops`, #B by 2 [m]; on a circle of the surface's area
+            if not given.
+
+    Returns:
+        #V by 2 [m].
     """
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import spsolve
@@ -48,17 +56,19 @@ def harmonic_layout(surface: Surface) -> FloatArray:
     matrix = matrix.tocsr()
     matrix = diags(1.0 / np.asarray(matrix.sum(axis=1)).ravel()) @ matrix
 
-    border = loops[0]
-    arc = arc_lengths(surface.vertices[border], closed=True)
-    angle = 2 * np.pi * arc[:-1] / arc[-1]
-    q = surface.vertices[triangles]
-    area = 0.5 * np.linalg.norm(np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), axis=1).sum()
+    outer = loops[0]
+    if border is None:
+        arc = arc_lengths(surface.vertices[outer], closed=True)
+        angle = 2 * np.pi * arc[:-1] / arc[-1]
+        q = surface.vertices[triangles]
+        area = 0.5 * np.linalg.norm(np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), axis=1).sum()
+        border = np.sqrt(area / np.pi) * np.column_stack([np.cos(angle), np.sin(angle)])
     layout = np.zeros((size, 2))
-    layout[border] = np.sqrt(area / np.pi) * np.column_stack([np.cos(angle), np.sin(angle)])
-    inner = np.setdiff1d(np.arange(size), border)
+    layout[outer] = border
+    inner = np.setdiff1d(np.arange(size), outer)
     if len(inner):
         system = (diags(np.ones(len(inner))) - matrix[inner][:, inner]).tocsc()
-        layout[inner] = spsolve(system, matrix[inner][:, border] @ layout[border]).reshape(-1, 2)
+        layout[inner] = spsolve(system, matrix[inner][:, outer] @ layout[outer]).reshape(-1, 2)
     return layout[: len(surface.vertices)]
 
 

@@ -6,21 +6,22 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.core.text import find_unused_name
 from warpflat.flattening.result import Flattening
+from warpflat.flattening.straight_band import cut_straight, find_band
 from warpflat.garment.closed_cuts import seams_of_cuts
-from warpflat.garment.constraints import Constraint
+from warpflat.garment.constraints import Constraint, KeptGirth
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.garment import Garment
 from warpflat.garment.sewing import sew
-from warpflat.garment.sewn import Stitching
+from warpflat.garment.sewn import Sewn, Stitching
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import SAME_PLACE, BorderSeam, surface_seams
 from warpflat.surface.connectivity import border_loops, join_labels
@@ -28,7 +29,10 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.mirror_images import even_sides, mirror_images
 from warpflat.surface.repair.layers import Layer, lies_within
 
-__all__ = ["meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
+__all__ = ["Bands", "meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
+
+#: Which bands are cut straight.
+Bands = Literal["auto", "straight", "as worn"]
 
 #: Borders that run along each other within this distance [m] are meant to be sewn, or reported.
 BESIDE = 1e-3
@@ -42,6 +46,8 @@ _SAMPLES, _MOST_SAMPLES = 5e-4, 200_000
 _ALIKE = 5e-3
 # A layer that keeps within this distance [m] of another one is its lining.
 _LINING = 5e-3
+# A band that its mesh says is straight is so many times as long as wide, and this share of one side is sewn, and not of the other.
+_SLENDER, _SEWN = 15.0, 0.8
 
 
 def sew_pieces(
@@ -52,6 +58,8 @@ def sew_pieces(
     options: RelaxOptions | None = None,
     name: str | None = None,
     eased: bool = False,
+    bands: Bands = "as worn",
+    shorter: float = 0.0,
 ) -> Garment:
     """Relax pieces of meshes again, all together, so that seams and darts match and constraints hold.
 
@@ -66,6 +74,9 @@ def sew_pieces(
         name: of the garment; that of the first piece if not given.
         eased: whether the two sides of a seam where borders meet are as long as each other as a whole, what one has more here eased in
             there; otherwise they are alike edge by edge. Darts and seams that close a piece to a tube are.
+        bands: long strips of even width that are cut straight, and stretched as they are sewn: "straight" all, "auto" those that are closed
+            to a ring, at least fifteen times as long as wide, and sewn along one side; "as worn" none. One that a constraint holds is none.
+        shorter: the share by which these are cut shorter than their shorter side is worn.
 
     Returns:
         The garment; its `sewn` is None where there is nothing to be sewn or held.
@@ -121,9 +132,36 @@ def sew_pieces(
         title = find_unused_name(opening or pair.name, {other.name for other in pairs})
         along = f"{first}.{opening or title}"
         pairs.append(replace(pair, name=title, sides=(f"{along}.left", f"{along}.right")))
-    garment = Garment(name=name or first, pieces=flat, stitching=pairs, border_seams=seams)
-    if not pairs and not constraints:
-        return garment
+    straight = (
+        {} if bands == "as worn" else _straight_bands(flat, pairs, constraints, closed=bands == "auto", shorter=shorter)
+    )
+    flat |= straight
+    rest = [pair for pair in pairs if straight.keys().isdisjoint(pair.pieces)]
+    sewn: Sewn | None = None
+    if rest or constraints:
+        sewn = _sew_evenly(
+            {name: piece for name, piece in flat.items() if name not in straight}, rest, constraints, options
+        )
+        flat |= sewn.pieces
+        sewn = replace(sewn, pieces=flat)
+    # What is sewn to a straight band keeps its length; the band is stretched to it.
+    for number, pair in enumerate(pairs):
+        if not straight.keys().isdisjoint(pair.pieces):
+            one, other = (
+                polyline_length(flat[piece].positions[row])
+                for piece, row in zip(pair.pieces, pair.vertices, strict=True)
+            )
+            pairs[number] = replace(pair, ratio=one / other, eased=True)
+    return Garment(name=name or first, pieces=flat, stitching=pairs, border_seams=seams, sewn=sewn)
+
+
+def _sew_evenly(
+    flat: dict[str, Flattening],
+    pairs: Sequence[Stitching],
+    constraints: Sequence[Constraint],
+    options: RelaxOptions | None,
+) -> Sewn:
+    """Sew pieces as :func:`warpflat.garment.sewing.sew`, those that are mirror images from the same layout and to the same one."""
     # One pattern serves for both pieces of a pair only where both are the same: they are sewn from the same layout.
     images = mirror_images({name: piece.network.surface for name, piece in flat.items()}) if len(flat) > 1 else {}
     if any(piece.grain_angle for piece in flat.values()):
@@ -138,8 +176,52 @@ def sew_pieces(
                 flat[mate] = replace(flat[mate], positions=laid)
     sewn = sew(flat, pairs, constraints=constraints, options=options)
     even = even_sides({name: sewn.pieces[name].positions for name in flat}, images)
-    sewn_pieces = {name: replace(sewn.pieces[name], positions=even[name]) for name in flat}
-    return replace(garment, pieces=sewn_pieces, sewn=replace(sewn, pieces=sewn_pieces))
+    return replace(sewn, pieces={name: replace(sewn.pieces[name], positions=even[name]) for name in flat})
+
+
+def _straight_bands(
+    flat: Mapping[str, Flattening],
+    pairs: Sequence[Stitching],
+    constraints: Sequence[Constraint],
+    *,
+    closed: bool,
+    shorter: float,
+) -> dict[str, Flattening]:
+    """Return the bands, cut straight, by name.
+
+    Args:
+        flat: all pieces, relaxed.
+        pairs: what is sewn.
+        constraints: pieces that one holds are left as they are.
+        closed: only those whose mesh says so: a slender ring that is sewn along one of its sides.
+        shorter: as :func:`sew_pieces` takes it.
+    """
+    held = {each.piece for each in constraints if not isinstance(each, KeptGirth)}
+    found = {}
+    for name, piece in flat.items():
+        band = None if name in held else find_band(piece)
+        if band is None:
+            continue
+        # What is sewn to itself (at its ends), and to other pieces.
+        own, others = (
+            [
+                v
+                for pair in pairs
+                for k in (0, 1)
+                if pair.pieces[k] == name and (len(set(pair.pieces)) == 1) == alone
+                for v in pair.vertices[k]
+            ]
+            for alone in (True, False)
+        )
+        ends = np.concatenate([side[[0, -1]] for side in band.sides])
+        ring = bool(np.isin(ends, own).all())
+        sewn = [float(np.isin(side[1:-1], others).mean()) if len(side) > 2 else 0.0 for side in band.sides]
+        if closed and not (ring and band.slenderness > _SLENDER and max(sewn) > _SEWN and min(sewn) < 1.0 - _SEWN):
+            continue
+        made = cut_straight(piece, band, shorter=shorter)
+        if made is not None:
+            found[name] = made
+    return found
 
 
 def name_seams(surfaces: Sequence[Surface]) -> list[Surface]:

@@ -144,7 +144,9 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
             f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
-    return Slicer(new, triangles, noise * _UNITS[unit], len(scanned)), notes
+    upright = Slicer(new, triangles, noise * _UNITS[unit], len(scanned))
+    upright.placed = frame.T * _UNITS[unit], new[0] - points[0] @ frame.T * _UNITS[unit]
+    return upright, notes
 
 
 def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:

@@ -40,6 +40,8 @@ class Slicer:
     def __init__(
         self, vertices: FloatArray, triangles: NDArray[np.int64], noise: float = 0.0, scanned: int | None = None
     ) -> None:
+        #: How the mesh came here from its file: a matrix, 3 by 3, that multiplies points from the right, and a shift [m].
+        self.placed: tuple[FloatArray, FloatArray] = np.eye(3), np.zeros(3)
         #: How far noise moved the vertices before it was smoothed [m].
         self.noise = noise
         #: Triangles from this one on close holes.

@@ -138,7 +138,10 @@ class MeshPlan:
             constraints = scene_constraints(settings.constraints, lines)
             # Where nobody has said what meets what, a seam is eased as a tailor does it.
             eased = self.found is not None
-            garment = sew_pieces(pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased)
+            garment = sew_pieces(
+                pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased, bands=settings.bands,
+                shorter=settings.bands_shorter,
+            )  # fmt: skip
         if garment.sewn is not None:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])

@@ -652,6 +652,11 @@ class SceneTable(Table):
     start: str | None = None
     """An OBJ file of the same mesh, from whose texture coordinates the piece is relaxed."""
     grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    bands: Literal["auto", "straight", "as worn"] = "auto"
+    """Long strips of even width that are cut straight and stretched as they are sewn, as long as their shorter side is worn: "auto" slender
+    rings that are sewn along one side, as a neck band, "straight" all, "as worn" none."""
+    bands_shorter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Share by which straight bands are cut shorter still, as rib is."""
     model: Literal["springs", "membrane"] = "springs"
     wear: WearTable | None = None
     drape: DrapeTable | None = None
@@ -732,6 +737,10 @@ class SceneTable(Table):
                     )
         else:
             # Refuse what belongs to a surface.
+            if self.bands != "auto" or self.bands_shorter:
+                raise ValueError(
+                    "bands and bands_shorter are for pieces of a [surface]; a form's bands are its [[finishing]]"
+                )
             if self.find_seams is not None or self.seams_cut:
                 raise ValueError(
                     f"{'[seams]' if self.find_seams else '[[seams_cut]]'} is for a garment from a file; a form has its own "

@@ -1,0 +1,81 @@
+"""What `benchmarks/truth.py` measures, on panels that are known; and the garments of WARPFLAT_DATA within its bounds."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpflat.surface.io.read import RawMesh, read_mesh_file
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+import truth
+
+_DATA = os.environ.get("WARPFLAT_DATA")
+
+
+def _rolled(unit: float) -> RawMesh:
+    """Return two panels of 300 x 200 mm that are worn rolled up to cylinders beside each other, with their pattern as texture."""
+    across, along = np.meshgrid(np.linspace(0.0, 0.3, 13), np.linspace(0.0, 0.2, 9))
+    flat = np.column_stack([across.ravel(), along.ravel()])
+    worn = np.column_stack([0.1 * np.sin(flat[:, 0] / 0.1), flat[:, 1], 0.1 * np.cos(flat[:, 0] / 0.1)])
+    corner = (13 * np.arange(8)[:, None] + np.arange(12)).ravel()
+    quads = np.stack([corner, corner + 1, corner + 14, corner + 13], axis=1)
+    turned = flat[:, ::-1] * [-1.0, 1.0] + [1.0, 0.4]
+    return RawMesh(
+        vertices=np.concatenate([worn, worn + np.array([1.0, 0.0, 0.0])]),
+        polygons=np.concatenate([quads, quads + len(worn)]),
+        scale=1.0,
+        texture=np.concatenate([flat[quads], turned[quads]]) / unit,
+    )
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01, 0.001])
+def test_panels_that_can_lie_flat_are_met(unit):
+    panels = truth.panels_of(_rolled(unit), 1.0)
+    assert [len(panel.cut) for panel in panels] == [117, 117]
+    assert [panel.area for panel in panels] == pytest.approx([0.06, 0.06])
+    found = truth.layouts(panels, "woven")
+    for name in ("sewn", "springs", "membrane"):
+        for panel, layout in zip(panels, found[name], strict=True):
+            # Twelve chords are shorter than their arc, half of it on either side of the middle.
+            shorter = 0.5 * (300.0 - 12 * 200.0 * np.sin(0.125))
+            assert truth.measure(panel, layout)[1:] == pytest.approx([shorter, shorter], abs=0.01), name
+    assert any("body 300 x 200" in line for line in truth.table(panels, found))
+
+
+def test_a_panel_is_laid_turned_and_mirrored_and_never_scaled():
+    panel = truth.panels_of(_rolled(1.0), 1.0)[0]
+    turn = np.array([[0.6, 0.8], [-0.8, 0.6]])
+    for mirror in (1.0, -1.0):
+        assert max(truth.measure(panel, panel.cut @ turn * [mirror, 1.0] + [3.0, -1.0])) < 1e-9
+    mean, most, outline = truth.measure(panel, 1.01 * panel.cut)
+    # One per cent of the distance from the middle: of the corner, 180 mm, at most.
+    radius = np.linalg.norm(panel.cut - panel.cut.mean(axis=0), axis=1)
+    assert mean == pytest.approx(10.0 * radius.mean(), rel=1e-6)
+    assert most == pytest.approx(10.0 * np.percentile(radius, 95), rel=1e-6)
+    assert outline == pytest.approx(10.0 * np.percentile(radius[panel.outline], 95), rel=1e-6)
+
+
+def test_a_texture_that_is_no_pattern_is_refused():
+    raw = _rolled(1.0)
+    with pytest.raises(ValueError, match="true size"):
+        truth.panels_of(raw, 0.6)
+    raw.texture = None
+    with pytest.raises(ValueError, match="no texture"):
+        truth.panels_of(raw, 1.0)
+
+
+@pytest.mark.skipif(_DATA is None, reason="WARPFLAT_DATA is not set: Female_T_Shirt.usd")
+def test_a_worn_sleeve_lies_on_its_panel():
+    file = Path(str(_DATA)) / "garments" / "Female_T_Shirt.usd"
+    _, raw, scale, _ = read_mesh_file(file, units=None, prim=None, name=None)
+    panels = truth.panels_of(raw, scale)
+    assert [panel.is_band for panel in panels] == [False, False, False, False, True]
+    for name, (layout,) in truth.layouts(panels[2:3], "woven").items():
+        # Its cloth is worn stretched: all ways are as far off, but for LSCM.
+        assert truth.measure(panels[2], layout)[0] < (2.5 if name == "LSCM" else 1.9), name

@@ -1,0 +1,130 @@
+"""One mesh for all bodies: the body model, fitted to each and laid on it, so that a vertex is the same place on every body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.mannequin.body_landmarks import model_places, near_level, value_at
+from warpflat.mannequin.body_model import BodyModel, Person, finer_body
+from warpflat.mannequin.fit_body import Mesh, fit_body
+from warpflat.mannequin.fit_inside import fit_inside
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
+from warpflat.mannequin.stand_body import lay_on_scan, stand_body
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["CommonBody", "common_body_inside", "common_body_of_mannequin", "common_body_of_scan", "skin_triangles"]
+
+
+# Levels that a mannequin and the model both have, from the floor up; and how often the model is slid to them.
+_LEVELS, _SLIDES = ("ankle", "knee", "hip", "waist", "underbust", "bust"), 2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CommonBody:
+    """A body as a mesh whose vertices are the same places on every body.
+
+    Attributes:
+        name: what it is called.
+        person: of the body model.
+        vertices: #V by 3 [m], the finer model's, laid on the body.
+        turn, shift: points of the body's file come here as points @ turn + shift.
+        far: mean distance of the fitted model from the body [m].
+    """
+
+    name: str
+    person: Person
+    vertices: FloatArray
+    turn: FloatArray = field(default_factory=lambda: np.eye(3))
+    shift: FloatArray = field(default_factory=lambda: np.zeros(3))
+    far: float = 0.0
+
+    def level(self, name: str) -> float:
+        """Return the height [m] of a level of the trunk: bust, underbust, waist or hip."""
+        return float(value_at(near_level(name), self.vertices[:, 1]))
+
+    def in_pose_of(self, other: CommonBody) -> CommonBody:
+        """Return this body as it stands where another one does, and with its joints bent as the other's."""
+        model, finer = BodyModel.load(), finer_body()[0]
+        posed = replace(self.person, bend=other.person.bend, turn=other.person.turn, place=other.person.place)
+        vertices = model.rebend(self.person, posed, finer, self.vertices)
+        # It stands on the same floor.
+        down = np.array([0.0, float(other.vertices[:, 1].min() - vertices[:, 1].min()), 0.0])
+        return replace(
+            self,
+            person=replace(posed, place=posed.place + down),
+            vertices=vertices + down,
+            turn=other.turn,
+            shift=other.shift,
+        )
+
+
+def common_body_of_scan(
+    vertices: FloatArray, faces: NDArray[np.int64], *, name: str, options: ScanOptions | None = None
+) -> CommonBody:
+    """Return the body of a scan, in the scan's pose.
+
+    Args:
+        vertices: #V by 3, any unit. faces: #F by 3 or 4 (-1 in the last column for a triangle).
+        name: of the body.
+        options: what is known of the scan.
+
+    Raises:
+        InputError: it is no standing body with arms and legs.
+    """
+    scan, _ = turn_scan_upright(np.asarray(vertices, float), np.asarray(faces), options or ScanOptions())
+    laid = stand_body(scan.vertices, scan.triangles, scan.scanned)
+    if laid.unsure is not None:
+        raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
+    turn, shift = scan.placed
+    about = np.array([-1.0, 1.0, -1.0]) if laid.turned else np.ones(3)
+    return CommonBody(
+        name=name, person=laid.fit.person, vertices=laid.posed, turn=turn * about, shift=shift * about, far=laid.far
+    )
+
+
+def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
+    """Return the body of a mannequin of a size or of measurements; head, hands and feet, which it lacks, are the model's."""
+    triangles = triangulate(np.asarray(mannequin.layout.faces))[0].astype(np.int64)
+    fit = fit_body(mannequin.vertices, triangles)
+    model, finer = BodyModel.load(), finer_body()[0]
+    mesh, whole = Mesh(mannequin.vertices, triangles), np.zeros(len(triangles), dtype=bool)
+    vertices, _ = lay_on_scan(finer @ model.vertices(fit.person), mesh, whole)
+    # Without head and feet the model may have slid up or down: its levels go where the mannequin has them, and what lies between follows.
+    levels, heights = mannequin.levels(), vertices[:, 1]
+    places = model_places()
+    for _ in range(_SLIDES):
+        arms = places.strips["arm left"] | places.strips["arm right"]
+        own = np.array(
+            [
+                np.mean([value_at(near_level(name, side), vertices[:, 1]) for side in ("left", "right")])
+                for name in _LEVELS
+            ]
+        )
+        move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
+        vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
+        vertices, _ = lay_on_scan(vertices, mesh, whole)
+        heights = vertices[:, 1]
+    far = float(fit.distance[np.isfinite(fit.distance)].mean())
+    return CommonBody(name=name, person=fit.person, vertices=vertices, far=far)
+
+
+def common_body_inside(vertices: FloatArray, triangles: NDArray[np.int64], *, name: str) -> CommonBody:
+    """Return the body that may wear a garment (#V by 3 [m], Y up, front +Z; #T by 3, outward)."""
+    fit = fit_inside(vertices, triangles)
+    model, finer = BodyModel.load(), finer_body()[0]
+    return CommonBody(name=name, person=fit.person, vertices=finer @ model.vertices(fit.person))
+
+
+@lru_cache(maxsize=1)
+def skin_triangles() -> NDArray[np.int64]:
+    """Return the triangles of the common mesh that cloth lies over: without head, hands and feet."""
+    finer, triangles = finer_body()
+    plain = finer @ BodyModel.load().detail.astype(float) < 0.5
+    return triangles[plain[triangles].all(axis=1)]
