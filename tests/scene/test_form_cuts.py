@@ -236,3 +236,21 @@ def test_a_dart_that_the_body_does_not_want_is_left_out(tmp_path: Path):
     own = {"piece": "front", "line": "princess front left", "mouth_mm": 8}
     kept = plan_garment(scene(**tables, cuts=[own], curves_mm=0)).flatten()
     assert without_closed_darts(scene(**tables, cuts=[own]), [kept])[1] == ()
+
+
+def test_a_dart_too_near_the_armhole_moves_to_the_shoulder_or_goes(monkeypatch):
+    asked = scene(shape="darts", half=True, curves_mm=0)
+    made = plan_garment(asked).flatten()
+    # A size table leaves room for it.
+    assert without_closed_darts(asked, [made])[1] == ()
+    # It lies 43 mm off; no strip of less than 60 mm may be left now, which a dart from the shoulder leaves.
+    monkeypatch.setattr("warpflat.garment.darts.NEAR_ARMHOLE", 0.06)
+    moved, (note,) = without_closed_darts(asked, [made])
+    assert note.startswith("front: the bust dart lies along the shoulder's princess line instead")
+    darts = plan_garment(moved).flatten().metrics()["pieces"]["front"]["darts"]
+    assert {dart["name"] for dart in darts} == {"shoulder dart left", "waist dart left"}
+    # One on a shoulder too narrow for it goes.
+    monkeypatch.setattr("warpflat.scene.form_shaping.NEAR_ARMHOLE", 0.20)
+    left, (note,) = without_closed_darts(asked, [made])
+    assert note.startswith("front: the bust dart is left out, since it would come within 30 mm of the armhole")
+    assert [cut.omit for cut in left.settings.cuts] == [True]
