@@ -109,7 +109,7 @@ def test_a_t_shirt_on_a_scan_has_no_hook_under_the_arm_and_a_round_neck(name: st
     side = made.vertices[layout.rings[layout.level_row["underbust"] :, layout.quarter]]
     # Seen from the side the seam runs straight into the armhole; seen from the front there is no ledge under the arm.
     assert np.ptp(side[:, 2]) < 0.0047
-    assert abs(side[-1, 0] - side[-5, 0]) < 0.008
+    assert abs(side[-1, 0] - side[-5, 0]) < 0.4 * (side[-1, 1] - side[-5, 1])
     garment = flatten_form(body, made, fabric="interlock")
     for key in ("front", "back"):
         piece, flat = made.pieces[key], garment.pieces[key]

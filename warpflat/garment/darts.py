@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.core.polyline import arc_lengths, nearest_on_polyline, polyline_length
 from warpflat.garment.closed_cuts import CLOSED
 from warpflat.garment.constraints import DartMouth
 from warpflat.garment.sewn import Stitching
@@ -19,11 +19,21 @@ if TYPE_CHECKING:
     from warpflat.mannequin.darts import FormDart
     from warpflat.mannequin.forms import FormResult
 
-__all__ = ["closed_darts", "dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
+__all__ = [
+    "NEAR_ARMHOLE",
+    "closed_darts",
+    "crowded_darts",
+    "dart_constraints",
+    "dart_pairs",
+    "measure_darts",
+    "pleat_depths",
+]
 
 
 # A mouth narrower than this [m] is no dart that anybody would sew.
 _NARROW = 3e-3
+#: A dart that comes nearer to the armhole [m] is no dart that anybody would sew: the strip between them curls.
+NEAR_ARMHOLE = 0.03
 
 
 def dart_pairs(form: FormResult) -> list[Stitching]:
@@ -80,6 +90,29 @@ def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[
         overlap = open_length(left, right)[1]
         most = OVERLAP if dart.name in form.pieces[dart.piece].fisheyes else CLOSED
         if overlap > most or np.linalg.norm(left - right, axis=1).max() < _NARROW:
+            found.append(dart.asked)
+    return found
+
+
+def crowded_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[FormDart]:
+    """Return the darts from the border that come within 30 mm of their piece's armhole on one side of the body at least.
+
+    Args and darts as of :func:`closed_darts`; one whose mouth lies on the armhole itself is none of them.
+    """
+    found = []
+    legs = form.legs()
+    for dart in form.darts:
+        if (dart.piece, dart.name) not in legs or dart.asked in found:
+            continue
+        piece, flat = form.pieces[dart.piece], positions[dart.piece]
+        armholes = [ids for edge, ids in piece.edges.items() if piece.parts.get(edge, edge).startswith("armhole")]
+        if dart.name in piece.fisheyes or any(np.isin(legs[dart.piece, dart.name], ids).any() for ids in armholes):
+            continue
+        away = [
+            np.linalg.norm(nearest_on_polyline(point, flat[ids]) - point)
+            for ids in armholes for leg in legs[dart.piece, dart.name] for point in flat[leg]
+        ]  # fmt: skip
+        if min(away, default=np.inf) < NEAR_ARMHOLE:
             found.append(dart.asked)
     return found
 

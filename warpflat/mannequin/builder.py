@@ -22,6 +22,9 @@ __all__ = ["build_trunk", "build_vertices", "girth_ring", "quarter_fractions"]
 _GUIDE = 0.01
 _ATTRACT = 0.25
 _ATTRACT_ROUNDS = 4
+# So far [m] below the underarm the bust's row meets the side, where the rows below it keep this share of the height: a dart
+# from there keeps off the armhole.
+_DART_ROOM, _LEAST_SHARE = 0.05, 0.25
 
 
 def build_trunk(layout: Layout, blueprint: Blueprint) -> FloatArray:
@@ -49,8 +52,8 @@ def build_vertices(layout: Layout, blueprint: Blueprint, trunk: FloatArray | Non
         layout.vertex_count by 3, positions [m].
     """
     vertices = build_trunk(layout, blueprint) if trunk is None else trunk.copy()
-    # At the sides the rows from the underbust to the bust are lowered, so that all rows up to the underarm share its height:
-    # a bust lies level with the armpits on many bodies, and the armhole ends below them. A tape still reads each row's girth.
+    # At the sides the rows from the underbust to the bust are lowered: a bust lies level with the armpits on many bodies, the
+    # armhole ends below them, and a dart from the side needs room under it. A tape still reads each row's girth.
     first, bust, chest = (layout.level_row[level] for level in ("underbust", "bust", "chest"))
     base = vertices[layout.rings[: bust + 1]].copy()
     heights = base[:, 0, 1]
@@ -58,12 +61,14 @@ def build_vertices(layout: Layout, blueprint: Blueprint, trunk: FloatArray | Non
     reach = quarter - layout.to_princess
     for side, name in ((quarter, "front-left"), (3 * quarter, "front-right")):
         under = float(blueprint.quarters[name].armhole[-1, 1])
+        even = heights[first] + (under - heights[first]) * (bust - first) / (chest - first)
+        roomy = max(under - _DART_ROOM, heights[first] + _LEAST_SHARE * (under - heights[first]))
+        top = min(heights[bust], even, roomy)
         for row in range(first + 1, bust + 1):
-            even = heights[first] + (under - heights[first]) * (row - first) / (chest - first)
-            dip = max(0.0, heights[row] - even)
+            dip = max(0.0, heights[row] - heights[first] - (top - heights[first]) * (row - first) / (bust - first))
             for column in range(side - reach + 1, side + reach):
                 near = 1.0 - abs(column - side) / reach
-                height = heights[row] - near * near * (3.0 - 2.0 * near) * dip
+                height = heights[row] - near * dip
                 line = base[:, column % count]
                 vertices[layout.rings[row, column % count]] = [np.interp(height, heights, line[:, k]) for k in range(3)]
     for row in range(first + 1, bust + 1):

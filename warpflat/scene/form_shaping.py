@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+import numpy as np
+
 from warpflat.cutting.ledger import AutoCut, LedgerEntry, RankedBy
 from warpflat.flattening.result import Flattening
-from warpflat.garment.darts import closed_darts
+from warpflat.garment.darts import NEAR_ARMHOLE, closed_darts, crowded_darts
 from warpflat.garment.garment import Garment
+from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.darts import FormDart, place_darts, usual_darts
 from warpflat.mannequin.elbow_darts import ELBOW
 from warpflat.scene.cuts import place_of, scene_with
 from warpflat.scene.form import scene_recipe
@@ -104,8 +108,14 @@ def _note(made: list[LedgerEntry]) -> str:
     return f"cuts found: {'; '.join(words)}" if made else "no cut was found that would help"
 
 
+#: The cut that takes over from a bust dart.
+_SHOULDER = {"name": "shoulder dart", "line": "princess front left", "at": "shoulder left"}
+# As it opens, the cloth beside it swings towards the armhole by so much [m].
+_SWING = 0.01
+
+
 class ClosedDarts(Exception):
-    """Darts of a scene's shape do not open.
+    """Darts of a scene's shape cannot be sewn: they do not open, or lie too near the armhole.
 
     Attributes:
         without: the scene without them.
@@ -118,40 +128,65 @@ class ClosedDarts(Exception):
 
 
 def without_closed_darts(scene: Scene, garments: Iterable[Garment]) -> tuple[Scene, tuple[str, ...]]:
-    """Return a scene without the darts of its shape that do not open in some size, and one sentence for each that is left out.
+    """Return a scene without the darts of its shape that cannot be sewn in some size, and one sentence for each.
 
-    A body may want no dart where a pattern book has one, such as in the skirt of one whose belly stands out.
+    A body may want no dart where a pattern book has one, such as in the skirt of one whose belly stands out: a dart that does
+    not open is left out. One that comes too near the armhole moves to the shoulder, where the piece has one.
 
     Args:
         scene: the one that has been flattened.
         garments: its garment, in every size.
     """
+    from scipy.spatial import cKDTree
+
     own = {place_of(table.model_dump()) for table in scene.settings.cuts}
-    closed = []
+    closed: list[FormDart] = []
+    crowded: list[FormDart] = []
+    movable: set[str] = set()
     for garment in garments:
-        found = [] if garment.form is None else closed_darts(garment.form, garment.positions)
-        closed += [d for d in found if d.place not in own and d not in closed]
+        if garment.form is None or garment.mannequin is None:
+            continue
+        closed += [d for d in closed_darts(garment.form, garment.positions) if d.place not in own and d not in closed]
+        crowded += [
+            d for d in crowded_darts(garment.form, garment.positions) if d.place not in own and d not in crowded
+        ]
+        layout = garment.mannequin.layout
+        bricks = {name: select_bricks(layout, piece.bricks) for name, piece in garment.form.recipe.pieces.items()}
+        form = garment.form.vertices
+        usual = [dart for dart in usual_darts(layout, form, bricks) if dart.name == _SHOULDER["name"]]
+        armholes = form[np.concatenate([layout.lines[f"armhole {side}"] for side in ("left", "right")])]
+        # Where a shoulder is narrow, a dart there would be as near to the armhole.
+        movable |= {
+            dart.piece
+            for dart in place_darts(layout, form, bricks, usual)
+            if cKDTree(armholes).query(form[dart.row])[0].min() > NEAR_ARMHOLE + _SWING
+        }
     if scene.settings.shape != "darts":
         # A woven sleeve around a bent elbow has its dart in every shape.
-        closed = [dart for dart in closed if ELBOW in dart.place]
-    if not closed:
+        closed, crowded = [dart for dart in closed if ELBOW in dart.place], []
+    if not closed and not crowded:
         return scene, ()
     cuts = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
-    for dart in closed:
+    notes = []
+    for dart in (*closed, *(dart for dart in crowded if dart not in closed)):
         place = zip(("piece", "line", "towards", "at"), dart.place, strict=True)
         cuts.append({key: value for key, value in place if value} | {"omit": True})
-    notes = tuple(
-        f"{dart.piece}: the {dart.name} is left out, since the cloth would not open it; [[cuts]] with mouth_mm keeps it"
-        for dart in closed
-    )
-    return scene_with(scene, cuts=cuts), notes
+        if dart in closed:
+            why = "is left out, since the cloth would not open it; [[cuts]] with mouth_mm keeps it"
+        elif dart.piece in movable:
+            cuts.append({"piece": dart.piece} | _SHOULDER)
+            why = "lies along the shoulder's princess line instead: from the side it would come within 30 mm of the armhole"
+        else:
+            why = "is left out, since it would come within 30 mm of the armhole; [[cuts]] keeps it or gives another one"
+        notes.append(f"{dart.piece}: the {dart.name} {why}")
+    return scene_with(scene, cuts=cuts), tuple(notes)
 
 
 def require_open_darts(scene: Scene, garments: Iterable[Garment]) -> None:
-    """Check that the darts of a scene's shape open in the garment of every size.
+    """Check that the darts of a scene's shape can be sewn in the garment of every size.
 
     Raises:
-        ClosedDarts: some darts of the scene's shape do not open.
+        ClosedDarts: some of them cannot.
     """
     without, notes = without_closed_darts(scene, garments)
     if notes:
