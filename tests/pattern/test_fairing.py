@@ -3,7 +3,7 @@
 import numpy as np
 
 from warpflat.core.polyline import turning_angles
-from warpflat.pattern.fairing import bend_one_way, best_wave, count_inflections, fair_line, fairest_line
+from warpflat.pattern.fairing import bend_one_way, count_inflections, fair_line, fairest_line
 
 ALONG = np.linspace(0.0, 0.3, 61)
 
@@ -25,12 +25,11 @@ def test_inflections_are_bends_both_ways():
 def test_a_wobble_is_faired_away_within_the_bound():
     line = wobbly_hip()
     assert count_inflections(line) > 4
-    wave = best_wave(line, 0.003)
-    assert wave is not None
-    faired = fair_line(line, wave)
+    faired = fairest_line(line, 0.003)
+    assert faired is not None
     assert faired.inflections == 0
     assert faired.shift < 0.0015
-    assert best_wave(line, 1e-5) is None
+    assert fairest_line(line, 1e-5) is None
 
 
 def test_a_stretch_is_straight_and_a_circle_stays():

@@ -166,6 +166,8 @@ def measure_curves(
         positions: by piece, #V by 2, with the lines drawn [m].
         results: of the lines, in their order.
     """
+    import shapely
+
     of_edge = {
         (name, edge): seam.name
         for seam in form.seams
@@ -175,6 +177,11 @@ def measure_curves(
     measured = []
     for plan, result in zip(plans, results, strict=True):
         place, after = (plan.line.piece, plan.line.line), positions[plan.line.piece][plan.line.vertices]
+        # Both shapes are laid upon each other as near as they come.
+        first, second = plan.before - plan.before.mean(axis=0), after - after.mean(axis=0)
+        left, _, right = np.linalg.svd(second.T @ first)
+        laid = second @ (left @ np.diag([1.0, np.sign(np.linalg.det(left @ right))]) @ right)
+        shift = float(shapely.distance(shapely.LineString(laid), shapely.points(first[1:-1])).max())
         measured.append(
             DrawnCurve(
                 place=".".join(place),
@@ -184,7 +191,7 @@ def measure_curves(
                 away_mm=1e3 * plan.away,
                 inflections_before=count_inflections(plan.before),
                 inflections_after=count_inflections(after),
-                shift_mm=1e3 * _shift(plan.before, after),
+                shift_mm=1e3 * shift,
                 price_j=result.cost,
             )
         )
@@ -219,13 +226,3 @@ def _book_line(layout: Layout, form: FormResult, grid: IntArray, edge: str, *, f
     if edge.startswith(STRAIGHT_EDGES):
         return "all", np.ones(len(grid), dtype=bool)
     return "", np.zeros(len(grid), dtype=bool)
-
-
-def _shift(before: FloatArray, after: FloatArray) -> float:
-    """Return the largest distance [m] between two shapes of a line, laid upon each other as near as they come."""
-    import shapely
-
-    first, second = before - before.mean(axis=0), after - after.mean(axis=0)
-    left, _, right = np.linalg.svd(second.T @ first)
-    laid = second @ (left @ np.diag([1.0, np.sign(np.linalg.det(left @ right))]) @ right)
-    return float(shapely.distance(shapely.LineString(laid), shapely.points(first[1:-1])).max())

@@ -119,7 +119,15 @@ def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRule
     piece = form.pieces[name]
     plans: list[EdgePlan] = []
     taken: set[str] = set(piece.edges)
-    lowest = _lowest_edge(form, name, sewing)
+    # The lowest of its free edges at a level where garments are hemmed.
+    heights = {
+        edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
+        for edge, ids in piece.edges.items()
+        if piece.parts.get(edge, edge) == edge
+        and edge.split(" ")[0] in HEMMED_LEVELS
+        and not sewing.covers((name, edge))
+    }
+    lowest = min(heights, key=lambda edge: heights[edge], default=None)
     legs = {leg for dart in piece.darts.values() for leg in dart}
     for edge, ids in piece.edges.items():
         whole = piece.parts.get(edge, edge)
@@ -286,16 +294,3 @@ def _plan_seams(
         if name not in known:
             raise InputError(f"ease: there is no seam {name!r}; {nearest(name, known)}")
     return tuple(seams.values()), tuple((seams[key], side) for key, side in of_form)
-
-
-def _lowest_edge(form: FormResult, name: str, sewing: _FormSeams) -> str | None:
-    """Return the lowest of a piece's free edges at a level where garments are hemmed; None if there is none."""
-    piece = form.pieces[name]
-    heights = {
-        edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
-        for edge, ids in piece.edges.items()
-        if piece.parts.get(edge, edge) == edge
-        and edge.split(" ")[0] in HEMMED_LEVELS
-        and not sewing.covers((name, edge))
-    }
-    return min(heights, key=lambda edge: heights[edge]) if heights else None

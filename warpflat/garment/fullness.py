@@ -153,7 +153,15 @@ def measure_fullness(piece: Flattening, edges: Sequence[FullEdge], plain: Sequen
     # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap do, all of what is eased in,
     # and the excess on slanting sides.
     wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
-    lacks = [(ids, _lack(ids, factor, positions, axes, np.exp(log_full))) for ids, factor in wanted]
+    full, lacks = np.exp(log_full), []
+    for ids, factor in wanted:
+        step = np.diff(positions[ids], axis=0)
+        across = np.stack([step @ axes[0], step @ axes[1]], axis=1)
+        here = 0.5 * (full[ids[1:]] + full[ids[:-1]])
+        length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(np.float64).tiny)
+        # The log of what is still missing of the factor, at each of the edge's vertices.
+        lack = np.log(factor * length / np.linalg.norm(across * here, axis=1))
+        lacks.append((ids, 0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack))))
     log_full += falloff_weights(faces, lacks, border_loops(faces), len(positions))[:, None]
     return np.asarray(np.exp(log_full))
 
@@ -162,18 +170,6 @@ def _runs_along(positions: FloatArray, line: IntArray, axes: tuple[FloatArray, F
     """Return 0 where the line's chord is nearer to the warp, 1 where it is nearer to the weft."""
     chord = positions[line[-1]] - positions[line[0]]
     return int(abs(float(chord @ axes[1])) > abs(float(chord @ axes[0])))
-
-
-def _lack(
-    edge: IntArray, factor: float, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
-) -> FloatArray:
-    """Return the log of what is still missing of an edge's factor at each of its vertices."""
-    step = np.diff(positions[edge], axis=0)
-    along = np.stack([step @ axes[0], step @ axes[1]], axis=1)
-    here = 0.5 * (full[edge[1:]] + full[edge[:-1]])
-    length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(np.float64).tiny)
-    lack = np.log(factor * length / np.linalg.norm(along * here, axis=1))
-    return np.asarray(0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack)))
 
 
 def _wider_springs(

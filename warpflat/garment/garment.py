@@ -203,18 +203,18 @@ class Garment:
         first = next(iter(self.pieces.values()))
         return assess_wearer(self.mannequin, self.form, self.positions, first.fabric, grain_angle=first.grain_angle)
 
-    def _measure(self, name: str, piece: Flattening) -> dict[str, Any]:
-        """Build the entry of a part in `metrics.json`; of a form's piece with its strain energy brick by brick, and its darts."""
-        if self.form is None:
-            return piece.measures
-        brick = np.array(self.form.pieces[name].face_brick)
-        measured = piece.measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
-        darts = measure_darts(self.form, name, piece.positions)
-        return {**measured, **({"darts": darts} if darts else {})}
-
     def metrics(self) -> dict[str, Any]:
         """Return the content of `metrics.json`."""
-        pieces, more = {name: self._measure(name, piece) for name, piece in self.parts.items()}, dict[str, Any]()
+        pieces, more = dict[str, dict[str, Any]](), dict[str, Any]()
+        for name, piece in self.parts.items():
+            if self.form is None:
+                pieces[name] = piece.measures
+                continue
+            # Of a form's piece with its strain energy brick by brick, and its darts.
+            brick = np.array(self.form.pieces[name].face_brick)
+            measured = piece.measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
+            darts = measure_darts(self.form, name, piece.positions)
+            pieces[name] = {**measured, **({"darts": darts} if darts else {})}
         if self.form is not None and self.mannequin is not None:
             wearer = {} if self.wearer is None else {"against": "form", "wearer": self.wearer.as_dict()}
             more = {
@@ -425,9 +425,17 @@ class _SewAgain:
         """
         bounds = dict.fromkeys(garment.pieces, bound)
         for share in (0.5, 0.0, None):
-            drawn = self._drawn(garment, bounds)
-            if drawn.curves is None:
-                return drawn
+            plans = plan_curves(self.mannequin.layout, self.form, garment.positions, bounds, self.held)
+            if not plans or garment.sewn is None or not garment.sewn.converged:
+                return garment
+            drawn, outcome = self(garment, [plan.line for plan in plans])
+            if not outcome.converged or drawn.sewn is None:
+                words = "the borders stay as the cloth rests: drawn by hand, seams or constraints could not be kept"
+                return replace(garment, remarks=(*garment.remarks, words))
+            results = [each for each in outcome.results if each.kind == "curve"]
+            lines = measure_curves(self.form, plans, drawn.positions, results)
+            farthest, price = 1e3 * max(bounds.values()), drawn.sewn.drawing_cost
+            drawn = replace(drawn, curves=Curves(bound_mm=farthest, price_j=price, lines=lines))
             strained = _strained(garment, drawn)
             if share is None or not strained:
                 break
@@ -437,23 +445,6 @@ class _SewAgain:
             return drawn
         words = f"borders are drawn within less, or the cloth would be strained beyond its limit: {', '.join(less)}"
         return replace(drawn, remarks=(*drawn.remarks, words))
-
-    def _drawn(self, garment: Garment, bounds: Mapping[str, float]) -> Garment:
-        """Return the garment with the borders of each piece drawn within its bound [m]."""
-        assert garment.sewn is not None
-        plans = plan_curves(self.mannequin.layout, self.form, garment.positions, bounds, self.held)
-        if not plans or not garment.sewn.converged:
-            return garment
-        drawn, outcome = self(garment, [plan.line for plan in plans])
-        if not outcome.converged:
-            words = "the borders stay as the cloth rests: drawn by hand, seams or constraints could not be kept"
-            return replace(garment, remarks=(*garment.remarks, words))
-        lines = measure_curves(
-            self.form, plans, drawn.positions, [each for each in outcome.results if each.kind == "curve"]
-        )
-        assert drawn.sewn is not None
-        bound = max(bounds.values())
-        return replace(drawn, curves=Curves(bound_mm=1e3 * bound, price_j=drawn.sewn.drawing_cost, lines=lines))
 
 
 def _strained(before: Garment, after: Garment) -> list[str]:

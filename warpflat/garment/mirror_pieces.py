@@ -54,9 +54,18 @@ def find_mirror_pairs(
         if matched[0] is not None and all(edges == matched[0] for edges in matched):
             found.append(MirrorPair(name=second, of=first, edges=matched[0]))
     # A piece that is sewn differently needs notches of its own; leaving it out may make others differ.
-    while different := _sewn_differently(found, seams):
+    while True:
+        by_name = {pair.name: pair for pair in found}
+        different = {
+            part.piece
+            for seam in seams
+            for side in seam.sides
+            for part, drawn in zip(side, _replaced(side, by_name), strict=True)
+            if drawn.mirrored and _mirror_seam(drawn, seams, by_name) is None
+        }
+        if not different:
+            return tuple(found)
         found = [pair for pair in found if pair.name not in different]
-    return tuple(found)
 
 
 def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) -> tuple[Seam, ...]:
@@ -104,18 +113,6 @@ def _matching_edges(garment: Garment, pieces: Sequence[Piece], first: str, secon
             return None
         edges[image.name] = edge.name
     return edges if len(edges) == len(two.edges) else None
-
-
-def _sewn_differently(mirror_pairs: Sequence[MirrorPair], seams: Sequence[Seam]) -> set[str]:
-    """Return the pieces with an edge that is sewn where their mirror image's is not."""
-    by_name = {pair.name: pair for pair in mirror_pairs}
-    return {
-        part.piece
-        for seam in seams
-        for side in seam.sides
-        for part, drawn in zip(side, _replaced(side, by_name), strict=True)
-        if drawn.mirrored and _mirror_seam(drawn, seams, by_name) is None
-    }
 
 
 def _mirror_seam(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length, segment_lengths, turning_angles
 
-__all__ = ["Curve", "adjust_lengths", "as_cubic", "chords", "cubic_weights", "fit_curve", "split_bezier"]
+__all__ = ["Curve", "adjust_lengths", "as_cubic", "chords", "cubic_weights", "farthest", "fit_curve", "split_bezier"]
 
 
 #: A vertex inside an edge that turns by more than this [rad] is a corner, not a sample of a curve.
@@ -71,16 +71,16 @@ class Curve:
 
     def sample(self, tolerance: float = CHORD) -> FloatArray:
         """Return points on the curve (#P by 2 [m]) whose chords stray at most `tolerance` [m]; joints are exact."""
-        parts = []
-        for control, straight in zip(self.bezier, self.straight, strict=True):
-            if straight:
-                parts.append(control[:1])
-                continue
-            # A chord over a parameter step h strays at most h^2/8 max|B''|, and |B''| <= 6 max|second difference|.
-            bend = float(np.linalg.norm(np.diff(control, n=2, axis=0), axis=1).max())
-            count = max(1, int(np.ceil(np.sqrt(0.75 * bend / tolerance))))
-            parts.append(cubic_weights(np.arange(count) / count) @ control)
-        return np.concatenate([*parts, self.bezier[-1:, 3]])
+        # A chord over a parameter step h strays at most h^2/8 max|B''|, and |B''| <= 6 max|second difference|.
+        second = self.bezier[:, :-2] - 2 * self.bezier[:, 1:-1] + self.bezier[:, 2:]
+        bend = np.sqrt((second * second).sum(axis=2).max(axis=1))
+        counts = np.maximum(1, np.ceil(np.sqrt(0.75 * bend / tolerance))).astype(np.int64)
+        counts[self.straight] = 1
+        ends = counts.cumsum()
+        number = np.repeat(np.arange(len(counts)), counts)
+        t = (np.arange(ends[-1]) - (ends - counts)[number]) / counts[number]
+        points = np.einsum("tk,tkd->td", cubic_weights(t), self.bezier[number])
+        return np.concatenate([points, self.bezier[-1:, 3]])
 
     @property
     def length(self) -> float:
@@ -167,7 +167,7 @@ def _within_tolerance(curve: Curve, points: FloatArray, tolerance: float) -> Cur
     # Measured on the chords by which the curve is drawn.
     room = tolerance - CHORD / 2
     for share in INSIDE:
-        if _stray(curve.sample(), points) <= tolerance:
+        if farthest(curve.sample(), points) <= tolerance:
             break
         # The lengths [m] (#P) of a curve that runs inside the points, no more than a share of the tolerance.
         step, turn = segment_lengths(points), np.abs(turning_angles(points))
@@ -175,40 +175,6 @@ def _within_tolerance(curve: Curve, points: FloatArray, tolerance: float) -> Cur
         longer = np.maximum(0.0, step * both**2 / 24 - share * tolerance * both)
         curve = _fit_run(points, tolerance, np.concatenate([[0.0], np.cumsum(step + longer)]), room=room)
     return curve
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _FitGoal:
-    """The lengths and tolerances that the curve of one stretch has to meet.
-
-    Attributes:
-        points: #P by 2 [m], what it runs along.
-        arc: #P, the wanted length [m] up to each point.
-        tolerance: [m].
-        room: largest distance [m] of a point from a curve along a straight stretch.
-        bend: largest product of turning angle and step along the points [m]. A curve of equal length strays from a coarse
-            border by a share of it, to one side at corners and to the other side at chords.
-        leeway: by how much less an error of length counts.
-        strict: the room holds everywhere, whatever the bend.
-    """
-
-    points: FloatArray
-    arc: FloatArray
-    tolerance: float
-    room: float
-    bend: float
-    leeway: float
-    strict: bool
-
-    def score(self, curve: Curve, length_error: float) -> float:
-        """Return the larger of both errors, of place and length, over what is allowed; infinite if it is too far."""
-        samples = curve.sample(self.tolerance / 10)
-        stray = _stray(samples, self.points)
-        if stray > self.room + self.bend / 6 or _stray(self.points, samples) > self.room + self.bend / 4:
-            return np.inf
-        length_error = max(length_error, abs(float(arc_lengths(samples)[-1] - self.arc[-1])))
-        allowed = self.room if self.strict else self.room + self.bend / 24
-        return max(stray / allowed, length_error / (LENGTH * self.leeway))
 
 
 def _fit_run(
@@ -226,32 +192,41 @@ def _fit_run(
         lengths: #P, the wanted length [m] up to each point; None for that of the chords.
         room: largest distance [m] of a point from the curve; None for the tolerance, or more if `lengths` are given.
     """
-    if _stray(points[[0, -1]], points) <= tolerance:
+    if farthest(points[[0, -1]], points) <= tolerance:
         return chords(points[[0, -1]])
-    # What a curve along the points is measured by.
+    # The largest product of turning angle and step along the points [m]. A curve of equal length strays from a coarse
+    # border by a share of it, to one side at corners and to the other side at chords.
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     bend = float((np.abs(turning_angles(points)) * np.maximum(step[:-1], step[1:])).max())
-    leeway = 1.0
-    strict = room is not None
-    if room is not None:
-        leeway = NEAR
-    elif lengths is None:
-        # A zigzag smoothed away is longer than the curve by the square of its width.
-        room, leeway = tolerance, max(1.0, (tolerance / TOLERANCE) ** 2)
-    else:
-        room = OTHER_LENGTHS * tolerance
+    # By how much less an error of length counts. A zigzag smoothed away is longer than the curve by the square of its width.
+    leeway = NEAR if room is not None else 1.0 if lengths is not None else max(1.0, (tolerance / TOLERANCE) ** 2)
+    if lengths is not None and room is None and tolerance > TOLERANCE:
         # What bends along a zigzag is to be smoothed away.
-        bend = 0.0 if tolerance > TOLERANCE else bend
+        bend = 0.0
+    far = room if room is not None else tolerance if lengths is None else OTHER_LENGTHS * tolerance
+    allowed = far + bend / 24 if room is None else far
     arc = arc_lengths(points) if lengths is None else lengths
-    goal = _FitGoal(points=points, arc=arc, tolerance=tolerance, room=room, bend=bend, leeway=leeway, strict=strict)
     best, least = chords(points), np.inf
+    tried: FloatArray = np.zeros(0)
     for smoothing in tolerance**2 * len(points) * np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001, 0.0]):
-        fit = _length_keeping_spline(points, goal.arc, float(smoothing), tolerance, LENGTH_WEIGHT * goal.leeway)
-        if fit is None:
+        spline = _smoothing_spline(points, arc / arc[-1], float(smoothing))
+        # Once its lengths are right, a spline with the same knots is the same to some micrometres.
+        if spline is None or np.array_equal(spline[0], tried):
             continue
-        bezier, length_error = fit
+        tried, control = spline
+        control, length_error = adjust_lengths(tried, control, points, arc, tolerance, LENGTH_WEIGHT * leeway)
+        bezier = _bezier(tried, control)
+        # Crowded parameters may throw control points far out although the curve meets all data.
+        if not np.isfinite(bezier).all() or np.abs(bezier - points[0]).max() > 2 * np.abs(points - points[0]).max():
+            continue
         curve = Curve(bezier=bezier, straight=np.zeros(len(bezier), dtype=bool))
-        score = goal.score(curve, length_error)
+        samples = curve.sample(tolerance / 10)
+        away = farthest(samples, points)
+        if away > far + bend / 6 or farthest(points, samples) > far + bend / 4:
+            continue
+        length_error = max(length_error, abs(polyline_length(samples) - float(arc[-1])))
+        # The larger of both errors, of place and length, over what is allowed.
+        score = max(away / allowed, length_error / (LENGTH * leeway))
         if len(bezier) < len(points) and score < least:
             best, least = curve, score
         if least <= 1.0:
@@ -259,52 +234,42 @@ def _fit_run(
     return best
 
 
-def _length_keeping_spline(
-    points: FloatArray, arc: FloatArray, smoothing: float, tolerance: float, length_weight: float
-) -> tuple[FloatArray, float] | None:
-    """Fit a spline, and move its coefficients until it has the wanted lengths.
+def _smoothing_spline(points: FloatArray, at: FloatArray, smoothing: float) -> tuple[FloatArray, FloatArray] | None:
+    """Return knots and control points (#C by 2 [m]) of a cubic smoothing spline, or None if there is none.
 
     Args:
-        points, arc: #P by 2 [m], and #P, the wanted length up to each [m].
+        points: #P by 2 [m].
+        at: #P, their parameters from 0 to 1.
         smoothing: FITPACK's bound for the sum of squared distances [m2].
-        tolerance: [m].
-        length_weight: [m], an error of length that counts as much as one tolerance of place.
-
-    Returns:
-        Control points (#S by 4 by 2), and by how much [m] the length up to some point is off; None if there is no
-        curve.
     """
-    from scipy.interpolate import BSpline, splprep
+    from scipy.interpolate import splprep
 
-    at = arc / arc[-1]
     degree = min(3, len(points) - 1)
     weights = np.ones(len(points))
     # The ends must stay: they weigh a thousandfold, and the last micrometres are corrected below.
     weights[[0, -1]] = 1e3
     try:
         # full_output silences FITPACK's warnings: the caller measures whether the fit is close enough.
-        fit = splprep(points.T, u=at, w=weights, k=degree, s=smoothing, full_output=1)
-        knots, coefficients, _ = fit[0][0]
+        knots, coefficients, _ = splprep(points.T, u=at, w=weights, k=degree, s=smoothing, full_output=1)[0][0]
     except ValueError:
         return None
     control = np.array(coefficients).T
     if degree == 2:
         knots, control = np.repeat([0.0, 1.0], 4), as_cubic(control)
     control[[0, -1]] = points[[0, -1]]
-    if not np.isfinite(control).all():
-        return None
-    control, off = adjust_lengths(knots, control, points, arc, tolerance, length_weight)
-    spline = BSpline(knots, control, 3)
-    breaks = np.unique(knots)
-    place, slope = spline(breaks), spline(breaks, 1)
-    third = np.diff(breaks)[:, None] / 3
-    result = np.stack([place[:-1], place[:-1] + third * slope[:-1], place[1:] - third * slope[1:], place[1:]], axis=1)
-    result[0, 0], result[-1, 3] = points[0], points[-1]
-    result[1:, 0] = result[:-1, 3]
-    # Crowded parameters may throw control points far out although the curve meets all data.
-    if not np.isfinite(result).all() or np.abs(result - points[0]).max() > 2 * np.abs(points - points[0]).max():
-        return None
-    return result, off
+    return (knots, control) if np.isfinite(control).all() else None
+
+
+def _bezier(knots: FloatArray, control: FloatArray) -> FloatArray:
+    """Return the segments (#S by 4 by 2) of a cubic B-spline, by inserting each inner knot twice more (Boehm 1980)."""
+    before, start, end, after = knots[2:-5], knots[3:-4], knots[4:-3], knots[5:-2]
+    one, two = (
+        control[1:-2] + ((at - before) / (after - before))[:, None] * (control[2:-1] - control[1:-2])
+        for at in (start, end)
+    )
+    share = (start[1:] - start[:-1]) / (end[1:] - start[:-1])
+    nodes = np.concatenate([control[:1], two[:-1] + share[:, None] * (one[1:] - two[:-1]), control[-1:]])
+    return np.stack([nodes[:-1], one, two, nodes[1:]], axis=1)
 
 
 def chords(points: FloatArray) -> Curve:
@@ -315,7 +280,7 @@ def chords(points: FloatArray) -> Curve:
     )
 
 
-def _stray(line: FloatArray, points: FloatArray) -> float:
+def farthest(line: FloatArray, points: FloatArray) -> float:
     """Return the largest distance [m] of a point from a line."""
     import shapely
 
@@ -362,7 +327,7 @@ def adjust_lengths(
         else:
             break
         fit = tried
-        if np.abs(move).max() < 1e-8:
+        if np.abs(move).max() < 1e-7:
             break
     return fit.control, float(np.abs(np.cumsum(fit.length_error)).max())
 
@@ -527,15 +492,14 @@ class _LengthSystem:
 
 
 def _cubic_basis(knots: FloatArray, at: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Return the cubic B-splines that are not zero at each place: numbers, values and slopes, #N by 4 each."""
+    """Return the cubic B-splines that are not zero at each place: numbers, values and slopes, #N by 4 each (de Boor 1972)."""
     from scipy.interpolate import BSpline
 
-    cubic, square = (BSpline.design_matrix(at, knots, degree) for degree in (3, 2))
-    number = cubic.indices.reshape(-1, 4).astype(np.int64)
-    # A cubic B-spline's slope is three times the difference of two quadratic ones, each over the width of its support.
+    square = BSpline.design_matrix(at, knots[1:-1], 2)
+    number = square.indices.reshape(-1, 3)[:, :1].astype(np.int64) + np.arange(5)
     lower = np.zeros((len(at), 5))
     lower[:, 1:4] = square.data.reshape(-1, 3)
-    each = number[:, :1] + np.arange(5)
-    reach = knots[np.minimum(each + 3, len(knots) - 1)] - knots[each]
-    share = 3.0 * np.divide(lower, reach, out=np.zeros_like(lower), where=reach > 0.0)
-    return number, cubic.data.reshape(-1, 4), share[:, :-1] - share[:, 1:]
+    start, end = knots[number], knots[np.minimum(number + 3, len(knots) - 1)]
+    share = np.divide(lower, end - start, out=np.zeros_like(lower), where=end > start)
+    value = share[:, :-1] * (at[:, None] - start[:, :-1]) + share[:, 1:] * (end[:, 1:] - at[:, None])
+    return number[:, :-1], value, 3.0 * (share[:, :-1] - share[:, 1:])

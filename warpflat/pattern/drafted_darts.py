@@ -65,7 +65,10 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
     found = {}
     for dart in piece.darts:
         left, right = by_name[dart.left], by_name[dart.right]
-        fold_to = dart.fold_to or _fold_side(left.line, right.line)
+        # A wedge is pressed downwards, or towards the middle if the dart runs along the grain.
+        (x, y), (u, v) = left.line[0], right.line[-1]
+        away = np.abs((left.line[0] + right.line[-1]) / 2 - left.line[-1])
+        fold_to = dart.fold_to or ("left" if (y < v if away[0] > away[1] else abs(x) < abs(u)) else "right")
         wedge = Wedge(name=dart.name, left=left.line, right=right.line, fold_to=fold_to)
         legs = DartLegs(dart=dart, left=left, right=right, wedge=wedge)
         # A dart is cut away if its mouth is so wide that something is left between the legs' allowances. Legs that are one
@@ -84,15 +87,6 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
 
 def _leg_width(leg: DraftedEdge) -> float:
     return LEG_ALLOWANCE if leg.edge.allowance is None else leg.edge.allowance
-
-
-def _fold_side(left: FloatArray, right: FloatArray) -> str:
-    """Return the side to which a wedge is pressed: downwards, or towards the middle for a dart along the grain."""
-    tip = left[-1]
-    away = (left[0] + right[-1]) / 2 - tip
-    if abs(away[0]) > abs(away[1]):
-        return "left" if left[0, 1] < right[-1, 1] else "right"
-    return "left" if abs(left[0, 0]) < abs(right[-1, 0]) else "right"
 
 
 def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 
-__all__ = ["FairLine", "bend_one_way", "best_wave", "count_inflections", "fair_line", "fairest_line"]
+__all__ = ["FairLine", "bend_one_way", "count_inflections", "fair_line", "fairest_line"]
 
 #: A line is faired at places this far apart [m], but at no fewer and no more of them than this.
 STEP, FEWEST, MOST = 0.003, 24, 200
@@ -50,7 +51,7 @@ def _changes_of_bend(angles: list[float]) -> int:
     """Return how often the direction [rad] of a line turns back by more than :data:`LEAST_BEND`."""
     count, sign, low, high = 0, 0, np.inf, -np.inf
     for angle in angles:
-        low, high = min(low, angle), max(high, angle)
+        low, high = angle if angle < low else low, angle if angle > high else high
         turned = 1 if angle - low > LEAST_BEND else -1 if high - angle > LEAST_BEND else 0
         if turned:
             # The next bend begins where this one ends.
@@ -76,6 +77,13 @@ def fair_line(
         straight: #P, points in a row that come to lie on one straight line, if some do.
         mirrored: whether the line goes on beyond its first and its last point as its mirror image in an upright line.
     """
+    return next(_fair_lines(points, [wave], straight, mirrored))
+
+
+def _fair_lines(
+    points: FloatArray, waves: Iterable[float], straight: BoolArray | None, mirrored: tuple[bool, bool]
+) -> Iterator[FairLine]:
+    """Yield the line of :func:`fair_line` for each wave [m]; the waves share the equations."""
     places, even = _evenly(points)
     arc = arc_lengths(points)
     is_straight = _straight_places(points, places, straight)
@@ -98,32 +106,14 @@ def fair_line(
         sums[begin + 1 : last, begin], sums[begin + 1 : last, last] = 1.0 - share, share
         inner[begin + 1 : last] = True
     basis = sums[:, ~inner]
-    bend = (wave / (2 * np.pi * places[1])) ** 3 * np.diff(basis, n=3, axis=0)
-    solved = np.linalg.solve(basis.T @ basis + bend.T @ bend, basis.T @ even)
-    smooth = (basis @ solved)[first : first + len(places)]
-    # Points keep their shares of the length.
-    reached = arc_lengths(smooth)
-    placed = points_at_lengths(smooth, np.interp(arc, places, reached))
-    return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
-
-
-def best_wave(
-    points: FloatArray,
-    bound: float,
-    *,
-    straight: BoolArray | None = None,
-    mirrored: tuple[bool, bool] = (False, False),
-) -> float | None:
-    """Return the wave that makes the fewest inflections for the least shift; None if every wave breaks the bound [m]."""
-    best: tuple[int, float, float] | None = None
-    for wave in FIRST_WAVE * GROWTH ** np.arange(WAVES):
-        tried = fair_line(points, float(wave), straight=straight, mirrored=mirrored)
-        if tried.shift > bound:
-            break
-        cost = tried.shift + WORTH * tried.inflections
-        if best is None or (tried.inflections < best[0] and cost < best[1]):
-            best = tried.inflections, cost, float(wave)
-    return None if best is None else best[2]
+    bend = np.diff(basis, n=3, axis=0)
+    near, bent, wanted = basis.T @ basis, bend.T @ bend, basis.T @ even
+    for wave in waves:
+        solved = np.linalg.solve(near + (wave / (2 * np.pi * places[1])) ** 6 * bent, wanted)
+        smooth = (basis @ solved)[first : first + len(places)]
+        # Points keep their shares of the length.
+        placed = points_at_lengths(smooth, np.interp(arc, places, arc_lengths(smooth)))
+        yield FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
 
 
 def bend_one_way(points: FloatArray, wave: float, *, straight: BoolArray | None = None) -> FairLine | None:
@@ -175,15 +165,23 @@ def fairest_line(
         bound: [m].
         one_way: whether a line that bends to one side only is preferred, with the longest wave within the bound.
     """
-    wave = best_wave(points, bound, straight=straight, mirrored=mirrored)
-    best = None if wave is None else fair_line(points, wave, straight=straight, mirrored=mirrored)
+    best: FairLine | None = None
+    least = np.inf
+    for tried in _fair_lines(points, FIRST_WAVE * GROWTH ** np.arange(WAVES), straight, mirrored):
+        if tried.shift > bound:
+            break
+        cost = tried.shift + WORTH * tried.inflections
+        if best is None or (tried.inflections < best.inflections and cost < least):
+            best, least = tried, cost
+        if best.inflections == 0:
+            break
     if not one_way or (best is not None and best.inflections == 0):
         return best
     for wave in FIRST_WAVE * GROWTH ** np.arange(WAVES):
-        tried = bend_one_way(points, float(wave), straight=straight)
-        if tried is None or tried.shift > bound:
+        bent = bend_one_way(points, float(wave), straight=straight)
+        if bent is None or bent.shift > bound:
             break
-        best = tried
+        best = bent
     return best
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, turning_angles
-from warpflat.pattern.curves import TOLERANCE, Curve, chords, fit_curve
+from warpflat.pattern.curves import TOLERANCE, Curve, chords, farthest, fit_curve
 from warpflat.pattern.piece_parts import SAME_POINT
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
@@ -167,7 +167,8 @@ def _keep_near(
     within = TOLERANCE if tolerance is None else tolerance
     keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
     clean = [key for key in keys if fitted[key][1] <= within]
-    tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in clean}
+    far = [key for key in clean if fitted[key][1] != within or farthest(fitted[key][0].sample(), lines[key]) > within]
+    tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in far}
     # Both sides of every seam and dart, in one direction, and the second side's ease.
     unchecked: list[tuple[Sides, Eased]] = [(seam.sides, (seam.ease, seam.eased)) for seam in seams]
     for name, dart in ((piece.name, dart) for piece in pieces for dart in piece.darts):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -85,7 +85,9 @@ def piece_from_mesh(
     loops = border_loops(faces, np.column_stack([flat, np.zeros(len(flat))]))
     if not loops:
         raise InputError(f"piece {name!r}: the mesh is closed and has no border; cut it open first")
-    areas = [_signed_area(flat[loop]) for loop in loops]
+    # Areas [m2], negative where a border runs clockwise.
+    plane = flat[:, 0] + 1j * flat[:, 1]
+    areas = [float((plane[loop].conj() * plane[np.roll(loop, -1)]).imag.sum() / 2) for loop in loops]
     largest = int(np.argmax(np.abs(areas)))
     if areas[largest] < 0:  # it lies on its back
         flat = flat * [-1.0, 1.0]
@@ -108,9 +110,22 @@ def piece_from_mesh(
     corners = corners | {place for places in darts.values() for place in places}
     found = find_cracks(flat[outer], corners, {places[1] for places in darts.values()})
     darts |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
-    grain = None if features.grain_line is None else _grain_along(flat, outer, lines, features.grain_line, name)
+    grain = None
+    if (datum := features.grain_line) is not None:
+        if datum not in lines:
+            raise InputError(f"piece {name!r}: no line {datum!r} for the grain; {nearest(datum, lines)}")
+        span = flat[lines[datum][-1]] - flat[lines[datum][0]]
+        if (length := float(np.linalg.norm(span))) < 1e-6:
+            raise InputError(f"piece {name!r}: line {datum!r} is closed and gives the grain no direction")
+        # Parallel to the line's chord but inside the piece: a datum line is often its border.
+        x, y = span / length
+        turn = np.array([[y, -x], [x, y]])
+        grain = default_grain(flat[outer] @ turn.T) @ turn
     changes = {i for i in range(len(labels)) if labels[i] != labels[i - 1]}
-    inside_leg = {place for places in darts.values() for place in _between_mouths(places, len(labels))}
+    # Places strictly between the two mouths of a dart.
+    inside_leg = {
+        (left + k) % len(labels) for left, _, right in darts.values() for k in range(1, (right - left) % len(labels))
+    }
     # The border as edges from one split to the next, named by lines, darts or numbers.
     splits = sorted((corners | changes) - inside_leg | {places[1] for places in darts.values()}) or [0]
     legs = {places[0]: f"{key}.left" for key, places in darts.items()}
@@ -130,6 +145,20 @@ def piece_from_mesh(
         for key in mapping:
             if key not in names:
                 raise InputError(f"piece {name!r}: {what} name an edge {key!r} that it has not; {nearest(key, names)}")
+    # Stretches of feature lines inside, and borders inside, counter-clockwise: those of cracks by their names.
+    border = {
+        (min(a, b), max(a, b)) for loop in loops for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+    }
+    internal: dict[str, FloatArray] = {}
+    for key, line in lines.items():
+        for index, stretch in enumerate(inner_stretches(line, border)):
+            internal[key if index == 0 else f"{key}_{index + 1}"] = flat[stretch]
+    cracks = {key: np.unique(np.asarray(vertices)) for key, vertices in features.fisheyes.items()}
+    holes = []
+    for number, loop in enumerate(inner, start=1):
+        crack = next((each for each, ids in cracks.items() if np.array_equal(ids, np.sort(loop))), None)
+        label, kind = (f"hole_{number}", "cutout") if crack is None else (crack, "dart")
+        holes.append(Hole(name=label, points=flat[loop[::-1]], kind=kind))
     return Piece(
         name=name,
         size=size,
@@ -145,15 +174,10 @@ def piece_from_mesh(
             for title, vertices in stretches
         ],
         darts=[Dart(name=key, left=f"{key}.left", right=f"{key}.right") for key in darts],
-        internal_lines=_internal_lines(flat, [outer, *inner], lines),
+        internal_lines=internal,
         grain=grain,
-        holes=_holes(flat, inner, features.fisheyes),
+        holes=holes,
     )
-
-
-def _between_mouths(places: DartPlaces, count: int) -> set[int]:
-    """Return the places strictly between the two mouths of a dart."""
-    return {(places[0] + k) % count for k in range(1, (places[2] - places[0]) % count)}
 
 
 def line_labels(loop: IntArray, curves: Mapping[str, IntArray]) -> list[str]:
@@ -180,48 +204,3 @@ def inner_stretches(line: IntArray, border: Set[tuple[int, int]]) -> list[IntArr
         else:
             runs[-1] += [b] if runs[-1] else [a, b]
     return [np.array(run, dtype=np.int64) for run in runs if run]
-
-
-def _internal_lines(
-    flat: FloatArray, loops: Sequence[IntArray], lines: Mapping[str, IntArray]
-) -> dict[str, FloatArray]:
-    """Return the stretches of feature lines inside, #P by 2 [m]; a second stretch of a line is "NAME_2"."""
-    border = {
-        (min(a, b), max(a, b)) for loop in loops for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
-    }
-    internal: dict[str, FloatArray] = {}
-    for key, line in lines.items():
-        for index, stretch in enumerate(inner_stretches(line, border)):
-            internal[key if index == 0 else f"{key}_{index + 1}"] = flat[stretch]
-    return internal
-
-
-def _holes(flat: FloatArray, loops: Sequence[IntArray], fisheyes: Mapping[str, ArrayLike]) -> list[Hole]:
-    """Return the border loops inside, counter-clockwise: those of cracks by their names, the others numbered."""
-    cracks = {name: np.unique(np.asarray(vertices)) for name, vertices in fisheyes.items()}
-    holes = []
-    for number, loop in enumerate(loops, start=1):
-        crack = next((name for name, ids in cracks.items() if np.array_equal(ids, np.sort(loop))), None)
-        name, kind = (f"hole_{number}", "cutout") if crack is None else (crack, "dart")
-        holes.append(Hole(name=name, points=flat[loop[::-1]], kind=kind))
-    return holes
-
-
-def _grain_along(flat: FloatArray, loop: IntArray, lines: Mapping[str, IntArray], key: str, name: str) -> FloatArray:
-    """Return the grain, parallel to a line's chord but inside the piece: a datum line is often its border."""
-    if key not in lines:
-        raise InputError(f"piece {name!r}: no line {key!r} for the grain; {nearest(key, lines)}")
-    line = lines[key]
-    span = flat[line[-1]] - flat[line[0]]
-    length = float(np.linalg.norm(span))
-    if length < 1e-6:
-        raise InputError(f"piece {name!r}: line {key!r} is closed and gives the grain no direction")
-    x, y = span / length
-    turn = np.array([[y, -x], [x, y]])
-    return default_grain(flat[loop] @ turn.T) @ turn
-
-
-def _signed_area(ring: FloatArray) -> float:
-    """Return the area [m2] of a closed line, negative if it runs clockwise."""
-    following = np.roll(ring, -1, axis=0)
-    return float((ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0]).sum() / 2)

@@ -108,7 +108,13 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     import shapely
 
     axis = _axis(piece)
-    edges = [part for edge in piece.edges if (part := _kept_part(edge, axis, side)) is not None]
+    edges = []
+    for whole in piece.edges:
+        clipped = [_clipped(control, axis, side) for control in whole.curve.bezier]
+        has_part = np.array([part is not None for part in clipped])
+        if has_part.any():
+            bezier = np.stack([part for part in clipped if part is not None])
+            edges.append(_with_curve(whole, Curve(bezier=bezier, straight=whole.curve.straight[has_part])))
     # The first edge after the gap where the other half was.
     first = next(
         k
@@ -224,19 +230,6 @@ def _along_fold(notch: Notch) -> Notch:
         notch, at=notch.at * upright, base=(notch.base[0] * upright,),
         direction=np.sign(notch.direction[1]) * upright,
     )  # fmt: skip
-
-
-def _kept_part(edge: DraftedEdge, axis: float, side: float) -> DraftedEdge | None:
-    """Return the part of an edge on one side of the axis; None if there is none."""
-    kept, straight = [], []
-    for control, is_straight in zip(edge.curve.bezier, edge.curve.straight, strict=True):
-        part = _clipped(control, axis, side)
-        if part is not None:
-            kept.append(part)
-            straight.append(is_straight)
-    if not kept:
-        return None
-    return _with_curve(edge, Curve(bezier=np.stack(kept), straight=np.array(straight)))
 
 
 def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -249,20 +248,17 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
         total_computation_time=seconds, num_workers=1, seed=seed, min_items_separation=cloth.gap * 1000 or None
     )
     placements = []
-    for item in _solved(instance, config):
-        piece, mirrored = copies[int(item.id)]
-        placements.append(_placed(piece, mirrored, matrices[int(item.id)], item.rotation, item.translation, cloth.gap))
-    return sorted(placements, key=lambda copy: (copy.cut_line[:, 0].min(), copy.cut_line[:, 1].min()))
-
-
-def _solved(instance: Any, config: Any) -> list[Any]:
-    """Run the solver, and turn its panic, a bare exception in Python, into an error message."""
     try:
-        return list(instance.solve(config).placed_items)
+        placed = list(instance.solve(config).placed_items)
     except BaseException as error:
+        # The solver's panic is a bare exception in Python.
         if type(error).__name__ != "PanicException":
             raise
         raise InputError(f"the nesting solver gave up ({error}); wider cloth or a smaller gap may help") from None
+    for item in placed:
+        piece, mirrored = copies[int(item.id)]
+        placements.append(_placed(piece, mirrored, matrices[int(item.id)], item.rotation, item.translation, cloth.gap))
+    return sorted(placements, key=lambda copy: (copy.cut_line[:, 0].min(), copy.cut_line[:, 1].min()))
 
 
 def _check(marker: Marker) -> None:

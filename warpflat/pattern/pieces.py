@@ -21,7 +21,7 @@ from warpflat.pattern.words import translate_name
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 if TYPE_CHECKING:
-    import shapely
+    pass
 
 __all__ = ["Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
 
@@ -370,7 +370,14 @@ def check_piece(
         raise InputError(f"{where}: the outline has {len(outline)} points; it needs at least 3")
     polygon = shapely.Polygon(outline)
     if not polygon.is_valid or polygon.area <= 0:
-        raise InputError(f"{where}: the outline {_outline_fault(polygon)}")
+        if polygon.length <= 0 or polygon.convex_hull.area <= 1e-9 * polygon.length**2:
+            raise InputError(f"{where}: the outline encloses no area")
+        place = _PLACE.search(shapely.is_valid_reason(polygon))
+        at = "" if place is None else f" at ({1e3 * float(place[1]):.1f}, {1e3 * float(place[2]):.1f}) mm in the plane"
+        raise InputError(
+            f"{where}: the outline crosses itself{at}: flat, the piece lies over itself there; cut it apart, so that no "
+            "piece does"
+        )
     if not polygon.exterior.is_ccw:
         raise InputError(f"{where}: the outline runs clockwise; list its edges counter-clockwise")
     # A dart's legs are edges of its kind that follow each other.
@@ -407,14 +414,3 @@ def check_piece(
             f"{where}: the cloth around hole {hole.name!r} lies on itself by {width * 1000:.1f} mm; a hole runs "
             "counter-clockwise and does not cross itself"
         )
-
-
-def _outline_fault(polygon: shapely.Polygon) -> str:
-    """Return why a closed line is no outline, and what to do about it."""
-    import shapely
-
-    if polygon.length <= 0 or polygon.convex_hull.area <= 1e-9 * polygon.length**2:
-        return "encloses no area"
-    place = _PLACE.search(shapely.is_valid_reason(polygon))
-    at = "" if place is None else f" at ({1e3 * float(place[1]):.1f}, {1e3 * float(place[2]):.1f}) mm in the plane"
-    return f"crosses itself{at}: flat, the piece lies over itself there; cut it apart, so that no piece does"

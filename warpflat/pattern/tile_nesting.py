@@ -110,7 +110,12 @@ def nest_on_tiles(
     least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
     square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
     counts = list(range(least, max(least, square) + 3)) if coarser == 1.0 else [max(least, square)]
-    heights = [_heights(masks, count, per_tile, shared) for count in counts]
+    # How many rows of tiles each shape takes where it is lowest, of its positions that fit into the columns.
+    heights = []
+    for count in counts:
+        across = count * per_tile[1] + shared[1]
+        low = [min(len(mask.cells) for mask in row if mask.cells.shape[1] <= across) for row in masks]
+        heights.append([max(1, int(np.ceil((height - shared[0]) / per_tile[0]))) for height in low])
     sizes = [(max(height) + needed // count + 2, count) for count, height in zip(counts, heights, strict=True)]
     # Where shapes do not fit together there is room at last for all above each other.
     stacked = sum(max(len(mask.cells) for mask in row) // per_tile[0] + 1 for row in masks)
@@ -204,15 +209,6 @@ def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: t
     row, column = np.nonzero(unknown)
     cells[row, column] = shapely.intersects(area, boxes(row, column, 1))
     return np.ascontiguousarray(cells)
-
-
-def _heights(
-    masks: Sequence[Sequence[Mask]], columns: int, per_tile: tuple[int, ...], shared: tuple[int, int]
-) -> list[int]:
-    """Return for each shape how many rows of tiles it takes where it is lowest, of its positions that fit into the columns."""
-    across = columns * per_tile[1] + shared[1]
-    low = [min(len(mask.cells) for mask in row if mask.cells.shape[1] <= across) for row in masks]
-    return [max(1, int(np.ceil((height - shared[0]) / per_tile[0]))) for height in low]
 
 
 def orders(masks: Sequence[Sequence[Mask]]) -> list[list[int]]:

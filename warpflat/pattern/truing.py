@@ -58,8 +58,12 @@ class _Corner:
     wanted: float
 
     def angle(self, curves: Mapping[EdgeKey, Curve]) -> float:
-        """Return the sum of the angles [rad]."""
-        return sum(_inner_angle(curves[arrive[0]], curves[leave[0]]) for arrive, leave in self.ends)
+        """Return the sum of the angles [rad] inside the pieces, between an edge and the next one, counter-clockwise."""
+        total = 0.0
+        for arrive, leave in self.ends:
+            (x, y), (u, v) = -end_direction(curves[arrive[0]].reversed()), end_direction(curves[leave[0]])
+            total += float(np.pi - np.arctan2(x * v - y * u, x * u + y * v))
+        return total
 
 
 def true_corners(
@@ -138,12 +142,6 @@ def _least_turns(corners: Sequence[_Corner], curves: Mapping[EdgeKey, Curve]) ->
     missing = np.array([corner.wanted - corner.angle(curves) for corner in corners])
     solved = np.linalg.lstsq(rates, missing, rcond=1e-9)[0]
     return {end: float(turn) for end, turn in zip(ends, solved, strict=True) if abs(turn) > LEAST_TURN}
-
-
-def _inner_angle(arrive: Curve, leave: Curve) -> float:
-    """Return the angle [rad] inside a piece between an edge and the next one, counter-clockwise."""
-    (x, y), (u, v) = -end_direction(arrive.reversed()), end_direction(leave)
-    return float(np.pi - np.arctan2(x * v - y * u, x * u + y * v))
 
 
 def _seam_corners(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[_Corner]:

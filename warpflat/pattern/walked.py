@@ -52,6 +52,8 @@ def walk_seams(drafted: DraftedGarment) -> tuple[WalkedSeam, ...]:
 
 def _walk(seam: Seam, pieces: dict[str, DraftedPiece], size: str) -> WalkedSeam:
     """Lay the second side of a seam upon the first."""
+    import shapely
+
     lines = [SeamLine(side, pieces) for side in seam.sides]
     shares = np.linspace(0.0, 1.0, PLACES)
     opposite = np.array([seam.reach(float(share), 1.0) for share in shares]) / (1.0 + seam.ease)
@@ -65,7 +67,25 @@ def _walk(seam: Seam, pieces: dict[str, DraftedPiece], size: str) -> WalkedSeam:
     left, _, right = np.linalg.svd((second - middles[1]).T @ (first - middles[0]))
     turn = left @ np.diag([1.0, np.sign(np.linalg.det(left @ right))]) @ right
     second = (second - middles[1]) @ turn + middles[0]
-    marked = [_notch_lengths(line) for line in lines]
+    # The lengths [m] along each side at which its edges have notches, those of a turned copy included.
+    marked = []
+    for line in lines:
+        found = {
+            float(start + shapely.LineString(points).project(shapely.Point(notch.at)))
+            for piece, edge, points, start in zip(line.pieces, line.edges, line.lines, line.joints, strict=False)
+            for notch in piece.notches
+            if notch.edge == edge.name
+        }
+        marked.append(np.array(sorted(found)))
+    if seam.sides[0] == seam.sides[1]:
+        notch_mm = 0.0 if len(marked[0]) else None
+    else:
+        # The largest distance from a notch to the nearest notch or joint of the other side.
+        joints = [np.concatenate([row, line.joints]) for row, line in zip(marked, lines, strict=True)]
+        reached = np.array([seam.reach(float(length), lines[0].length) for length in joints[0]])
+        gaps = [float(np.abs(joints[1] - length).min()) for length in reached[: len(marked[0])]]
+        gaps += [float(np.abs(reached - length).min()) for length in marked[1]]
+        notch_mm = 1000.0 * max(gaps) if gaps else None
     notches = [points_at_lengths(line, lengths) for line, lengths in zip(drawn, marked, strict=True)]
     notches[1] = (notches[1] - middles[1]) @ turn + middles[0]
     return WalkedSeam(
@@ -75,7 +95,7 @@ def _walk(seam: Seam, pieces: dict[str, DraftedPiece], size: str) -> WalkedSeam:
         notches=(notches[0], notches[1]),
         distance_mm=1000.0 * float(np.linalg.norm(first - second, axis=1).max()),
         difference_mm=1000.0 * (lines[1].length - lines[0].length * (1.0 + seam.ease)),
-        notch_mm=_notch_mismatch(seam, lines, marked),
+        notch_mm=notch_mm,
     )
 
 
@@ -90,27 +110,3 @@ def _joined(line: SeamLine) -> FloatArray:
             part = (part - part[0]) @ np.array([[cosine, sine], [-sine, cosine]]) + joined[-1]
         joined = np.concatenate([joined, part[1:] if len(joined) else part])
     return joined
-
-
-def _notch_lengths(line: SeamLine) -> FloatArray:
-    """Return the lengths [m] along one side at which its edges have notches, those of a turned copy included."""
-    import shapely
-
-    found = {
-        float(start + shapely.LineString(points).project(shapely.Point(notch.at)))
-        for piece, edge, points, start in zip(line.pieces, line.edges, line.lines, line.joints, strict=False)
-        for notch in piece.notches
-        if notch.edge == edge.name
-    }
-    return np.array(sorted(found))
-
-
-def _notch_mismatch(seam: Seam, lines: list[SeamLine], marked: list[FloatArray]) -> float | None:
-    """Return the largest distance [mm] from a notch to the nearest notch or joint of the other side."""
-    if seam.sides[0] == seam.sides[1]:
-        return 0.0 if len(marked[0]) else None
-    places = [np.concatenate([row, line.joints]) for row, line in zip(marked, lines, strict=True)]
-    reached = np.array([seam.reach(float(length), lines[0].length) for length in places[0]])
-    gaps = [float(np.abs(places[1] - length).min()) for length in reached[: len(marked[0])]]
-    gaps += [float(np.abs(reached - length).min()) for length in marked[1]]
-    return 1000.0 * max(gaps) if gaps else None

@@ -48,9 +48,12 @@ def whole_pieces(
     whole |= {name + MIRRORED: _turned(given[name]) for name in twice if name in sewn}
     found: list[Seam] = []
     taken: set[tuple[str, str]] = set()
-    flipped = [
-        _flipped(seam) for seam in seams if all(s.piece in halves | twice for chain in seam.sides for s in chain)
-    ]
+    # Seams on the other side of the body.
+    flipped = []
+    for seam in seams:
+        if all(side.piece in halves | twice for chain in seam.sides for side in chain):
+            one, other = (tuple(replace(side, mirrored=not side.mirrored) for side in row) for row in seam.sides)
+            flipped.append(replace(seam, name=seam.name + MIRRORED, sides=(one, other)))
     for seam in (*seams, *flipped):
         plain = replace(seam, sides=(_named(seam.sides[0], halves), _named(seam.sides[1], halves)))
         edges = {(side.piece, side.edge) for chain in plain.sides for side in chain}
@@ -86,12 +89,6 @@ def hole_edges(hole: Hole) -> list[Edge]:
         return [Edge(name=f"{hole.name} left", points=first), Edge(name=f"{hole.name} right", points=second[::-1])]
     ring, half = np.concatenate([hole.points, hole.points[:1]]), len(hole.points) // 2
     return [Edge(name=f"{hole.name} {k + 1}", points=p) for k, p in enumerate((ring[: half + 1], ring[half:]))]
-
-
-def _flipped(seam: Seam) -> Seam:
-    """Return the seam on the other side of the body."""
-    first, second = (tuple(replace(side, mirrored=not side.mirrored) for side in chain) for chain in seam.sides)
-    return replace(seam, name=seam.name + MIRRORED, sides=(first, second))
 
 
 def _named(chain: Sequence[SeamSide], halves: set[str]) -> tuple[SeamSide, ...]:
