@@ -241,24 +241,6 @@ def test_mistakes_are_found_before_anything_is_flattened(tmp_path: Path):
     assert "A4" in told("[surface]\nshape = 'dome'\n[pattern]\npaper = 'A5'\n")
 
 
-def test_the_scripts_of_the_readme_run_and_write_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    piece, steps, garment = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    (of_piece,) = re.findall(r"`(warpflat\.surface_files\(.*?\))`", text)
-    monkeypatch.chdir(tmp_path)
-    # As they stand, but coarser.
-    for script, fine, coarse in (
-        (f"{piece}\n{of_piece}\n{steps}", "resolution=33", "resolution=9"),
-        (garment, 'from_size("EU 38")', 'from_size("EU 38", resolution_mm=30)'),
-    ):
-        assert fine in script
-        exec(script.replace(fine, coarse), {})
-    for name, objects in (("bodice", {"bodice.obj"}), ("dress", {"front_centre.obj", "back_centre.obj"})):
-        files = {path.name for path in (tmp_path / "out" / name).iterdir()}
-        assert {"metrics.json", "picture.png", f"{name}.dxf", f"{name}.svg", "pattern.pdf", "pattern.json"} <= files
-        assert objects < files
-
-
 def test_what_cannot_be_drawn_is_a_note(tmp_path: Path):
     flat = flatten(make_shape("dome", resolution=7))
     torn = flat.positions.copy()
