@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -20,7 +21,9 @@ from warpflat._version import __version__
 from warpflat.cli.progress_bar import ProgressBar
 from warpflat.cli.tables import warnings_of
 from warpflat.core.text import energy_words, format_count
+from warpflat.core.toml_file import read_toml
 
+SCENES = Path(__file__).parents[2] / "scenes"
 PATTERN_FILES = ("cloth.dxf", "cloth.svg", "pattern.pdf", "pattern.json")
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
@@ -539,3 +542,24 @@ def test_program_ends_without_a_last_search_of_its_memory():
         "sys.exit(10 + code if gc.get_freeze_count() > 1000 and gc.get_threshold()[0] > usual else 1)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 10
+
+
+def test_an_example_is_written_beside_what_is_there_and_says_the_next_command(command: Command, tmp_path: Path):
+    listed = command("example")
+    assert listed.code == 0
+    assert {line.split("  ")[0] for line in listed.out.splitlines() if "  " in line} == {
+        path.stem for path in SCENES.iterdir() if path.suffix in (".toml", ".py")
+    }
+    written = command("example", "dome")
+    assert written.changed == {"dome.toml"}
+    assert written.out.splitlines()[-1] == "next: warpflat run dome.toml"
+    assert read_toml(tmp_path / "dome.toml") == read_toml(SCENES / "dome.toml")
+    assert "scenes/" not in (tmp_path / "dome.toml").read_text()
+    assert command(*shlex.split(written.out.splitlines()[-1])[2:], "--quiet").code == 0
+    # Nothing is replaced, and a batch brings its scenes.
+    (tmp_path / "basic_block.toml").write_text("mine")
+    assert "is there already" in command("example", "dome.toml").refusal
+    batch = command("example", "batch_sizes")
+    assert batch.changed == {"batch_sizes.toml"}
+    assert "next: warpflat batch batch_sizes.toml" in batch.out
+    assert "did you mean 'dome'" in command("example", "dom").refusal

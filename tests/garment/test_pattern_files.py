@@ -14,13 +14,14 @@ import ezdxf
 import numpy as np
 import pytest
 import shapely
+from printed import faults
 from sample_dress import sample_dress
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.export.dxf import write_dxf
 from warpflat.export.pattern_json import pattern_from_json, pattern_json, read_pattern_json
-from warpflat.export.pdf import write_pdf
+from warpflat.export.pdf import draw_sheet, sheet_names, write_pdf
 from warpflat.export.svg import write_svg
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules
@@ -33,6 +34,7 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece
 from warpflat.pattern.drafted import DraftedGarment
+from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.scene.load import load_scene
@@ -86,6 +88,25 @@ def test_sizes_lie_in_one_file(nest: Path):
     assert widths[2] - widths[0] > 0.02
     svg = (nest / "skirt.svg").read_text()
     assert all(f'data-size="{size}"' in svg for size in data["sizes"])
+
+
+@pytest.mark.parametrize("paper", ["A4", "Letter"])
+def test_no_label_of_a_nest_is_cut_at_the_edge_of_a_sheet(nest: Path, dress: DraftedGarment, paper: str):
+    assert faults(read_pattern_json(nest / "pattern.json"), paper) == []
+    assert faults(dress, paper) == []
+    # A sheet's name lies on no line.
+    for garment in (read_pattern_json(nest / "pattern.json"), dress):
+        printed = halved(garment)
+        tiling, drawings = draw_sheet(printed, paper)
+        lines = [
+            shapely.LineString(placed.on_sheet(stroke.points))
+            for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True)
+            for drawing in sizes
+            for stroke in drawing.strokes
+            if not stroke.hidden
+        ]
+        for place in sheet_names(tiling, drawings).values():
+            assert shapely.distance(shapely.box(*place, *(place + np.array([0.012, 0.0065]))), lines).min() > 0.0
 
 
 def test_the_scene_sets_allowances(nest: Path):
@@ -239,24 +260,6 @@ def test_mistakes_are_found_before_anything_is_flattened(tmp_path: Path):
     assert "EU 37" in told(NEST.replace("EU 44", "EU 37"))
     assert "pattern.sizes needs" in told("[surface]\nshape = 'dome'\n[pattern]\nsizes = ['EU 38']\n")
     assert "A4" in told("[surface]\nshape = 'dome'\n[pattern]\npaper = 'A5'\n")
-
-
-def test_the_scripts_of_the_readme_run_and_write_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    piece, steps, garment = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    (of_piece,) = re.findall(r"`(warpflat\.surface_files\(.*?\))`", text)
-    monkeypatch.chdir(tmp_path)
-    # As they stand, but coarser.
-    for script, fine, coarse in (
-        (f"{piece}\n{of_piece}\n{steps}", "resolution=33", "resolution=9"),
-        (garment, 'from_size("EU 38")', 'from_size("EU 38", resolution_mm=30)'),
-    ):
-        assert fine in script
-        exec(script.replace(fine, coarse), {})
-    for name, objects in (("bodice", {"bodice.obj"}), ("dress", {"front_centre.obj", "back_centre.obj"})):
-        files = {path.name for path in (tmp_path / "out" / name).iterdir()}
-        assert {"metrics.json", "picture.png", f"{name}.dxf", f"{name}.svg", "pattern.pdf", "pattern.json"} <= files
-        assert objects < files
 
 
 def test_what_cannot_be_drawn_is_a_note(tmp_path: Path):

@@ -9,12 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from printed import faults
+from pypdf import PdfReader
 from usd_validation import validate_usd
 
 from warpflat.core.errors import InputError
 from warpflat.core.toml_file import read_toml
+from warpflat.export.pattern_json import read_pattern_json
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.library import find_fabric
+from warpflat.garment.pattern_files import export_patterns
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, load_scene, scene_fabric
 from warpflat.scene.run import run_scene
@@ -318,6 +322,20 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
     if path.stem in DRAWN:
         assert validate_usd(tmp_path / "frames.usdc") == []
     assert json.loads((tmp_path / "metrics.json").read_text())["pieces"].keys() == result.metrics["pieces"].keys()
+    # The pattern as printed: nothing leaves its piece, no word is cut, and every opening is named in every file.
+    assert faults(read_pattern_json(tmp_path / "pattern.json")) == []
+    openings = {str(table["kind"]).removesuffix("s") for table in read_toml(path).get("openings", ())}
+    if openings:
+        export_patterns(tmp_path, ["pdf", "svg", "dxf"], out=tmp_path / "opened")
+        own_name = path.stem.replace("_", " ")
+        pages = [
+            page.extract_text().replace(own_name, "") for page in PdfReader(tmp_path / "opened" / "pattern.pdf").pages
+        ]
+        guide, sheets = ("".join(page for page in pages if ("sheet A" in page) == wanted) for wanted in (False, True))
+        drawn = [(tmp_path / "opened" / f"{path.stem}.{ending}").read_text() for ending in ("svg", "dxf")]
+        for text in (guide, sheets, *drawn):
+            named = set(re.findall(r"zip|button|vent|slit|keyhole", text.replace(path.stem, "").replace(own_name, "")))
+            assert openings <= named
 
 
 def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

@@ -40,7 +40,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     A task whose result is there is not run again. Ctrl-C keeps what is done, and the same command goes on from there.
     A task that fails ends none of the others; the exit code is 1 then.
 
-    Several workers and a scheduler need Dask: pip install "warpflat[batch]".
+    Several workers and a scheduler need Dask: pip install ".[batch]" in a checkout.
 
     \b
     Examples:
@@ -57,9 +57,9 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     tasks = load_batch(file)
     if find_spec("distributed") is None:
         if scheduler is not None:
-            raise InputError('--scheduler needs Dask: pip install "warpflat[batch]", or leave it out')
+            raise InputError('--scheduler needs Dask: pip install ".[batch]" in a checkout, or leave it out')
         if workers > 1:
-            _note('--workers needs Dask (pip install "warpflat[batch]"); the tasks run one after the other')
+            _note('--workers needs Dask (pip install ".[batch]" in a checkout); the tasks run one after the other')
             workers = 1
     start_warp_silently()
     folder = out if out is not None else Path("out") / file.stem

@@ -17,6 +17,7 @@ from warpflat.cli.batch import batch
 from warpflat.cli.compare import compare
 from warpflat.cli.cuts import cuts
 from warpflat.cli.drape import drape
+from warpflat.cli.example import example
 from warpflat.cli.export import export
 from warpflat.cli.fabrics import fabrics
 from warpflat.cli.fit import fit
@@ -74,7 +75,8 @@ def cli(context: click.Context) -> None:
 
     \b
     Examples:
-      warpflat run scenes/dome.toml                       a scene file, into out/dome
+      warpflat example                                    the scenes that come with it; example dome writes dome.toml
+      warpflat run dome.toml                              a scene file, into out/dome
       warpflat flatten front.obj --units cm --fabric denim
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
@@ -89,7 +91,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, fit, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
+for _command in (run, example, flatten, fit, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
     cli.add_command(_command)
 
 

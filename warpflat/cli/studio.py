@@ -44,7 +44,7 @@ def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> i
     SCENE it begins with the basic block of size EU 38. Ctrl-C ends the studio. The address that it prints has a token in it: only
     who opens that address is let in.
 
-    It needs viser: pip install "warpflat[studio]".
+    It needs viser: pip install ".[studio]" in a checkout.
 
     \b
     Examples:
@@ -56,7 +56,7 @@ def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> i
     from warpflat.scene.load import load_scene, make_scene
 
     if find_spec("viser") is None:
-        raise InputError('the studio needs viser: pip install "warpflat[studio]"')
+        raise InputError('the studio needs viser: pip install ".[studio]" in a checkout')
     made = load_scene(scene) if scene else make_scene(_BLOCK, name="block", folder=Path(), where="studio")
     start_warp_silently()
     from warpflat.studio.page import Page

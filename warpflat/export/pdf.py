@@ -25,15 +25,15 @@ from warpflat.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, P
 from warpflat.export.svg import OF_SIZE, STYLE
 from warpflat.pattern.draft import nest_label, relabelled
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
-from warpflat.pattern.drawing import OnPaper, Stroke, draw_nest
+from warpflat.pattern.drawing import Drawing, OnPaper, Stroke, draw_nest
 from warpflat.pattern.half_pieces import halved
-from warpflat.pattern.label import BOLD, CAPITALS, FONT, Words, embedded_font
+from warpflat.pattern.label import BOLD, CAPITALS, FONT, Words, embedded_font, text_width
 from warpflat.pattern.layout import Placed, Sheet, lay_out, nests, occupied_points
 from warpflat.pattern.sewing_order import seam_letters
 from warpflat.pattern.tile_nesting import nest_on_tiles
 from warpflat.pattern.words import printed_in, translate
 
-__all__ = ["PAPERS", "too_many_sheets", "write_pdf"]
+__all__ = ["PAPERS", "draw_sheet", "sheet_names", "too_many_sheets", "write_pdf"]
 
 
 #: Points per metre: a PDF's unit is 1/72 inch.
@@ -51,6 +51,8 @@ PAPERS = {
 }
 #: Width [m] of the page of a projector: that of a cutting table.
 PROJECTED_WIDTH = 0.9
+#: Size [pt] of a sheet's name, its distance [m] from the sheet's joints, and the least one from lines and words.
+SHEET_NAME, NAME_INSIDE, NAME_CLEAR = 26, 0.006, 0.0015
 # Nobody glues more sheets than these together.
 MOST_SHEETS = 1000
 #: Roles whose strokes lie on the layer of their size in a nest.
@@ -88,31 +90,44 @@ def write_pdf(
             garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
         whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
         printed = halved(whole)
-        kind = PAPERS[paper]
         if fault := too_many_sheets(printed, paper):
             raise InputError(f"{path}: {fault}")
-        sheet, tiling = _arranged(nests(printed), kind)
-        # Labels move to where no joint of two sheets crosses them, where there is room for that.
-        placed = []
-        for place in sheet.placed:
-            joints = [place.on_piece(joint) for joint in tiling.joints]
-            pieces = (
-                tuple(relabelled(piece, garment.name, joints) for piece in place.pieces) if joints else place.pieces
-            )
-            if any(piece.label.leader is not None for piece in pieces):
-                pieces = place.pieces
-            placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
-        kind, sheet = tiling.paper, replace(sheet, placed=tuple(placed))
-        tiling = replace(tiling, sheet=sheet)
+        tiling, drawings = draw_sheet(printed, paper)
         content, guided = b"", list[str]()
-        if kind.tiled:
+        if tiling.paper.tiled:
             with optional_file(path, guided, part="the guide"):
-                content = _pages(whole, printed, tiling, chosen, guide=True)
+                content = _pages(whole, printed, tiling, drawings, guide=True)
         if not guided:
-            content = _pages(whole, printed, tiling, chosen, guide=False)
+            content = _pages(whole, printed, tiling, drawings, guide=False)
         with atomic_path(path) as temporary:
             Path(temporary).write_bytes(content)
         return tiling
+
+
+def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[Drawing, ...]]]:
+    """Lay the pieces of a garment, in all its sizes, on sheets of a paper, and draw them there.
+
+    Args:
+        printed: the garment with halves on the fold.
+        paper: a key of `PAPERS`.
+
+    Returns:
+        The tiling, and what is drawn of each `Placed` of its sheet, in the coordinates of its pieces.
+    """
+    sheet, tiling = _arranged(nests(printed), PAPERS[paper])
+    # Labels move to where no joint of two sheets crosses them, where there is room for that.
+    placed = []
+    for place in sheet.placed:
+        joints = [place.on_piece(joint) for joint in tiling.joints]
+        pieces = tuple(relabelled(piece, printed.name, joints) for piece in place.pieces) if joints else place.pieces
+        if any(piece.label.leader is not None for piece in pieces):
+            pieces = place.pieces
+        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
+    tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
+    return tiling, [
+        draw_nest(place.pieces, OnPaper(joints=[place.on_piece(joint) for joint in tiling.joints], letters=letters))
+        for place in placed
+    ]
 
 
 def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
@@ -127,21 +142,25 @@ def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
 
 
 def _pages(
-    whole: DraftedGarment, printed: DraftedGarment, tiling: Tiling, chosen: tuple[str, ...], *, guide: bool
+    whole: DraftedGarment,
+    printed: DraftedGarment,
+    tiling: Tiling,
+    drawings: Sequence[tuple[Drawing, ...]],
+    *,
+    guide: bool,
 ) -> bytes:
     """Return the pages of the pattern, after those of legend and guide if these are wanted.
 
     Args:
         whole, printed: the garment, and as it is printed, with pieces on the fold.
-        tiling: of the pieces.
-        chosen: sizes.
+        tiling, drawings: of the pieces (see :func:`draw_sheet`).
         guide: whether the legend and the guide come first.
     """
     from reportlab.pdfbase import pdfmetrics
     from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
-    kind, stream = tiling.paper, BytesIO()
+    kind, stream, chosen = tiling.paper, BytesIO(), tuple(whole.pieces)
     canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
     for name in (FONT, BOLD):
         pdfmetrics.registerFont(embedded_font(name))
@@ -151,13 +170,11 @@ def _pages(
     # The whole sheet is drawn once, as a form; every page shows its part of it.
     border, sheet = 0.05, tiling.sheet
     low, high = np.array([-border, -3.0]), sheet.size + 3.0
-    letters = seam_letters(printed)
     widen = tiling.paper.line_width
     canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
-    for placed in sheet.placed:
+    for placed, sizes in zip(sheet.placed, drawings, strict=True):
         nested = len(placed.pieces) > 1
-        on_paper = OnPaper(joints=[placed.on_piece(joint) for joint in tiling.joints], letters=letters)
-        for index, drawing in enumerate(draw_nest(placed.pieces, on_paper)):
+        for index, drawing in enumerate(sizes):
             of_size: list[Stroke] = []
             shared: list[Stroke] = []
             for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
@@ -180,6 +197,7 @@ def _pages(
     if guide:
         legend_page(canvas, printed, chosen, tiling.sheet, tiling)
         guide_pages(canvas, whole, printed, kind)
+    names = sheet_names(tiling, drawings) if tiling.joined else {}
     for row, column in tiling.tiles:
         title = whole.name.replace("_", " ")
         paper = tiling.paper
@@ -194,6 +212,9 @@ def _pages(
         canvas.restoreState()
         if tiling.joined:
             _joining_marks(canvas, tiling, row, column)
+            canvas.setFillColor("#bbbbbb")
+            canvas.setFont(BOLD, SHEET_NAME)
+            canvas.drawString(*((names[row, column] - corner + paper.margin) * POINT), tiling.name(row, column))
         canvas.setFillColor("#555555")
         canvas.setFont(FONT, 7)
         number = translate("sheet {name}", name=tiling.name(row, column))
@@ -218,6 +239,41 @@ def _pages(
         catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
     canvas.save()
     return stream.getvalue()
+
+
+def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict[tuple[int, int], FloatArray]:
+    """Return where the name of each tile is written: its lower left on the sheet [m], clear of lines and words if there is room.
+
+    The upper left is preferred, then the other corners, then the place with the most room.
+    """
+    import shapely
+
+    lines, words = [], []
+    for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True):
+        for drawing in sizes:
+            lines += [
+                shapely.LineString(
+                    placed.on_sheet(np.vstack([each.points, each.points[:1]] if each.closed else [each.points]))
+                )
+                for each in drawing.strokes
+                if not each.hidden
+            ]
+            words += [shapely.Polygon(placed.on_sheet(each.box())) for each in drawing.words]
+    taken = shapely.STRtree([*lines, *words])
+    height, found = SHEET_NAME * CAPITALS / POINT, {}
+    for tile in tiling.tiles:
+        width = text_width(tiling.name(*tile), height, bold=True)
+        size = np.array([width, height])
+        low = tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap])
+        room = tiling.paper.step - size - 2 * NAME_INSIDE
+        shares = [(0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0)]
+        shares += [(x / 8, y / 12) for y in range(12, -1, -1) for x in range(9)]
+        places = [low + NAME_INSIDE + room * share for share in shares]
+        boxes = [shapely.box(*place, *(place + size)) for place in places]
+        nearest = np.array([float(shapely.distance(box, taken.geometries[taken.nearest(box)])) for box in boxes])
+        clear = np.flatnonzero(nearest > NAME_CLEAR)
+        found[tile] = places[int(clear[0]) if len(clear) else int(nearest.argmax())]
+    return found
 
 
 def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
@@ -359,6 +415,3 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
         for y in (bottom, top):
             for dx, dy in ((0.004, 0.0), (0.0, 0.004)):
                 canvas.line(*(np.array([x - dx, y - dy]) * POINT), *(np.array([x + dx, y + dy]) * POINT))
-    canvas.setFillColor("#bbbbbb")
-    canvas.setFont(BOLD, 26)
-    canvas.drawString((low[0] + 0.006) * POINT, (top - 0.014) * POINT, tiling.name(row, column))

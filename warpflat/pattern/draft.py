@@ -45,6 +45,8 @@ from warpflat.pattern.words import printed_in
 __all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabelled"]
 
 
+#: A grain line may lie beyond the sewing line by this much [m], as along a fold.
+GRAIN_ON_BORDER = 1e-4
 #: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
 ALONG_GRAIN = np.radians(1.0)
 
@@ -129,6 +131,8 @@ def relabelled(piece: DraftedPiece, garment: str, joints: Sequence[FloatArray]) 
 
 def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance: float | None) -> DraftedPiece:
     """Draft one piece whose edges are fitted: cut line, darts, holes, lines, label and notes."""
+    import shapely
+
     frame = _frame(piece)
     darts = dart_legs(piece, edges)
     drafted_legs = {leg.name: leg for legs in darts.values() for leg in (legs.left, legs.right)}
@@ -157,7 +161,10 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
     internal = {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
-    grain = default_grain(sew_line, list(holes.values())) if piece.grain is None else _moved(piece.grain, frame)
+    grain = None if piece.grain is None else _moved(piece.grain, frame)
+    # The middle of a curved piece, such as a facing, lies outside it.
+    if grain is None or not shapely.Polygon(sew_line).buffer(GRAIN_ON_BORDER).covers(shapely.LineString(grain)):
+        grain = default_grain(sew_line, list(holes.values()))
     leg_lines = [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
     widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
     # Pleats are not marked through the cloth.

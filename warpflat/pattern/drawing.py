@@ -16,7 +16,7 @@ from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafted_darts import fisheye_legs
-from warpflat.pattern.label import Label, Words, text_width
+from warpflat.pattern.label import TAILS, Label, Words, text_width
 from warpflat.pattern.placement import LabelRoom, Spot, spots_along
 from warpflat.pattern.words import translate, translate_name
 
@@ -33,8 +33,6 @@ NAME, NAME_GAP = 0.0024, 0.0028
 NAME_SHARES = (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5)
 #: Least distance [m] of words from all else; that at which no better place is sought, for names and for letters.
 CLEAR, WELL_CLEAR, LETTER_CLEAR = 0.0004, 0.006, 0.001
-#: Height of letters with tails below, over that of capitals.
-CAPITALS_AND_TAILS = 1.6
 #: Height [m] of a seam's letter beside a notch, and its distance from it.
 LETTER, LETTER_GAP = 0.0026, 0.0012
 #: What lies closer [m] to a fold lies on it.
@@ -150,10 +148,20 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
         if edge:
             # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
             ring = shapely.LinearRing(piece.cut_line)
+            joints = shapely.MultiLineString([] if paper is None else [joint.tolist() for joint in paper.joints])
             for start in (0.08, 0.62):
-                at = resample(piece.edge(edge).line, start + 0.3 * (index + 0.5) / len(pieces))
-                on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
-                words.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
+                at_first = start + 0.3 * (index + 0.5) / len(pieces)
+                tags = []
+                # A little to either side, more and more, where a joint of two sheets would cut it.
+                for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
+                    at = resample(piece.edge(edge).line, min(max(at_first + away, 0.0), 1.0))
+                    on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+                    tags.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
+                    if shapely.disjoint(shapely.Polygon(tags[-1].box()), joints):
+                        break
+                else:
+                    tags = tags[:1]
+                words.append(tags[-1])
         drawings.append(Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words)))
     return tuple(drawings)
 
@@ -275,12 +283,13 @@ def _annotations(
     for stroke in grain_strokes(piece.grain):
         room.take(shapely.LineString(stroke.points))
 
-    def write(text: str, height: float, spots: Iterable[Spot], *, bold: bool = False, **clear: Any) -> None:
+    def write(text: str, height: float, spots: Iterable[Spot], *, bold: bool = False, **clear: Any) -> bool:
         width = text_width(text, height, bold=bold)
-        spot = room.place_clear(spots, width, CAPITALS_AND_TAILS * height, **clear)
+        spot = room.place_clear(spots, width, TAILS * height, **clear)
         if spot is not None:
             at = np.array([spot.x, spot.y])
             words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
+        return spot is not None
 
     # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
     first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
@@ -298,8 +307,34 @@ def _annotations(
         text = translate_name(name_without_number(name, called))
         width = text_width(text, NAME)
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
-            spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=side)
-            write(text, NAME, spots, avoid=[*drawn[:index], *drawn[index + 1 :]], least=CLEAR, enough=WELL_CLEAR)
+            others = [*drawn[:index], *drawn[index + 1 :]]
+            # Beside an edge, as a zip is, a name may have room on one side alone.
+            for beside in (side, "either") if side == "above" else (side,):
+                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=beside)
+                if write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
+                    break
+    # The first button and the first buttonhole of a row, which are too short for a name along them.
+    marks = {hole.name: hole.at for hole in piece.drill_holes if hole.name == "button"}
+    marks |= {name: line.mean(axis=0) for name, line in piece.internal_lines.items() if name == "buttonhole"}
+    for name, at in marks.items():
+        text = translate_name(name)
+        out = np.array([text_width(text, NAME) / 2 + 2 * DRILL + 0.001, 2 * DRILL + NAME])
+        sides = [
+            (0, 1),
+            (0, -1),
+            (1, 0),
+            (-1, 0),
+            (0, 2),
+            (0, -2),
+            (1, 1),
+            (1, -1),
+            (-1, 1),
+            (-1, -1),
+            (1.6, 0),
+            (-1.6, 0),
+        ]
+        beside = [Spot(x=float(x), y=float(y)) for x, y in at + out * sides]
+        write(text, NAME, beside, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
     letters = {} if paper is None else paper.letters
     for notch in piece.notches:
         letter = letters.get(notch.seam)

@@ -24,6 +24,7 @@ __all__ = [
     "CAPITALS",
     "FONT",
     "LEADING",
+    "TAILS",
     "TEXT",
     "TITLE",
     "Label",
@@ -45,6 +46,8 @@ CAPITALS = 0.729
 UNKNOWN = 1.0
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
 TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
+#: Height of letters with tails below, over that of capitals.
+TAILS = 1.6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,6 +69,11 @@ class Words:
     angle: float = 0.0
     bold: bool = False
     tag: bool = False
+
+    def box(self) -> FloatArray:
+        """Return the corners of what it covers, 4 by 2 [m]; tails below the line count."""
+        half = np.array([text_width(self.text, self.height, bold=self.bold) / 2, self.height * TAILS / 2])
+        return self.at + (half * [[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ rotation(self.angle).T
 
 
 @cache
