@@ -174,7 +174,12 @@ def pattern_of_garment(
         for edge in piece.edges
         if edge.name == f"{opening.line} {STAND}"
     ]  # fmt: skip
-    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands)
+    girths = {
+        size: {level: each.girth for level, each in garment.mannequin.levels().items()}
+        for size, garment in garments.items()
+        if garment.mannequin is not None and any(wish.elastic for wish in sample.finishing)
+    }
+    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
     return add_pockets(pattern, sample.pockets), notes
 
 

@@ -62,17 +62,24 @@ def straight_stands(form: FormResult, openings: Sequence[Opening]) -> list[Const
 
 def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
     """Return the finishing that a scene wants."""
-    return [
-        Finishing(
-            kind=table.kind,
-            edge=table.edge,
-            width=FINISHES[table.kind] if table.width_mm is None else 1e-3 * table.width_mm,
-            share=table.share,
-            overlap=1e-3 * table.overlap_mm,
-            shaped=table.shaped,
+    found = []
+    for table in tables:
+        width = FINISHES[table.kind] if table.width_mm is None else 1e-3 * table.width_mm
+        found.append(
+            Finishing(
+                kind=table.kind,
+                edge=table.edge,
+                width=width,
+                share=table.share,
+                overlap=1e-3 * table.overlap_mm,
+                shaped=table.shaped,
+                shorten=1e-3 * table.shorten_mm,
+                elastic=table.elastic,
+                placket=1e-3 * table.placket_mm,
+                turns=table.turns,
+            )
         )
-        for table in tables
-    ]
+    return found
 
 
 def scene_pockets(tables: Sequence[PocketTable]) -> list[Pocket]:

@@ -513,25 +513,62 @@ class OpeningTable(Table):
         return self
 
 
-class FinishingTable(Table):
-    """Pieces that finish free edges of a form: a facing of each piece, or one straight strip along the whole edge."""
+#: Keys of a finishing that belong to some kinds only.
+_OF_KINDS = {
+    "share": ("band", "waistband", "cuff", "ruffle"),
+    "overlap_mm": ("waistband", "cuff"),
+    "shaped": ("waistband",),
+    "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce"),
+    "elastic": ("casing", "band", "waistband"),
+    "placket_mm": ("cuff",),
+    "turns": ("flounce",),
+}
 
-    kind: Literal["facing", "band", "waistband", "binding"]
+
+class FinishingTable(Table):
+    """Pieces that finish free edges of a form, hems too: what they are follows from the lengths of the edges that they are sewn to.
+
+    A `facing` repeats each piece; one straight strip along the whole edge is a `band` or rib, a `waistband`, a `cuff`, a `binding` or a
+    gathered `ruffle`. A `flounce` is a part of a ring below each piece. A `casing` is turned in from the edge itself, for an elastic.
+    """
+
+    kind: Literal["facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing"]
     edge: Annotated[str, Field(min_length=1, max_length=100)]
-    width_mm: Annotated[float, Field(ge=5, le=300)] | None = None
-    share: Annotated[float, Field(ge=0.5, le=1)] = 1.0
+    width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=5)] = 1.0
+    """Length of a strip over that of its edge. A band of 0.85 is stretched, what is sewn to a cuff or waistband of 0.7 is gathered, a
+    ruffle of 1.8 is gathered itself."""
     overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
     shaped: bool = False
     """A waistband that is cut from the upper strip of the pieces, as curved as they are."""
+    shorten_mm: Annotated[float, Field(ge=0, le=800)] = 0.0
+    """The pieces end so far before the edge, because the strip takes the place."""
+    elastic: Annotated[float, Field(ge=0, le=1.5)] = 0.0
+    """Length of an elastic that is threaded through it, as a share of the body's girth there; 0 for none."""
+    placket_mm: Annotated[float, Field(ge=0, le=300)] = 0.0
+    """Length of a slit that opens the edge, behind in a sleeve, bound with a strip of its own."""
+    turns: Annotated[float, Field(ge=0.1, le=3)] = 0.5
+    """How much of a circle a flounce is: 1 for a circle skirt, 0.5 for half of one."""
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> FinishingTable:
-        if self.kind != "band" and self.share != 1.0:
-            raise ValueError("share belongs to a band, which is stretched as it is sewn; leave it out")
-        if self.kind != "waistband" and self.overlap_mm:
-            raise ValueError("overlap_mm belongs to a waistband; leave it out")
-        if self.shaped and (self.kind != "waistband" or self.overlap_mm):
-            raise ValueError("shaped belongs to a waistband without an overlap; leave one of them out")
+        for key, kinds in _OF_KINDS.items():
+            if key in self.model_fields_set and self.kind not in kinds:
+                raise ValueError(f"{key} belongs to a {' or '.join(kinds)}; leave it out for a {self.kind}")
+        if (self.width_mm or 0.0) > 300.0 and self.kind not in ("ruffle", "flounce"):
+            raise ValueError(f"width_mm is at most 300 for a {self.kind}")
+        if self.share > 1.0 and self.kind != "ruffle":
+            raise ValueError(f"share is at most 1 for a {self.kind}, which does not gather; take a ruffle")
+        if self.share < 1.0 and self.kind == "ruffle":
+            raise ValueError("share is at least 1 for a ruffle, which is gathered as it is sewn")
+        if self.shaped and (self.overlap_mm or self.share != 1.0 or self.elastic or self.shorten_mm):
+            raise ValueError(
+                "shaped belongs to a waistband without overlap_mm, share, elastic and shorten_mm; leave them out"
+            )
+        if self.kind == "casing" and not self.elastic:
+            raise ValueError("elastic is missing: its length as a share of the body's girth there, as elastic = 0.95")
+        if self.placket_mm and not self.overlap_mm:
+            raise ValueError("a cuff with a placket needs an overlap for its button, overlap_mm = 25")
         return self
 
 
