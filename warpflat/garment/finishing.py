@@ -10,7 +10,8 @@ import numpy as np
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import find_unused_name, without_side
 from warpflat.garment.button_stand import buttonhole
-from warpflat.garment.facings import Stand, centre_notch, with_facings, with_stand_facings
+from warpflat.garment.collars import Collar, with_collar, with_hood
+from warpflat.garment.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
 from warpflat.garment.flounces import with_flounce
 from warpflat.garment.free_edges import Break, FreeChain, chain_length, free_chains
 from warpflat.garment.plackets import with_slits
@@ -40,6 +41,8 @@ _STRIPS = {
     "cuff": (True, (1.0, 0.0), "cuff"),
     "binding": (False, (0.7071, 0.7071), "strip"),
     "ruffle": (False, (0.0, 1.0), "strip"),
+    # A turtleneck, which is doubled and turned down.
+    "collar": (True, (0.0, 1.0), "strip"),
 }
 # Allowance of the hem of a ruffle, and of the edge of a casing that is turned in [m].
 _NARROW = 0.010
@@ -61,6 +64,7 @@ class Finishing:
         elastic: length of the elastic in a folded strip or casing, as a share of the body's girth there; 0 where there is none.
         placket: length of a slit that opens the edge [m].
         turns: how much of a circle a flounce is; more than one overlaps itself and is cut in pieces.
+        collar: what a collar or hood is like.
     """
 
     kind: str
@@ -73,11 +77,12 @@ class Finishing:
     elastic: float = 0.0
     placket: float = 0.0
     turns: float = 0.5
+    collar: Collar | None = None
 
     @property
     def name(self) -> str:
         """Return what its pieces are called."""
-        return self.kind if self.kind in ("waistband", "cuff") else f"{self.edge}_{self.kind}"
+        return self.kind if self.kind in ("waistband", "cuff", "collar") else f"{self.edge}_{self.kind}"
 
 
 def finish_edges(
@@ -95,26 +100,45 @@ def finish_edges(
         finishing: what is wanted.
         gaps: names of seams that an opening leaves open at their upper end; a band ends there.
         stands: button stands; what no facing of an edge beside them takes along gets one of its own.
-        girths: of the body by size and level [m], for elastics.
+        girths: of the body by size and level [m], and of the "head", for elastics and hoods.
 
     Raises:
         InputError: no free edge has the name, or a piece cannot be drawn there.
     """
+    # First what takes cloth away, then the facings of stands that no facing of an edge beside them takes along: other pieces may part
+    # the edges beside a stand.
+    faced = set[Stand]()
     for number, wish in enumerate(finishing):
         try:
             pattern, places = _opened_up(pattern, wish.edge)
             if wish.shorten:
                 pattern = shortened(pattern, places, wish.shorten)
+            if wish.kind == "facing":
+                faced |= {stand for stand in stands for place in places if is_beside(pattern, stand, place)}
+        except InputError as error:
+            raise InputError(f"finishing[{number}]: {error}") from None
+    pattern = with_stand_facings(pattern, [stand for stand in stands if stand not in faced])
+    for number, wish in enumerate(finishing):
+        try:
+            pattern, places = _opened_up(pattern, wish.edge)
             if wish.elastic:
-                lengths = {
-                    size: wish.elastic * _girth_at(pattern, size, places, wish.edge, girths or {})
-                    for size in pattern.pieces
-                }
+                # Around one limb where the edge has a side.
+                levels = [places[0][1], wish.edge, f"{wish.edge} left"]
+                lengths = {size: wish.elastic * _girth_at(size, levels, girths or {}) for size in pattern.pieces}
                 pattern = replace(
-                    pattern, elastics=(*pattern.elastics, Elastic(edge=wish.edge, width=wish.width, lengths=lengths))
+                    pattern,
+                    elastics=(
+                        *pattern.elastics,
+                        Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=_count(places)),
+                    ),
                 )
             if wish.kind == "facing":
                 pattern = with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
+            elif wish.collar is not None and wish.kind == "hood":
+                heads = {size: _girth_at(size, ["head"], girths or {}) for size in pattern.pieces}
+                pattern = with_hood(pattern, places, wish.collar, heads, gaps=gaps)
+            elif wish.collar is not None and wish.collar.style != "turtleneck":
+                pattern = with_collar(pattern, places, wish.collar, gaps=gaps)
             elif wish.kind == "flounce":
                 for chain, _ in free_chains(pattern, places, gaps):
                     pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge)
@@ -131,10 +155,7 @@ def finish_edges(
                     pattern = _with_strip(pattern, wish, chain, count)
         except InputError as error:
             raise InputError(f"finishing[{number}]: {error}") from None
-    sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
-    edges = {piece.name: {edge.name for edge in piece.edges} for piece in pattern.pieces[pattern.sample]}
-    left = [each for each in stands if each.edge in edges[each.piece] and (each.piece, each.edge) not in sewn]
-    return with_stand_facings(pattern, left)
+    return pattern
 
 
 def _opened_up(pattern: Pattern, called: str) -> tuple[Pattern, list[tuple[str, str]]]:
@@ -173,23 +194,22 @@ def _opened_up(pattern: Pattern, called: str) -> tuple[Pattern, list[tuple[str, 
     return pattern, places
 
 
-def _girth_at(
-    pattern: Pattern,
-    size: str,
-    places: Sequence[tuple[str, str]],
-    edge: str,
-    girths: Mapping[str, Mapping[str, float]],
-) -> float:
-    """Return the body's girth at an edge [m], around one limb where the edge has a side.
+def _count(places: Sequence[tuple[str, str]]) -> int:
+    """Return how many rings the garment has of some edges: one on each side of the body, or one."""
+    return 2 if any(without_side(edge) != edge for _, edge in places) else 1
+
+
+def _girth_at(size: str, levels: Sequence[str], girths: Mapping[str, Mapping[str, float]]) -> float:
+    """Return the body's girth at the first of some levels that it has [m].
 
     Raises:
-        InputError: the body has no level of that name.
+        InputError: it has none of them.
     """
     own = girths.get(size, {})
-    for name in (places[0][1], edge, f"{edge} left"):
+    for name in levels:
         if name in own:
             return own[name]
-    raise InputError(f"no elastic can be cut for {edge!r}, where the body has no girth; {nearest(edge, own)}")
+    raise InputError(f"the body has no girth at {levels[0]!r}; {nearest(levels[0], own)}")
 
 
 def _with_casing(pattern: Pattern, places: Sequence[tuple[str, str]], wish: Finishing) -> Pattern:

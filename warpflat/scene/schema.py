@@ -515,24 +515,37 @@ class OpeningTable(Table):
 
 #: Keys of a finishing that belong to some kinds only.
 _OF_KINDS = {
-    "share": ("band", "waistband", "cuff", "ruffle"),
+    "share": ("band", "waistband", "cuff", "ruffle", "collar"),
     "overlap_mm": ("waistband", "cuff"),
     "shaped": ("waistband",),
     "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce"),
     "elastic": ("casing", "band", "waistband"),
     "placket_mm": ("cuff",),
     "turns": ("flounce",),
+    "style": ("collar",),
+    "rise_mm": ("collar",),
+    "fall_mm": ("collar",),
+    "point_mm": ("collar",),
+    "strip_mm": ("hood",),
+}
+#: And those of a collar to some styles only.
+_OF_STYLES = {
+    "share": ("turtleneck",),
+    "rise_mm": ("stand", "shirt"),
+    "fall_mm": ("shirt",),
+    "point_mm": ("shirt", "convertible"),
 }
 
 
 class FinishingTable(Table):
     """Pieces that finish free edges of a form, hems too: what they are follows from the lengths of the edges that they are sewn to.
 
-    A `facing` repeats each piece; one straight strip along the whole edge is a `band` or rib, a `waistband`, a `cuff`, a `binding` or a
-    gathered `ruffle`. A `flounce` is a part of a ring below each piece. A `casing` is turned in from the edge itself, for an elastic.
+    A `facing` repeats each piece. One straight strip along the whole edge is a `band` or rib, a `waistband`, a `cuff`, a `binding` or
+    a gathered `ruffle`. A `collar` and a `hood` go around the neck. A `flounce` is a part of a ring below each piece. A `casing` is
+    turned in from the edge itself, for an elastic.
     """
 
-    kind: Literal["facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing"]
+    kind: Literal["facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing", "collar", "hood"]
     edge: Annotated[str, Field(min_length=1, max_length=100)]
     width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
     share: Annotated[float, Field(ge=0.5, le=5)] = 1.0
@@ -549,12 +562,30 @@ class FinishingTable(Table):
     """Length of a slit that opens the edge, behind in a sleeve, bound with a strip of its own."""
     turns: Annotated[float, Field(ge=0.1, le=3)] = 0.5
     """How much of a circle a flounce is: 1 for a circle skirt, 0.5 for half of one."""
+    style: Literal["stand", "shirt", "convertible", "flat", "turtleneck"] = "stand"
+    """Of a collar: a stand; a stand with a fall; one that is both in one piece; one that lies flat around the neck (Peter Pan); a
+    doubled band of a knit that is turned down."""
+    rise_mm: Annotated[float, Field(ge=0, le=60)] = 15.0
+    """By how much the front ends of a stand lie higher than its middle, so that it leans to the neck."""
+    fall_mm: Annotated[float, Field(ge=20, le=150)] = 45.0
+    """Width of a shirt collar's fall in the middle of the back; `width_mm` is that of its stand."""
+    point_mm: Annotated[float, Field(ge=20, le=200)] = 65.0
+    """Length of the front edge of a fall, from the stand to its point."""
+    strip_mm: Annotated[float, Field(ge=0, le=250)] = 0.0
+    """Width of the strip over the crown of a hood of three pieces; 0 for one of two."""
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> FinishingTable:
         for key, kinds in _OF_KINDS.items():
             if key in self.model_fields_set and self.kind not in kinds:
                 raise ValueError(f"{key} belongs to a {' or '.join(kinds)}; leave it out for a {self.kind}")
+        for key, styles in _OF_STYLES.items() if self.kind == "collar" else ():
+            if key in self.model_fields_set and self.style not in styles:
+                raise ValueError(
+                    f'{key} belongs to a {" or ".join(styles)} collar; leave it out for style = "{self.style}"'
+                )
+        if self.kind == "hood" and self.width_mm is not None:
+            raise ValueError("width_mm of a hood follows from the head's girth; leave it out")
         if (self.width_mm or 0.0) > 300.0 and self.kind not in ("ruffle", "flounce"):
             raise ValueError(f"width_mm is at most 300 for a {self.kind}")
         if self.share > 1.0 and self.kind != "ruffle":
