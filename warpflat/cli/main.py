@@ -22,6 +22,7 @@ from warpflat.cli.fabrics import fabrics
 from warpflat.cli.flatten import flatten
 from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.mannequin import mannequin
+from warpflat.cli.new import new
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.review import review
 from warpflat.cli.run import run
@@ -74,6 +75,7 @@ def cli(context: click.Context) -> None:
     \b
     Examples:
       warpflat run scenes/dome.toml                       a scene file, into out/dome
+      warpflat new shirt --size "EU 38" --collar stand    a scene of a garment, for a size
       warpflat flatten front.obj --units cm --fabric denim
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
@@ -88,7 +90,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
+for _command in (new, run, flatten, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
     cli.add_command(_command)
 
 

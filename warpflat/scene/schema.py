@@ -480,7 +480,7 @@ class OpeningTable(Table):
     """An opening along a line of a form. A piece that runs across a centre line is parted there, with a seam below the opening.
 
     A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit` or `vent` from the lower one. Buttons
-    run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing.
+    and a zip run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing.
     """
 
     kind: Literal["zip", "buttons", "slit", "vent", "keyhole"]
@@ -505,8 +505,8 @@ class OpeningTable(Table):
             raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
         if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
             raise ValueError("start_mm and style belong to a zip; a slit or a vent begins at the lower end of its seam")
-        if self.kind != "buttons" and self.length_mm is None:
-            raise ValueError("length_mm is missing; only buttons run all along their line without one")
+        if self.kind not in ("buttons", "zip") and self.length_mm is None:
+            raise ValueError("length_mm is missing; only buttons and zips run all along their line without one")
         own = {"button_mm", "spacing_mm", "count", "facing", "facing_mm"} & self.model_fields_set
         if self.kind != "buttons" and own:
             raise ValueError(f"{sorted(own)[0]} belongs to buttons; leave it out for a {self.kind}")
