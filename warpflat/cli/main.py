@@ -24,6 +24,7 @@ from warpflat.cli.fit import fit
 from warpflat.cli.flatten import flatten
 from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.mannequin import mannequin
+from warpflat.cli.new import new
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.review import review
 from warpflat.cli.run import run
@@ -77,6 +78,7 @@ def cli(context: click.Context) -> None:
     Examples:
       warpflat example                                    the scenes that come with it; example dome writes dome.toml
       warpflat run dome.toml                              a scene file, into out/dome
+      warpflat new shirt --size "EU 38" --collar stand    a scene of a garment, for a size
       warpflat flatten front.obj --units cm --fabric denim
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
@@ -91,7 +93,22 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, example, flatten, fit, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
+for _command in (
+    run,
+    new,
+    example,
+    flatten,
+    fit,
+    batch,
+    drape,
+    mannequin,
+    compare,
+    fabrics,
+    cuts,
+    export,
+    review,
+    studio,
+):
     cli.add_command(_command)
 
 

@@ -13,7 +13,7 @@ from warpflat.cli.options import DONE, ComputingCommand
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_usd
 
-__all__ = ["mannequin"]
+__all__ = ["mannequin", "read_lengths"]
 
 
 @click.command(cls=ComputingCommand)
@@ -77,9 +77,9 @@ def mannequin(
     if size is not None:
         tables["size"] = size
     if measures:
-        tables["measurements"] = _lengths(measures, "--measure")
+        tables["measurements"] = read_lengths(measures, "--measure")
     if landmarks:
-        tables["landmarks"] = _lengths(landmarks, "--landmark")
+        tables["landmarks"] = read_lengths(landmarks, "--landmark")
     if resolution is not None:
         tables["resolution_mm"] = resolution
     table = check_table(MannequinTable, tables, "command line")
@@ -99,7 +99,7 @@ def mannequin(
     return DONE
 
 
-def _lengths(texts: Sequence[str], option: str) -> dict[str, float]:
+def read_lengths(texts: Sequence[str], option: str) -> dict[str, float]:
     """Return the lengths of all NAME=METRES, each name once."""
     found: dict[str, float] = {}
     for text in texts:

@@ -38,7 +38,7 @@ from warpflat.pattern.drafted import (
 )
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamOpening, SeamSide
 
 __all__ = [
     "SCHEMA",
@@ -186,7 +186,9 @@ class PieceEntry(Entry):
 
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
-    role: Literal["shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket"] = "shell"
+    role: Literal[
+        "shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket"
+    ] = "shell"
     also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
     enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
         default=[1.0, 1.0]
@@ -256,6 +258,15 @@ class SeamEntry(Entry):
     difference_per_50mm_mm: float | None
 
 
+class ElasticEntry(Entry):
+    """An elastic in a casing (see `warpflat.pattern.pieces.Elastic`)."""
+
+    edge: Name
+    width: Length
+    lengths: dict[Text, Length]
+    count: Annotated[int, Field(ge=1, le=1000)] = 1
+
+
 class PatternEntry(Entry):
     """The whole file: pieces by size and name, stitches, and the lengths of seams."""
 
@@ -265,6 +276,7 @@ class PatternEntry(Entry):
     sizes: dict[Text, Annotated[dict[Name, PieceEntry], Field(min_length=1)]] = Field(min_length=1)
     stitches: list[StitchEntry]
     seams: list[SeamEntry]
+    elastics: list[ElasticEntry] = Field(default_factory=list)
 
 
 #: Increased when a reader of the old form would misread the new one.
@@ -318,6 +330,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
             for size, pieces in garment.pieces.items()
         },
         "stitches": stitches,
+        "elastics": [asdict(elastic) for elastic in garment.garment.elastics],
         "seams": [
             {
                 "name": report.name,
@@ -482,6 +495,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
             ],
             sample_size=data.sample_size,
             words=data.words,
+            elastics=tuple(Elastic(**each.model_dump()) for each in data.elastics),
         )
         reports = tuple(
             SeamReport(

@@ -15,7 +15,7 @@ from warpflat.garment.openings import Buttons, Opening
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, Edge
 from warpflat.pattern.pieces import Piece
 
-__all__ = ["bust_depth", "button_depths", "with_button_stand"]
+__all__ = ["bust_depth", "button_depths", "buttonhole", "with_button_stand"]
 
 # The first button lies this far below the edge, beside half of its own width [m], and the last at least this share of
 # the spacing above the lower end.
@@ -122,6 +122,20 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         for end in ends:
             lines[find_unused_name("buttonhole end", lines)] = end + np.outer([-_BAR, _BAR], along)
     return replace(piece, edges=edges, internal_lines=lines, marks=marks)
+
+
+def buttonhole(centre: FloatArray, along: FloatArray, diameter: float = 0.012) -> dict[str, FloatArray]:
+    """Return the lines of a buttonhole on a cuff or a collar (2 by 2 [m] each), for a small button.
+
+    Args:
+        centre: its middle [m].
+        along: its direction.
+        diameter: of the button [m].
+    """
+    half, across = 0.5 * (diameter + _THICKNESS), np.array([-along[1], along[0]])
+    ends = centre + np.outer([-half, half], along)
+    bars = {f"buttonhole end {k}": end + np.outer([-_BAR, _BAR], across) for k, end in enumerate(ends, start=1)}
+    return {"buttonhole": ends, **bars}
 
 
 def _turned(points: FloatArray | list[FloatArray], down: bool) -> FloatArray:

@@ -19,7 +19,7 @@ from warpflat.core.text import find_unused_name, without_side
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
-__all__ = ["INNER", "STAND", "STAND_END", "Stand", "centre_notch", "with_facings", "with_stand_facings"]
+__all__ = ["INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "with_facings", "with_stand_facings"]
 
 #: What the outer edge and the lower end of a button stand are called, after its line, and the inner edge of a facing.
 STAND, STAND_END, INNER = "button stand", "stand end", "inner edge"
@@ -76,9 +76,9 @@ def with_facings(
     for name, edge in places:
         title = find_unused_name(f"{name}_{edge}_facing".replace(" ", "_"), taken)
         taken.add(title)
-        sample = pattern.piece(name, pattern.sample)
-        stand = next((each for each in stands if each.piece == name and each.edge in _ends(sample, (edge,))), None)
+        stand = next((each for each in stands if is_beside(pattern, each, (name, edge))), None)
         grown_on = stand is not None and stand.grown_on
+        sample = pattern.piece(name, pattern.sample)
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == name)
             strip = facing_edges(
@@ -144,6 +144,11 @@ def centre_notch(piece: Piece) -> tuple[float, ...] | None:
     """
     whole = without_side(piece.name) == piece.name.replace("_", " ") and not piece.on_fold
     return (0.5,) if whole else None
+
+
+def is_beside(pattern: Pattern, stand: Stand, place: tuple[str, str]) -> bool:
+    """Return whether a button stand lies beside an edge of its piece, at one of its ends."""
+    return stand.piece == place[0] and stand.edge in _ends(pattern.piece(stand.piece, pattern.sample), (place[1],))
 
 
 def _chain(piece: Piece, edge: str, stand: Stand | None) -> tuple[str, ...]:

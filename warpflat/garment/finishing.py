@@ -1,24 +1,51 @@
-"""Finishing pieces derived from a pattern's own free edges: facings, bands, waistbands and bindings."""
+"""Finishing pieces derived from a pattern's own free edges: facings, bands, waistbands, cuffs, ruffles, collars, hoods and casings."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import find_unused_name, without_side
-from warpflat.garment.facings import Stand, centre_notch, with_facings, with_stand_facings
-from warpflat.garment.free_edges import FreeChain, free_chain, free_edges
-from warpflat.garment.shaped_band import with_shaped_waistband
-from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, Edge
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.garment.button_stand import buttonhole
+from warpflat.garment.collars import Collar, with_collar, with_hood
+from warpflat.garment.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
+from warpflat.garment.flounces import with_flounce
+from warpflat.garment.free_edges import Break, FreeChain, chain_length, free_chains
+from warpflat.garment.plackets import with_slits
+from warpflat.garment.shaped_band import shortened, with_shaped_waistband
+from warpflat.garment.strips import Strip, strip_edges, swept
+from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges"]
 
-#: By kind the width of a finishing piece [m]; of bands that of the finished band, which is cut twice as wide and folded.
-FINISHES = {"facing": 0.06, "band": 0.02, "waistband": 0.035, "binding": 0.035}
+#: By kind the width of a finishing piece [m]; of what is folded that of the finished piece, which is cut twice as wide.
+FINISHES = {
+    "facing": 0.06,
+    "band": 0.02,
+    "waistband": 0.035,
+    "binding": 0.035,
+    "cuff": 0.06,
+    "ruffle": 0.08,
+    "flounce": 0.12,
+    "casing": 0.03,
+    "collar": 0.032,
+    "hood": 0.0,
+}
+#: Strips by kind: whether they are folded, the direction of their grain, their role.
+_STRIPS = {
+    "band": (True, (0.0, 1.0), "strip"),
+    "waistband": (True, (1.0, 0.0), "waistband"),
+    "cuff": (True, (1.0, 0.0), "cuff"),
+    "binding": (False, (0.7071, 0.7071), "strip"),
+    "ruffle": (False, (0.0, 1.0), "strip"),
+    # A turtleneck, which is doubled and turned down.
+    "collar": (True, (0.0, 1.0), "strip"),
+}
+# Allowance of the hem of a ruffle, and of the edge of a casing that is turned in [m].
+_NARROW = 0.010
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +56,15 @@ class Finishing:
         kind: one of `FINISHES`.
         edge: name of the edges, without their side: "neck", "armhole", "waist".
         width: [m].
-        share: length of a band over that of its edge; it is stretched as it is sewn.
-        overlap: by how much a waistband runs past one end [m].
+        share: length of a strip over that of its edge: a band is stretched, what is sewn to a waistband or cuff is gathered,
+            and a ruffle is gathered itself.
+        overlap: by how much a waistband or cuff runs past one end [m].
         shaped: whether a waistband is cut from the upper strip of the pieces, as curved as they are, not straight.
+        shorten: by how much the pieces end before the edge, since the strip takes the place [m].
+        elastic: length of the elastic in a folded strip or casing, as a share of the body's girth there; 0 where there is none.
+        placket: length of a slit that opens the edge [m].
+        turns: how much of a circle a flounce is; more than one overlaps itself and is cut in pieces.
+        collar: what a collar or hood is like.
     """
 
     kind: str
@@ -40,15 +73,25 @@ class Finishing:
     share: float = 1.0
     overlap: float = 0.0
     shaped: bool = False
+    shorten: float = 0.0
+    elastic: float = 0.0
+    placket: float = 0.0
+    turns: float = 0.5
+    collar: Collar | None = None
 
     @property
     def name(self) -> str:
         """Return what its pieces are called."""
-        return {"waistband": "waistband", "band": f"{self.edge}_band"}.get(self.kind, f"{self.edge}_{self.kind}")
+        return self.kind if self.kind in ("waistband", "cuff", "collar") else f"{self.edge}_{self.kind}"
 
 
 def finish_edges(
-    pattern: Pattern, finishing: Sequence[Finishing], *, gaps: Collection[str] = (), stands: Sequence[Stand] = ()
+    pattern: Pattern,
+    finishing: Sequence[Finishing],
+    *,
+    gaps: Collection[str] = (),
+    stands: Sequence[Stand] = (),
+    girths: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Pattern:
     """Return a pattern with the pieces that finish its edges, and the seams that join them.
 
@@ -57,54 +100,161 @@ def finish_edges(
         finishing: what is wanted.
         gaps: names of seams that an opening leaves open at their upper end; a band ends there.
         stands: button stands; what no facing of an edge beside them takes along gets one of its own.
+        girths: of the body by size and level [m], and of the "head", for elastics and hoods.
 
     Raises:
-        InputError: no free edge has the name, or a facing cannot be drawn there.
+        InputError: no free edge has the name, or a piece cannot be drawn there.
     """
+    # First what takes cloth away, then the facings of stands that no facing of an edge beside them takes along: other pieces may part
+    # the edges beside a stand.
+    faced = set[Stand]()
     for number, wish in enumerate(finishing):
-        found = [place for place in free_edges(pattern) if without_side(place[1]).rstrip(" 0123456789") == wish.edge]
-        if not found:
-            known = {without_side(edge).rstrip(" 0123456789") for _, edge in free_edges(pattern)}
-            raise InputError(f"finishing[{number}]: no free edge {wish.edge!r}; {nearest(wish.edge, known)}")
         try:
+            pattern, places = _opened_up(pattern, wish.edge)
+            if wish.shorten:
+                pattern = shortened(pattern, places, wish.shorten)
             if wish.kind == "facing":
-                pattern = with_facings(pattern, found, wish.width, gaps=gaps, stands=stands)
-            elif wish.shaped:
-                pattern = with_shaped_waistband(pattern, found, wish.width, gaps=gaps)
-            else:
-                chain = free_chain(pattern, found, gaps)
-                name = find_unused_name(wish.name, {piece.name for piece in pattern.pieces[pattern.sample]})
-                sided = any(without_side(side.edge) != side.edge for side in chain.sides)
-                ring = chain.closed and not wish.overlap
-                pieces = {}
-                for size, row in pattern.pieces.items():
-                    length = wish.share * sum(
-                        pattern.piece(side.piece, size).edge(side.edge).length for side in chain.sides
-                    )
-                    strip = _strip(wish, name, length, row[0], quantity=2 if sided else 1, ring=ring)
-                    pieces[size] = (*row, strip)
-                taken = {seam.name for seam in pattern.seams}
-                words = name.replace("_", " ")
-                seams = [
-                    *pattern.seams,
-                    Seam(
-                        name=find_unused_name(words, taken), sides=((SeamSide(piece=name, edge="lower"),), chain.sides),
-                        ease=1.0 / wish.share - 1.0, notches=None if sided else _centres(pattern, chain),
-                    ),
-                ]  # fmt: skip
-                if ring:
-                    ends = (
-                        (SeamSide(piece=name, edge="right end"),),
-                        (SeamSide(piece=name, edge="left end", reversed=True),),
-                    )
-                    seams.append(Seam(name=find_unused_name(f"{words} ends", taken), sides=ends))
-                pattern = replace(pattern, pieces=pieces, seams=seams)
+                faced |= {stand for stand in stands for place in places if is_beside(pattern, stand, place)}
         except InputError as error:
             raise InputError(f"finishing[{number}]: {error}") from None
+    pattern = with_stand_facings(pattern, [stand for stand in stands if stand not in faced])
+    for number, wish in enumerate(finishing):
+        try:
+            pattern, places = _opened_up(pattern, wish.edge)
+            if wish.elastic:
+                # Around one limb where the edge has a side.
+                levels = [places[0][1], wish.edge, f"{wish.edge} left"]
+                lengths = {size: wish.elastic * _girth_at(size, levels, girths or {}) for size in pattern.pieces}
+                pattern = replace(
+                    pattern,
+                    elastics=(
+                        *pattern.elastics,
+                        Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=_count(places)),
+                    ),
+                )
+            if wish.kind == "facing":
+                pattern = with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
+            elif wish.collar is not None and wish.kind == "hood":
+                heads = {size: _girth_at(size, ["head"], girths or {}) for size in pattern.pieces}
+                pattern = with_hood(pattern, places, wish.collar, heads, gaps=gaps)
+            elif wish.collar is not None and wish.collar.style != "turtleneck":
+                pattern = with_collar(pattern, places, wish.collar, gaps=gaps)
+            elif wish.kind == "flounce":
+                for chain, _ in free_chains(pattern, places, gaps):
+                    pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge)
+            elif wish.kind == "casing":
+                pattern = _with_casing(pattern, places, wish)
+            elif wish.shaped:
+                pattern = with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
+            else:
+                breaks: list[Break] = []
+                if wish.placket:
+                    pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
+                    pattern, places = _opened_up(pattern, wish.edge)
+                for chain, count in free_chains(pattern, places, gaps, breaks):
+                    pattern = _with_strip(pattern, wish, chain, count)
+        except InputError as error:
+            raise InputError(f"finishing[{number}]: {error}") from None
+    return pattern
+
+
+def _opened_up(pattern: Pattern, called: str) -> tuple[Pattern, list[tuple[str, str]]]:
+    """Return the free edges of a name, and the pattern with those that were hems as edges to be sewn.
+
+    Raises:
+        InputError: there is none; gives the nearest.
+    """
     sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
-    edges = {piece.name: {edge.name for edge in piece.edges} for piece in pattern.pieces[pattern.sample]}
-    left = [each for each in stands if each.edge in edges[each.piece] and (each.piece, each.edge) not in sewn]
-    return with_stand_facings(pattern, left)
+    free = [
+        (piece.name, edge)
+        for piece in pattern.pieces[pattern.sample]
+        for edge in piece.edges
+        if (piece.name, edge.name) not in sewn
+        and (edge.kind == "seam" or (edge.kind == "hem" and piece.role == "shell"))
+    ]
+    names = {edge.name: without_side(edge.name).rstrip(" 0123456789") for _, edge in free}
+    places = [(piece, edge.name) for piece, edge in free if names[edge.name] == called]
+    if not places:
+        raise InputError(f"no free edge {called!r}; {nearest(called, set(names.values()))}")
+    hems = {(piece, edge.name) for piece, edge in free if edge.kind == "hem"} & set(places)
+    if hems:
+        pieces = {}
+        for size, row in pattern.pieces.items():
+            made = []
+            for piece in row:
+                # As wide as the allowance of the piece's other seams.
+                width = next((edge.width for edge in piece.edges if edge.kind == "seam"), None)
+                edges = [
+                    replace(edge, kind="seam", allowance=width) if (piece.name, edge.name) in hems else edge
+                    for edge in piece.edges
+                ]
+                made.append(replace(piece, edges=edges))
+            pieces[size] = made
+        pattern = replace(pattern, pieces=pieces)
+    return pattern, places
+
+
+def _count(places: Sequence[tuple[str, str]]) -> int:
+    """Return how many rings the garment has of some edges: one on each side of the body, or one."""
+    return 2 if any(without_side(edge) != edge for _, edge in places) else 1
+
+
+def _girth_at(size: str, levels: Sequence[str], girths: Mapping[str, Mapping[str, float]]) -> float:
+    """Return the body's girth at the first of some levels that it has [m].
+
+    Raises:
+        InputError: it has none of them.
+    """
+    own = girths.get(size, {})
+    for name in levels:
+        if name in own:
+            return own[name]
+    raise InputError(f"the body has no girth at {levels[0]!r}; {nearest(levels[0], own)}")
+
+
+def _with_casing(pattern: Pattern, places: Sequence[tuple[str, str]], wish: Finishing) -> Pattern:
+    """Return a pattern whose edges are turned in as a casing: an allowance of its width, with the edge turned in once more."""
+    pieces = {}
+    for size, row in pattern.pieces.items():
+        made = []
+        for piece in row:
+            edges = [
+                replace(edge, kind="hem", allowance=wish.width + _NARROW) if (piece.name, edge.name) in places else edge
+                for edge in piece.edges
+            ]
+            made.append(replace(piece, edges=edges))
+        pieces[size] = made
+    return replace(pattern, pieces=pieces)
+
+
+def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int) -> Pattern:
+    """Return a pattern with one strip along a chain of free edges, cut `count` times."""
+    taken = {piece.name for piece in pattern.pieces[pattern.sample]}
+    name = find_unused_name(wish.name, taken)
+    ring = chain.closed and not wish.overlap
+    pieces = {}
+    for size, row in pattern.pieces.items():
+        length = wish.share * chain_length(pattern, chain, size)
+        allowance = pattern.piece(chain.sides[0].piece, size).edge(chain.sides[0].edge).width
+        strip = _strip(wish, name, length, row[0], quantity=count, ring=ring, allowance=allowance)
+        pieces[size] = (*row, strip)
+    called, words = {seam.name for seam in pattern.seams}, name.replace("_", " ")
+    sided = any(without_side(side.edge) != side.edge for side in chain.sides)
+    sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]] = ((SeamSide(piece=name, edge="lower"),), chain.sides)
+    ease = 1.0 / wish.share - 1.0
+    if wish.share > 1.0:
+        sides, ease = sides[::-1], wish.share - 1.0
+    sewn = Seam(
+        name=find_unused_name(words, called),
+        sides=sides,
+        ease=ease,
+        notches=None if sided else _centres(pattern, chain),
+    )
+    seams = [*pattern.seams, sewn]
+    if ring:
+        ends = ((SeamSide(piece=name, edge="right end"),), (SeamSide(piece=name, edge="left end", reversed=True),))
+        seams.append(Seam(name=find_unused_name(f"{words} ends", called), sides=ends))
+    return replace(pattern, pieces=pieces, seams=seams)
 
 
 def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
@@ -122,27 +272,29 @@ def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
     )
 
 
-def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, ring: bool) -> Piece:
-    """Return a strip of one size; its grain runs along a waistband, across a band and aslant over a binding."""
-    folded = wish.kind != "binding"
+def _strip(
+    wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, ring: bool, allowance: float
+) -> Piece:
+    """Return a straight strip of one size."""
+    folded, along, role = _STRIPS[wish.kind]
     high, whole = wish.width * (2 if folded else 1), length + wish.overlap
-    corners = [[0.0, 0.0], [length, 0.0], [whole, 0.0], [whole, high], [0.0, high]]
-    names = ["lower", "overlap", "right end", "upper", "left end"]
-    edges = []
-    for i, edge in enumerate(names):
-        ends = np.array([corners[i], corners[(i + 1) % len(corners)]])
-        if np.linalg.norm(ends[1] - ends[0]) > 0.0:
-            sewn = edge == "lower" or (ring and edge.endswith("end"))
-            # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
-            turned_in = 0.0 if wish.kind == "binding" and edge == "upper" else DEFAULT_ALLOWANCE["seam"]
-            edges.append(
-                Edge(name=edge, points=ends, kind="seam" if sewn else "cut", allowance=None if sewn else turned_in)
-            )
-    along = {"waistband": [1.0, 0.0], "band": [0.0, 1.0], "binding": [0.7071, 0.7071]}[wish.kind]
-    middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if wish.kind == "waistband" else high)
-    grain = middle + np.outer([-reach, reach], along)
+    # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
+    kinds = dict.fromkeys(("overlap", "upper"), "cut")
+    kinds |= {} if ring else dict.fromkeys(("right end", "left end"), "cut")
+    widths = dict.fromkeys(("lower", "right end", "left end", "upper", "overlap"), allowance)
+    if wish.kind == "binding":
+        widths["upper"] = 0.0
+    elif wish.kind == "ruffle":
+        kinds["upper"], widths["upper"] = "hem", _NARROW
+    edges = strip_edges(*swept(Strip(length=length, height=high)), overlap=wish.overlap, kinds=kinds, allowance=widths)
+    middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if along[1] == 0.0 else high)
     lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
+    marks = {}
+    if wish.kind == "cuff" and wish.overlap:
+        # It buttons upon itself, in the middle of its outer half.
+        marks["button"] = np.array([length + 0.5 * wish.overlap, 0.5 * wish.width])
+        lines |= buttonhole(np.array([0.5 * wish.overlap, 0.5 * wish.width]), np.array([1.0, 0.0]))
     return Piece(
-        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, internal_lines=lines, grain=grain,
-        paired=False, role="waistband" if wish.kind == "waistband" else "strip",
+        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, internal_lines=lines,
+        grain=middle + np.outer([-reach, reach], along), paired=False, role=role, marks=marks,
     )  # fmt: skip

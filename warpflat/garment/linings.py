@@ -21,7 +21,7 @@ _SHORTER, _LEAST_HEM = 0.020, 0.010
 
 
 def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
-    """Return a pattern whose facings and waistbands are cut from an interfacing too, by the same patterns.
+    """Return a pattern whose facings, waistbands, cuffs and collars are cut from an interfacing too, by the same patterns.
 
     A facing that is grown on gets a piece of interfacing of its own, without allowances.
     """
@@ -29,7 +29,7 @@ def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
     for size, row in pattern.pieces.items():
         doubled = [
             replace(piece, also={**piece.also, cloth: piece.quantity})
-            if piece.role in ("facing", "waistband")
+            if piece.role in ("facing", "waistband", "cuff", "collar")
             else piece
             for piece in row
         ]

@@ -118,7 +118,8 @@ def _with_zip(
             if not _runs_down(row[at], line):
                 line = line[::-1]
             drawn = dict(row[at].internal_lines)
-            drawn[find_unused_name(opening.title, drawn)] = _between(line, begin, min(stop, polyline_length(line)))
+            title = replace(opening, length=min(opening.length, sum(each.whole for each in placed[size][number]))).title
+            drawn[find_unused_name(title, drawn)] = _between(line, begin, min(stop, polyline_length(line)))
             row[at] = replace(row[at], internal_lines=drawn)
             pieces[size] = row
     if end is None:

@@ -65,7 +65,7 @@ class Opening:
         kind: "zip", "buttons" or "keyhole" from the upper end of the line; "slit" or "vent" from its lower end.
         line: of the seam, as "centre back" or "side left"; pieces that run across a centre line are parted there, except
             by a keyhole, which is cut into the piece.
-        length: [m]; infinite for buttons all along the line.
+        length: [m]; infinite for buttons or a zip all along the line.
         start: how far from that end it begins [m].
         style: of a zip, "invisible" or "lapped".
         width: of a vent's flap, of the button stand beyond its line, or of a keyhole's round end [m].

@@ -15,7 +15,7 @@ from warpflat.garment.mark_openings import lines_inside
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
-__all__ = ["with_shaped_waistband", "without_strip"]
+__all__ = ["shortened", "with_shaped_waistband", "without_strip"]
 
 
 def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
@@ -120,6 +120,36 @@ def with_shaped_waistband(
         seams.append(Seam(name=words, sides=((sides[0],), (sides[1],))))
     kept = [_with_moved_notches(pattern, seam, cut, width) for seam in pattern.seams]
     return replace(pattern, pieces=pieces, seams=[*kept, *seams])
+
+
+def shortened(pattern: Pattern, places: Sequence[tuple[str, str]], width: float) -> Pattern:
+    """Return a pattern without the strip along some free edges, which keep their names: a band or a cuff takes its place.
+
+    Args:
+        pattern: with all its openings.
+        places: pieces and edges.
+        width: of the strip [m].
+
+    Raises:
+        InputError: a dart ends in an edge, or the strip is too wide.
+    """
+    import shapely
+
+    pieces, cut = {size: list(row) for size, row in pattern.pieces.items()}, dict[tuple[str, str], tuple[str, bool]]()
+    for name, edge in places:
+        for row in pieces.values():
+            at = next(k for k, piece in enumerate(row) if piece.name == name)
+            piece = without_strip(row[at], facing_edges(row[at], (edge,), width), edge)
+            own = row[at].edge(edge)
+            edges = [replace(e, kind=own.kind, allowance=own.allowance) if e.name == edge else e for e in piece.edges]
+            body = shapely.Polygon(piece.outline)
+            marks = {key: mark for key, mark in piece.marks.items() if body.contains(shapely.Point(mark))}
+            row[at] = replace(piece, edges=edges, marks=marks)
+        order = [each.name for each in pattern.piece(name, pattern.sample).edges]
+        cut[name, order[order.index(edge) - 1]] = name, False
+        cut[name, order[(order.index(edge) + 1) % len(order)]] = name, True
+    seams = [_with_moved_notches(pattern, seam, cut, width) for seam in pattern.seams]
+    return replace(pattern, pieces=pieces, seams=seams)
 
 
 def _with_moved_notches(

@@ -174,7 +174,14 @@ def pattern_of_garment(
         for edge in piece.edges
         if edge.name == f"{opening.line} {STAND}"
     ]  # fmt: skip
-    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands)
+    girths = {}
+    if any(wish.elastic or wish.kind == "hood" for wish in sample.finishing):
+        for size, garment in garments.items():
+            assert garment.mannequin is not None
+            girths[size] = {level: each.girth for level, each in garment.mannequin.levels().items()}
+            head = garment.mannequin.extremity("head")
+            girths[size] |= {} if head is None else {"head": head}
+    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
     return add_pockets(pattern, sample.pockets), notes
 
 

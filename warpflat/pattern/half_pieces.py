@@ -65,7 +65,7 @@ def is_symmetric(piece: DraftedPiece) -> bool:
         return False
     # A strip is sewn to pieces that are not its mirror images: its notches must be so themselves.
     notched = np.array([base for notch in piece.notches for base in notch.base]).reshape(-1, 2)
-    if piece.piece.role in ("strip", "waistband") and any(
+    if piece.piece.role in ("strip", "waistband", "cuff", "collar", "hood") and any(
         np.linalg.norm(notched - base, axis=1).min() > INNER for base in notched * mirror + [2 * axis, 0]
     ):
         return False

@@ -23,12 +23,12 @@ from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
+__all__ = ["Elastic", "Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
 
 
 #: Kinds of :class:`SeamOpening`.
 OPENINGS = ("zip", "buttons", "slit", "vent")
-ROLES = ("shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket")
+ROLES = ("shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,7 +44,7 @@ class Piece:
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
         marks: points [m] by name that are marked through the cloth: buttons, corners of pockets.
-        role: "shell", or what it is derived as: "facing", "strip", "waistband", "lining", "interfacing", "pocket".
+        role: "shell", or what it is derived as: one of `ROLES`.
         also: cloths from which it is cut too, and how often, as interfacing.
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.
@@ -215,6 +215,23 @@ class Seam:
         return float(eased_length(length, whole, self.ease, self.eased))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Elastic:
+    """An elastic that is threaded through a casing or a folded band.
+
+    Attributes:
+        edge: name of the edges, without their side.
+        width: of the casing [m].
+        lengths: of the elastic by size [m].
+        count: how many the garment has.
+    """
+
+    edge: str
+    width: float
+    lengths: Mapping[str, float]
+    count: int = 1
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pattern:
     """All pieces of a garment in one or more sizes, and the seams between them (the same in every size).
@@ -225,6 +242,7 @@ class Pattern:
         seams: by name of piece and edge.
         sample_size: the size that files of one size show; None takes the middle one.
         words: what is printed instead of English words and names (see `warpflat.pattern.words`).
+        elastics: that are threaded through its casings.
     """
 
     __repr__ = short_repr
@@ -234,6 +252,7 @@ class Pattern:
     seams: Sequence[Seam] = ()
     sample_size: str | None = None
     words: Mapping[str, str] = field(default_factory=dict)
+    elastics: Sequence[Elastic] = ()
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):

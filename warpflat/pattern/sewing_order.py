@@ -35,6 +35,11 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Sew the lining to the facings", ({"facing", "lining"},)),
     ("Join the ends of bands and bindings", ({"strip"}, {"waistband"})),
     ("Sew bands and bindings to their edges", ({"strip", "shell"}, {"waistband", "shell"}, {"strip", "waistband"})),
+    ("Sew the cuffs on, fold them right sides together, sew their ends and turn them", ({"cuff", "shell"}, {"cuff"})),
+    ("Sew the hood's own seams", ({"hood"},)),
+    ("Sew the hood on", ({"hood", "shell"},)),
+    ("Make up the collar, right sides together, and turn it", ({"collar"},)),
+    ("Sew the collar on", ({"collar", "shell"},)),
 )
 # A seam of these stages is mentioned by others.
 _ON_FACINGS, _LININGS, _LAST = (len(_STAGES) + k for k in (1, 2, 5))
@@ -161,6 +166,14 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         steps.append(
             translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=", ".join(patches))
         )
+    placket = [titles[piece.name] for piece in pieces if piece.name.endswith("_placket")]
+    if placket:
+        steps.append(
+            translate(
+                "Cut the slits where they are marked, and bind both their edges with one strip each: {plackets}.",
+                plackets=", ".join(placket),
+            )
+        )
     seams = sewn_seams(garment, size)
     # Edges of linings and facings that no seam takes: they end at a zip, are caught in a binding, or are finished by themselves.
     free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
@@ -225,14 +238,31 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         )
     # Slits and vents are hems of their own, which the steps of their seams have turned in.
     hems: dict[float, list[str]] = {}
-    opened = {"slit", "vent"}
+    opened, cased = {"slit", "vent"}, {elastic.edge for elastic in garment.garment.elastics}
     for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
         for edge in piece.edges:
-            if edge.kind == "hem" and not opened & set(edge.name.split(" ")):
+            called = without_side(edge.name).rstrip(" 0123456789")
+            if edge.kind == "hem" and called not in cased and not opened & set(edge.name.split(" ")):
                 hems.setdefault(round(edge.width, 4), []).append(titles[piece.name])
     if hems:
         words = [f"{length_words(width, units)} ({', '.join(dict.fromkeys(rows))})" for width, rows in hems.items()]
         steps.append(translate("Turn up and sew the hems: {edges}.", edges=", ".join(words)))
+    for elastic in garment.garment.elastics:
+        # Without a strip of its own the edge is turned in.
+        turned_in = any(
+            edge.kind == "hem" and without_side(edge.name).rstrip(" 0123456789") == elastic.edge
+            for piece in pieces
+            for edge in piece.edges
+        )
+        phrase = "Turn in the {edge} as a casing of {width}" if turned_in else "Fold the band of the {edge} to {width}"
+        steps.append(
+            translate(
+                f"{phrase}, leave a gap in its seam, thread elastic of {{length}} through it, and close both.",
+                edge=translate_name(elastic.edge),
+                width=length_words(elastic.width, units),
+                length=length_words(elastic.lengths[size], units),
+            )
+        )
     for title, count in _buttons(pieces).items():
         steps.append(
             translate(
@@ -241,11 +271,16 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
                 title=title,
             )
         )
+    ends = [titles[piece.name] for piece in pieces if _buttons_at_one_end(piece)]
+    if ends:
+        steps.append(
+            translate("Work a buttonhole at one end, and sew a button to the other: {pieces}.", pieces=", ".join(ends))
+        )
     return tuple(steps)
 
 
 def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
-    """Return what is needed beside the cloth: zips and buttons."""
+    """Return what is needed beside the cloth: zips, elastics and buttons."""
     units = garment.garment.units
     zips = [
         translate(
@@ -255,11 +290,29 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         for opening in _zips(seam)
         if seam.stage < len(_STAGES)
     ]
-    return (*zips, *(translate("{count} buttons", count=count) for count in _buttons(garment.pieces[size]).values()))
+    elastics = [
+        translate(
+            "{count} elastic of {length}, at most {width} wide",
+            count=elastic.count,
+            length=length_words(elastic.lengths[size], units),
+            width=length_words(elastic.width, units),
+        )
+        for elastic in garment.garment.elastics
+    ]
+    buttons = list(_buttons(garment.pieces[size]).values())
+    at_ends = sum(piece.piece.quantity for piece in garment.pieces[size] if _buttons_at_one_end(piece))
+    buttons += [at_ends] if at_ends else []
+    return (*zips, *elastics, *(translate("{count} buttons", count=count) for count in buttons))
+
+
+def _buttons_at_one_end(piece: DraftedPiece) -> bool:
+    """Return whether a strip buttons upon itself: a cuff, or the stand of a collar."""
+    return piece.piece.role in ("cuff", "collar", "waistband") and "button" in piece.piece.marks
 
 
 def _buttons(pieces: Sequence[DraftedPiece]) -> dict[str, int]:
     """Return the number of buttons by the printed name of the piece that has them."""
+    pieces = [piece for piece in pieces if not _buttons_at_one_end(piece)]
     titles = piece_titles([piece.piece for piece in pieces])
     counts = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
     return {title: count for title, count in counts.items() if count > 1}

@@ -169,8 +169,9 @@ def _corner_between(pieces: Mapping[str, Piece], seam: str, sides: Sequence[tupl
         seam: its name.
         sides: each side's edge, and whether its last point is the corner.
     """
-    # The ends of a strip are cut straight across, wherever on a piece they come to lie.
-    if len({pieces[side.piece].role == "strip" for side, _ in sides}) > 1:
+    # The ends of a strip are cut straight across, wherever on a piece they come to lie; those of collars and cuffs are meant.
+    roles = [pieces[side.piece].role for side, _ in sides]
+    if len({role == "strip" for role in roles}) > 1 or {"collar", "cuff", "hood"} & set(roles):
         return None
     pairs, outer = [], []
     for side, at_end in sides:

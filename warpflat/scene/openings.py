@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from warpflat.garment.collars import COLLARS, Collar
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.finishing import FINISHES, Finishing
 from warpflat.garment.openings import CENTRES, Buttons, Opening
@@ -62,17 +63,37 @@ def straight_stands(form: FormResult, openings: Sequence[Opening]) -> list[Const
 
 def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
     """Return the finishing that a scene wants."""
-    return [
-        Finishing(
-            kind=table.kind,
-            edge=table.edge,
-            width=FINISHES[table.kind] if table.width_mm is None else 1e-3 * table.width_mm,
-            share=table.share,
-            overlap=1e-3 * table.overlap_mm,
-            shaped=table.shaped,
+    found = []
+    for table in tables:
+        usual = COLLARS[table.style] if table.kind == "collar" else FINISHES[table.kind]
+        width = usual if table.width_mm is None else 1e-3 * table.width_mm
+        collar = None
+        if table.kind in ("collar", "hood"):
+            collar = Collar(
+                style=table.style if table.kind == "collar" else "",
+                width=width,
+                rise=1e-3 * table.rise_mm,
+                fall=1e-3 * table.fall_mm,
+                point=1e-3 * table.point_mm,
+                strip=1e-3 * table.strip_mm,
+            )
+        found.append(
+            Finishing(
+                kind=table.kind,
+                edge=table.edge,
+                # A turtleneck is turned down upon itself.
+                width=2.0 * width if table.style == "turtleneck" else width,
+                share=table.share,
+                overlap=1e-3 * table.overlap_mm,
+                shaped=table.shaped,
+                shorten=1e-3 * table.shorten_mm,
+                elastic=table.elastic,
+                placket=1e-3 * table.placket_mm,
+                turns=table.turns,
+                collar=collar,
+            )
         )
-        for table in tables
-    ]
+    return found
 
 
 def scene_pockets(tables: Sequence[PocketTable]) -> list[Pocket]:

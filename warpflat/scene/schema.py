@@ -480,7 +480,7 @@ class OpeningTable(Table):
     """An opening along a line of a form. A piece that runs across a centre line is parted there, with a seam below the opening.
 
     A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit` or `vent` from the lower one. Buttons
-    run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing.
+    and a zip run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing.
     """
 
     kind: Literal["zip", "buttons", "slit", "vent", "keyhole"]
@@ -505,33 +505,101 @@ class OpeningTable(Table):
             raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
         if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
             raise ValueError("start_mm and style belong to a zip; a slit or a vent begins at the lower end of its seam")
-        if self.kind != "buttons" and self.length_mm is None:
-            raise ValueError("length_mm is missing; only buttons run all along their line without one")
+        if self.kind not in ("buttons", "zip") and self.length_mm is None:
+            raise ValueError("length_mm is missing; only buttons and zips run all along their line without one")
         own = {"button_mm", "spacing_mm", "count", "facing", "facing_mm"} & self.model_fields_set
         if self.kind != "buttons" and own:
             raise ValueError(f"{sorted(own)[0]} belongs to buttons; leave it out for a {self.kind}")
         return self
 
 
-class FinishingTable(Table):
-    """Pieces that finish free edges of a form: a facing of each piece, or one straight strip along the whole edge."""
+#: Keys of a finishing that belong to some kinds only.
+_OF_KINDS = {
+    "share": ("band", "waistband", "cuff", "ruffle", "collar"),
+    "overlap_mm": ("waistband", "cuff"),
+    "shaped": ("waistband",),
+    "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce"),
+    "elastic": ("casing", "band", "waistband"),
+    "placket_mm": ("cuff",),
+    "turns": ("flounce",),
+    "style": ("collar",),
+    "rise_mm": ("collar",),
+    "fall_mm": ("collar",),
+    "point_mm": ("collar",),
+    "strip_mm": ("hood",),
+}
+#: And those of a collar to some styles only.
+_OF_STYLES = {
+    "share": ("turtleneck",),
+    "rise_mm": ("stand", "shirt"),
+    "fall_mm": ("shirt",),
+    "point_mm": ("shirt", "convertible"),
+}
 
-    kind: Literal["facing", "band", "waistband", "binding"]
+
+class FinishingTable(Table):
+    """Pieces that finish free edges of a form, hems too: what they are follows from the lengths of the edges that they are sewn to.
+
+    A `facing` repeats each piece. One straight strip along the whole edge is a `band` or rib, a `waistband`, a `cuff`, a `binding` or
+    a gathered `ruffle`. A `collar` and a `hood` go around the neck. A `flounce` is a part of a ring below each piece. A `casing` is
+    turned in from the edge itself, for an elastic.
+    """
+
+    kind: Literal["facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing", "collar", "hood"]
     edge: Annotated[str, Field(min_length=1, max_length=100)]
-    width_mm: Annotated[float, Field(ge=5, le=300)] | None = None
-    share: Annotated[float, Field(ge=0.5, le=1)] = 1.0
+    width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=5)] = 1.0
+    """Length of a strip over that of its edge. A band of 0.85 is stretched, what is sewn to a cuff or waistband of 0.7 is gathered, a
+    ruffle of 1.8 is gathered itself."""
     overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
     shaped: bool = False
     """A waistband that is cut from the upper strip of the pieces, as curved as they are."""
+    shorten_mm: Annotated[float, Field(ge=0, le=800)] = 0.0
+    """The pieces end so far before the edge, because the strip takes the place."""
+    elastic: Annotated[float, Field(ge=0, le=1.5)] = 0.0
+    """Length of an elastic that is threaded through it, as a share of the body's girth there; 0 for none."""
+    placket_mm: Annotated[float, Field(ge=0, le=300)] = 0.0
+    """Length of a slit that opens the edge, behind in a sleeve, bound with a strip of its own."""
+    turns: Annotated[float, Field(ge=0.1, le=3)] = 0.5
+    """How much of a circle a flounce is: 1 for a circle skirt, 0.5 for half of one."""
+    style: Literal["stand", "shirt", "convertible", "flat", "turtleneck"] = "stand"
+    """Of a collar: a stand; a stand with a fall; one that is both in one piece; one that lies flat around the neck (Peter Pan); a
+    doubled band of a knit that is turned down."""
+    rise_mm: Annotated[float, Field(ge=0, le=60)] = 15.0
+    """By how much the front ends of a stand lie higher than its middle, so that it leans to the neck."""
+    fall_mm: Annotated[float, Field(ge=20, le=150)] = 45.0
+    """Width of a shirt collar's fall in the middle of the back; `width_mm` is that of its stand."""
+    point_mm: Annotated[float, Field(ge=20, le=200)] = 65.0
+    """Length of the front edge of a fall, from the stand to its point."""
+    strip_mm: Annotated[float, Field(ge=0, le=250)] = 0.0
+    """Width of the strip over the crown of a hood of three pieces; 0 for one of two."""
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> FinishingTable:
-        if self.kind != "band" and self.share != 1.0:
-            raise ValueError("share belongs to a band, which is stretched as it is sewn; leave it out")
-        if self.kind != "waistband" and self.overlap_mm:
-            raise ValueError("overlap_mm belongs to a waistband; leave it out")
-        if self.shaped and (self.kind != "waistband" or self.overlap_mm):
-            raise ValueError("shaped belongs to a waistband without an overlap; leave one of them out")
+        for key, kinds in _OF_KINDS.items():
+            if key in self.model_fields_set and self.kind not in kinds:
+                raise ValueError(f"{key} belongs to a {' or '.join(kinds)}; leave it out for a {self.kind}")
+        for key, styles in _OF_STYLES.items() if self.kind == "collar" else ():
+            if key in self.model_fields_set and self.style not in styles:
+                raise ValueError(
+                    f'{key} belongs to a {" or ".join(styles)} collar; leave it out for style = "{self.style}"'
+                )
+        if self.kind == "hood" and self.width_mm is not None:
+            raise ValueError("width_mm of a hood follows from the head's girth; leave it out")
+        if (self.width_mm or 0.0) > 300.0 and self.kind not in ("ruffle", "flounce"):
+            raise ValueError(f"width_mm is at most 300 for a {self.kind}")
+        if self.share > 1.0 and self.kind != "ruffle":
+            raise ValueError(f"share is at most 1 for a {self.kind}, which does not gather; take a ruffle")
+        if self.share < 1.0 and self.kind == "ruffle":
+            raise ValueError("share is at least 1 for a ruffle, which is gathered as it is sewn")
+        if self.shaped and (self.overlap_mm or self.share != 1.0 or self.elastic or self.shorten_mm):
+            raise ValueError(
+                "shaped belongs to a waistband without overlap_mm, share, elastic and shorten_mm; leave them out"
+            )
+        if self.kind == "casing" and not self.elastic:
+            raise ValueError("elastic is missing: its length as a share of the body's girth there, as elastic = 0.95")
+        if self.placket_mm and not self.overlap_mm:
+            raise ValueError("a cuff with a placket needs an overlap for its button, overlap_mm = 25")
         return self
 
 

@@ -1,0 +1,73 @@
+"""`warpflat new`: garments and choices are listed, a scene is written, and no file of the user is replaced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from warpflat.cli.main import main
+from warpflat.scene.load import load_scene
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    code = main(["new", *arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_garments_and_their_choices_are_listed(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    code, out, _ = run(capsys)
+    assert code == 0
+    assert {"shirt", "hoodie", "circle_skirt"} <= {line.split(" ")[0] for line in out.splitlines()}
+    code, out, _ = run(capsys, "shirt")
+    assert code == 0
+    assert "* --collar shirt: a stand with a fall" in out
+    assert "  --collar stand: a stand alone" in out
+
+
+def test_scene_is_written_with_what_was_chosen(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    file = tmp_path / "mine" / "shirt.toml"
+    code, out, _ = run(capsys, "shirt", "--size", "EU 38", "--collar", "stand", "--ease=loose", "-o", str(file))
+    assert code == 0
+    assert "* --collar stand" in out
+    scene = load_scene(file)
+    assert scene.settings.ease == {"bust": 17, "hip": 14, "biceps": 11, "elbow": 11, "forearm": 10, "wrist": 8}
+    assert [(table.kind, table.style) for table in scene.settings.finishing][-1] == ("collar", "stand")
+    before = file.read_text()
+    code, _, err = run(capsys, "shirt", "--size", "EU 40", "-o", str(file))
+    assert (code, file.read_text()) == (2, before)
+    assert "exists and is kept" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["shrt", "--size", "EU 38"], "did you mean 'shirt'"),
+        (["shirt", "--size", "EU 38", "--collar", "stnd"], "did you mean 'stand'"),
+        (["shirt", "--size", "EU 38", "--colar", "stand"], "did you mean 'collar'"),
+        (["shirt", "--size", "EU 99"], "EU 99"),
+        (["shirt", "--collar"], "--collar needs an option"),
+        (["shirt", "--collar", "stand", "--collar", "flat", "--size", "EU 38"], "--collar is given twice"),
+        (["shirt", "hoodie"], "one garment at a time"),
+        (["shirt", "--collar", "stand"], "say whom it is for"),
+        (["--size", "EU 38"], "name a garment"),
+        (["shirt", "--scan", "nobody.obj"], "nobody.obj: no such file"),
+        (["shirt", "--size", "EU 38", "--scan", "nobody.obj"], "command line"),
+        (["shirt", "--measure", "bst=0.9"], "did you mean 'bust'"),
+        (["shirt", "--fabric", "wovn", "--size", "EU 38"], "did you mean 'woven'"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    arguments: list[str],
+    message: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())

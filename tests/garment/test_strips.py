@@ -1,0 +1,148 @@
+"""Ribs, cuffs, plackets, ruffles, flounces and casings: strips drafted for the edges that they are sewn to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import body_of_size
+
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
+from warpflat.garment.finishing import Finishing
+from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.openings import Opening, part_at_centres
+from warpflat.garment.strips import Strip, swept
+from warpflat.garment.to_pattern import pattern_of_garment
+from warpflat.mannequin.forms import Form, shipped_form
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.pieces import Pattern
+from warpflat.pattern.sewing_order import notions, sewing_steps
+
+ZIP = Opening(kind="zip", line="centre back", length=0.3)
+
+
+def flat(form: Form, *openings: Opening, half: bool = False) -> Garment:
+    mannequin = body_of_size(30.0)
+    if not half:
+        form = part_at_centres(mannequin.layout, form, openings)
+    garment = flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True, curves_mm=0.0)
+    return replace(garment, openings=openings)
+
+
+@pytest.fixture(scope="module")
+def shirt() -> Garment:
+    return flat(shipped_form("shirt"), ZIP)
+
+
+@pytest.fixture(scope="module")
+def half_skirt() -> Garment:
+    return flat(shipped_form("skirt"), half=True)
+
+
+def finished(garment: Garment, *wishes: Finishing) -> Pattern:
+    return pattern_of_garment({"": replace(garment, finishing=wishes)}, name="garment")[0]
+
+
+def lengths(pattern: Pattern) -> Mapping[str, tuple[float, float]]:
+    """Lengths of both sides of every seam [mm], all of which match."""
+    drafted = draft_garment(pattern)
+    assert all(seam.matches for seam in drafted.seams)
+    return {seam.name: seam.length_mm for seam in drafted.seams}
+
+
+@pytest.mark.parametrize("turn", [-1.2, -0.2, 0.3])
+@pytest.mark.parametrize("even", [True, False])
+def test_curved_strip_has_the_length_of_its_edge_and_its_outer_edge_follows_from_the_turn(turn: float, even: bool):
+    lower, upper = swept(Strip(length=0.4, height=0.04, turn=turn, even=even))
+    assert polyline_length(lower) == pytest.approx(0.4)
+    assert polyline_length(upper) == pytest.approx(0.4 - 2.0 * turn * 0.04, rel=1e-3)
+    assert np.linalg.norm(upper - lower, axis=1) == pytest.approx(0.04)
+
+
+def test_rib_takes_the_place_of_a_strip_along_the_hem(shirt: Garment):
+    plain = pattern_of_garment({"": shirt}, name="garment")[0]
+    rib = Finishing(kind="band", edge="hip", width=0.06, share=0.85, shorten=0.06)
+    pattern = finished(shirt, rib)
+    side = ("front", "side left")
+    assert plain.piece(side[0], "").edge(side[1]).length - pattern.piece(side[0], "").edge(side[1]).length == (
+        pytest.approx(0.06)
+    )
+    found = lengths(pattern)
+    assert found["hip band"][0] == pytest.approx(0.85 * found["hip band"][1], abs=0.1)
+    # The zip opens the neck, and not the hem: the rib is a ring.
+    assert "hip band ends" in found
+    assert pattern.piece("front", "").edge("hip").kind == "seam"
+    assert plain.piece("front", "").edge("hip").kind == "hem"
+
+
+def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):
+    cuff = Finishing(kind="cuff", edge="wrist", width=0.06, share=0.8, overlap=0.025, shorten=0.05, placket=0.11)
+    pattern = finished(shirt, cuff)
+    piece = pattern.piece("cuff", "")
+    assert piece.quantity == 2
+    assert "button" in piece.marks
+    # One cuff goes around the whole wrist, from the slit to the slit.
+    seam = next(each for each in pattern.seams if each.name == "cuff")
+    assert [side.edge for side in seam.sides[1]] == ["wrist left 2", "wrist left"]
+    assert "cuff ends" not in {each.name for each in pattern.seams}
+    found = lengths(pattern)
+    assert found["cuff"][0] == pytest.approx(0.8 * found["cuff"][1], abs=0.1)
+    # The slit lies on the side of the sleeve that is sewn to the back.
+    sleeve = pattern.piece("sleeve_left", "")
+    slit = sleeve.internal_lines["slit 110 mm"][0]
+    armhole = next(each for each in pattern.seams if each.name == "armhole left")
+    cap = sleeve.edge(armhole.sides[1][0].edge).points
+    if armhole.sides[1][0].reversed:
+        cap = cap[::-1]
+    begins_behind = armhole.sides[0][0].piece.startswith("back")
+    back, front = (cap[0], cap[-1]) if begins_behind else (cap[-1], cap[0])
+    assert np.linalg.norm(slit - back) < np.linalg.norm(slit - front)
+    binding = pattern.piece("sleeve_placket", "")
+    assert binding.quantity == 2
+    assert binding.edge("lower").length > 0.22
+    steps = sewing_steps(draft_garment(pattern), "")
+    assert any("slits" in step for step in steps)
+    assert any("buttonhole at one end" in step and "cuff" in step for step in steps)
+    assert "2 buttons" in notions(draft_garment(pattern), "")
+    with pytest.raises(InputError, match="does not lie within the piece"):
+        finished(shirt, replace(cuff, placket=0.9))
+
+
+def test_ruffle_is_gathered_itself(shirt: Garment):
+    pattern = finished(shirt, Finishing(kind="ruffle", edge="hip", width=0.1, share=2.2))
+    found = lengths(pattern)["hip ruffle"]
+    assert found[1] == pytest.approx(2.2 * found[0], abs=0.1)
+    assert pattern.piece("hip_ruffle", "").edge("upper").kind == "hem"
+    assert any("gather the hip ruffle" in step for step in sewing_steps(draft_garment(pattern), ""))
+
+
+@pytest.mark.parametrize("turns", [0.5, 1.0])
+def test_flounce_has_a_panel_for_each_piece_and_the_hem_of_a_ring(half_skirt: Garment, turns: float):
+    pattern = finished(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=turns))
+    found = lengths(pattern)
+    assert {"front knee flounce", "back knee flounce", "side left of knee flounce"} <= set(found)
+    panels = [piece for piece in pattern.pieces[""] if piece.name.endswith("flounce")]
+    assert len(panels) == 2
+    assert all(piece.on_fold for piece in panels)
+    inner = 2.0 * sum(piece.edge("knee").length for piece in panels)
+    hem = 2.0 * sum(piece.edge("hem").length for piece in panels)
+    assert hem - inner == pytest.approx(2.0 * np.pi * turns * 0.2, rel=1e-3)
+    with pytest.raises(InputError, match="take fewer turns"):
+        finished(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=2.5))
+
+
+def test_casing_is_turned_in_and_has_an_elastic_of_the_body(half_skirt: Garment):
+    pattern = finished(half_skirt, Finishing(kind="casing", edge="waist", width=0.03, elastic=0.9))
+    edge = pattern.piece("front", "").edge("waist")
+    assert (edge.kind, edge.width) == ("hem", pytest.approx(0.04))
+    assert half_skirt.mannequin is not None
+    girth = half_skirt.mannequin.levels()["waist"].girth
+    assert pattern.elastics[0].lengths[""] == pytest.approx(0.9 * girth)
+    drafted = draft_garment(pattern)
+    assert any("thread elastic" in step for step in sewing_steps(drafted, ""))
+    assert any("elastic" in notion for notion in notions(drafted, ""))
+    with pytest.raises(InputError, match="no free edge 'hip'"):
+        finished(half_skirt, Finishing(kind="casing", edge="hip", width=0.03, elastic=0.9))

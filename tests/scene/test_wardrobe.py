@@ -1,0 +1,76 @@
+"""The wardrobe: every choice makes a valid scene, and garments come out whole."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from warpflat.core.errors import InputError
+from warpflat.garment.to_pattern import pattern_of_garment
+from warpflat.pattern.draft import draft_garment
+from warpflat.scene.load import Scene, make_scene
+from warpflat.scene.plan import plan_garment
+from warpflat.scene.wardrobe import garment_offer, offers, scene_text
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+def scene_of(name: str, **chosen: str) -> Scene:
+    text = scene_text(garment_offer(name), {"size": "EU 40", "resolution_mm": 25.0}, chosen)
+    return make_scene(tomllib.loads(text), name=name, folder=Path(), where=name)
+
+
+@pytest.mark.parametrize("name", list(offers()))
+def test_every_option_makes_a_valid_scene_of_its_own(name: str):
+    offer = garment_offer(name)
+    for choice, options in offer.choices.items():
+        texts = set()
+        for option, (about, _) in options.items():
+            assert about
+            scene = scene_of(name, **{choice: option})
+            texts.add(scene.settings.model_dump_json(exclude={"name"}))
+        assert len(texts) == len(options) > 1, choice
+
+
+@pytest.mark.parametrize(
+    ("name", "chosen", "pieces"),
+    [
+        ("shirt", {"collar": "shirt", "sleeve": "long"}, {"collar", "collar_stand", "cuff", "sleeve_placket"}),
+        ("hoodie", {"closure": "zip"}, {"hood", "hood_strip", "wrist_band", "hip_band"}),
+        ("circle_skirt", {"skirt": "circle"}, {"front_hip_flounce", "back_hip_flounce", "waistband"}),
+        ("pyjama_trousers", {"hem": "rib"}, {"ankle_band"}),
+        ("shift_dress", {"hem": "ruffle", "collar": "flat"}, {"knee_ruffle", "collar", "armhole_binding"}),
+    ],
+)
+def test_garment_comes_out_whole(name: str, chosen: dict[str, str], pieces: set[str]):
+    plan = plan_garment(scene_of(name, **chosen))
+    garment = plan.flatten()
+    metrics = garment.metrics()
+    assert all(each["flipped_faces"] == 0 and each["stages"][-1]["converged"] for each in metrics["pieces"].values())
+    # It can be put on.
+    assert all(ring["passes"] is not False for ring in metrics["rings"])
+    pattern, _ = pattern_of_garment({"": garment}, name=name, rules=plan.drawing.rules)
+    drafted = draft_garment(pattern)
+    assert pieces <= {piece.name for piece in drafted.pieces[""]}
+    assert all(seam.matches for seam in drafted.seams)
+
+
+def test_unknown_names_are_told_with_the_nearest():
+    with pytest.raises(InputError, match="'shrt' is unknown: did you mean 'shirt'"):
+        garment_offer("shrt")
+    with pytest.raises(InputError, match="a shirt has no choice 'colar': did you mean 'collar'"):
+        scene_text(garment_offer("shirt"), {"size": "EU 38"}, {"colar": "stand"})
+    with pytest.raises(InputError, match="collar 'stnd' is unknown: did you mean 'stand'"):
+        scene_text(garment_offer("shirt"), {"size": "EU 38"}, {"collar": "stnd"})
+
+
+@pytest.mark.parametrize("name", [path.stem.removeprefix("new_") for path in sorted(SCENES.glob("new_*.toml"))])
+def test_shipped_scenes_of_the_wardrobe_are_what_the_command_writes(name: str):
+    assert (SCENES / f"new_{name}.toml").read_text() == scene_text(garment_offer(name), {"size": "EU 38"}, {})
