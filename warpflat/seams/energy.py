@@ -45,6 +45,8 @@ _WORTH, _WORTH_OF_PIECE = 0.002, 0.15
 # A garment of which more than the first share is beyond the limit is parted further before darts are looked for; one of which more than the
 # second is, after them.
 _PARTED_FIRST, _PARTED = 0.05, 0.015
+# One that is as tight as a skin has further panels where more than this share is beyond the limit with all its darts.
+_STILL_TIGHT = 0.03
 # A centimetre sewn counts as this much cloth beyond the limit [m2].
 _PRICE = 1e-5
 # One that brings back this share of what is beyond in its piece is taken without a look at others.
@@ -164,7 +166,8 @@ def cut_by_energy(
     tried = 0
     parting = _PARTED_FIRST * total < sum(piece.outside for piece in pieces)
     most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
-    if parting and options.most_pieces is None and (anatomy.kind == "trousers" or anatomy.open_front):
+    tight = parting and options.most_pieces is None and anatomy.kind == "trousers"
+    if tight or (parting and options.most_pieces is None and anatomy.open_front):
         # What is as tight as a skin has a panel more in each leg, a jacket two in each sleeve.
         most += 2
     for _ in range(_MOST_ROUNDS):
@@ -184,6 +187,11 @@ def cut_by_energy(
         if worst is None and not parting and beyond > _PARTED * total:
             # Darts alone do not do.
             parting = True
+            exhausted.clear()
+            continue
+        if worst is None and tight and beyond > _STILL_TIGHT * total:
+            # And yet another one.
+            most, tight = most + 2, False
             exhausted.clear()
             continue
         if worst is None or tried >= _MOST_TRIALS:
