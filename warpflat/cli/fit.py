@@ -83,7 +83,16 @@ def fit(
       warpflat fit skirt.usd --to "EU 40" --ease waist=20mm --ease hip=5cm
     """
     from warpflat.cli.progress_bar import ProgressBar
-    from warpflat.scene.fit import FitJob, Fitted, ease_wishes, fit_to, require_own_study, study_table, write_study
+    from warpflat.scene.fit import (
+        FitJob,
+        Fitted,
+        check_tables,
+        ease_wishes,
+        fit_to,
+        require_own_study,
+        study_table,
+        write_study,
+    )
 
     ease = ease_wishes(eases)
     if len(set(bodies)) < len(bodies):
@@ -100,6 +109,7 @@ def fit(
     for option, key in (("seams", "find"), ("front", "front")):
         if options[option] is not None:
             tables.setdefault("find_seams", {})[key] = options[option]
+    check_tables(tables, garment)
     require_own_study(folder)
     start_warp_silently()
     job = FitJob.start(

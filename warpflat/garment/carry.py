@@ -20,7 +20,7 @@ from warpflat.surface.laplacian import stiffness_matrix
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["carry", "carry_points", "skin_frames"]
+__all__ = ["carry", "carry_points", "skin_frames", "skin_under"]
 
 # The nearest vertices of the skin that are asked, and over what distance they share [m, and as a share of the cloth's distance].
 _ASKED, _SHARED, _MORE = 96, 0.008, 0.5
@@ -57,6 +57,29 @@ def skin_frames(before: FloatArray, after: FloatArray, triangles: NDArray[np.int
     return np.asarray(outer[0] @ np.linalg.inv(outer[1]))
 
 
+def skin_under(
+    points: FloatArray, normals: FloatArray, skin: FloatArray, triangles: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Return the vertices of a skin under each point of cloth (#P by #K), their weights, and the distance of the nearest one (#P [m]).
+
+    Args:
+        points, normals: #P by 3 [m], and how the cloth faces there, outward.
+        skin: #V by 3 [m]. triangles: #T by 3, of the skin that may be asked.
+    """
+    from scipy.spatial import cKDTree
+
+    used = np.unique(triangles)
+    facing = vertex_normals(skin, triangles)
+    asked = min(_ASKED, len(used))
+    far, near = cKDTree(skin[used]).query(points, k=asked)
+    near = used[near.reshape(len(points), asked)]
+    far = far.reshape(len(points), asked)
+    away = far + _BEHIND * (np.einsum("pka,pa->pk", facing[near], normals) < _ALIKE)
+    least = away.min(axis=1, keepdims=True)
+    weight = np.exp(-0.5 * (away**2 - least**2) / (_SHARED + _MORE * least) ** 2)
+    return near, weight / weight.sum(axis=1, keepdims=True), far.min(axis=1)
+
+
 def carry_points(
     points: FloatArray,
     normals: FloatArray,
@@ -71,24 +94,11 @@ def carry_points(
         before, after: #V by 3 [m], the skin on either body.
         triangles: #T by 3, of the skin that may be asked.
     """
-    from scipy.spatial import cKDTree
-
-    used = np.unique(triangles)
     frames = skin_frames(before, after, triangles)
-    facing = vertex_normals(before, triangles)
-    asked = min(_ASKED, len(used))
-    far, near = cKDTree(before[used]).query(points, k=asked)
-    near = used[near.reshape(len(points), asked)]
-    far = far.reshape(len(points), asked)
-    other = np.einsum("pka,pa->pk", facing[near], normals) < _ALIKE
-    away = far + _BEHIND * other
-    least = away.min(axis=1, keepdims=True)
-    width = _SHARED + _MORE * least
-    weight = np.exp(-0.5 * (away**2 - least**2) / width**2)
-    weight /= weight.sum(axis=1, keepdims=True)
+    near, weight, far = skin_under(points, normals, before, triangles)
     off = points[:, None] - before[near]
     moved = after[near] + np.einsum("pkab,pkb->pka", frames[near], off)
-    return np.einsum("pk,pka->pa", weight, moved), far.min(axis=1)
+    return np.einsum("pk,pka->pa", weight, moved), far
 
 
 def carry(surface: Surface, before: FloatArray, after: FloatArray, triangles: NDArray[np.int64]) -> FloatArray:

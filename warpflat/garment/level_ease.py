@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.garment.carry import skin_under
 from warpflat.mannequin.body_landmarks import model_places
 from warpflat.mannequin.body_model import finer_body
-from warpflat.mannequin.common_body import CommonBody
+from warpflat.mannequin.common_body import CommonBody, skin_triangles
 from warpflat.mannequin.fit_body import vertex_normals
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.slicer import Slicer
@@ -22,8 +23,6 @@ EASE_LEVELS = ("bust", "underbust", "waist", "hip")
 # Above the bust what is asked there fades out, up to here.
 _TOP = "front_neck"
 _UP = np.array([0.0, 1.0, 0.0])
-# Vertices of the skin that share in a direction, and over what distance [m].
-_ASKED, _SHARED = 24, 0.02
 
 
 def level_ease(
@@ -68,8 +67,6 @@ def widened(
         layers: as :func:`level_ease` takes them.
         wished: ease by level [m].
     """
-    from scipy.spatial import cKDTree
-
     has = level_ease(body, layers)
     more = {name: wished.get(name, girths[0] - girths[1]) - (girths[0] - girths[1]) for name, girths in has.items()}
     if not more:
@@ -78,17 +75,13 @@ def widened(
     heights = [*(body.level(name) for name in order), max(body.level(_TOP), body.level(order[-1]) + 0.05)]
     # A tape that lies so much farther off is longer by a whole turn's share.
     off = [*(more[name] / (2.0 * np.pi) for name in order), 0.0]
-    triangles = finer_body()[1]
-    normals = vertex_normals(body.vertices, triangles)
+    skin = vertex_normals(body.vertices, finer_body()[1])
     places = model_places()
     arm = (places.strips["arm left"] | places.strips["arm right"]).astype(float)
-    tree = cKDTree(body.vertices)
     out = []
-    for vertices, _ in layers:
-        far, near = tree.query(vertices, k=_ASKED)
-        weight = np.exp(-0.5 * (far**2 - far[:, :1] ** 2) / (_SHARED + 0.5 * far[:, :1]) ** 2)
-        weight /= weight.sum(axis=1, keepdims=True)
-        way = np.einsum("pk,pka->pa", weight, normals[near])
+    for vertices, triangles in layers:
+        near, weight, _ = skin_under(vertices, vertex_normals(vertices, triangles), body.vertices, skin_triangles())
+        way = np.einsum("pk,pka->pa", weight, skin[near])
         way[:, 1] = 0.0
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
         here = np.interp(vertices[:, 1], heights, off) * (1.0 - np.einsum("pk,pk->p", weight, arm[near]))

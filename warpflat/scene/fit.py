@@ -8,6 +8,7 @@ import re
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,14 +21,24 @@ from warpflat.core.file_names import make_file_name
 from warpflat.core.input_files import listening_to_reads
 from warpflat.core.text import quote_value
 from warpflat.garment.level_ease import EASE_LEVELS
-from warpflat.scene.load import Scene, make_scene
+from warpflat.scene.load import Scene, make_scene, scene_fabric
 
 if TYPE_CHECKING:
     from warpflat.mannequin.common_body import CommonBody
     from warpflat.scene.run import SceneResult
     from warpflat.seams.layers import GarmentFile
 
-__all__ = ["Carried", "FitJob", "Fitted", "ease_wishes", "fit_to", "require_own_study", "study_table", "write_study"]
+__all__ = [
+    "Carried",
+    "FitJob",
+    "Fitted",
+    "check_tables",
+    "ease_wishes",
+    "fit_to",
+    "require_own_study",
+    "study_table",
+    "write_study",
+]
 
 # A garment lies on its body if half of its cloth is nearer than this [m].
 _BESIDE = 0.2
@@ -275,6 +286,27 @@ def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
     return found
 
 
+def check_tables(tables: Mapping[str, Any], garment: Path) -> None:
+    """Check the tables of a scene that a carried garment will be flattened by, before anything is fitted.
+
+    Raises:
+        InputError: a value or the fabric is wrong.
+    """
+    try:
+        scene_fabric(
+            make_scene(
+                {**tables, "surface": {"file": str(garment)}}, name="garment", folder=Path(), where="command line"
+            )
+        )
+    except InputError as error:
+        message = re.sub(
+            r"^command line: find_seams\.(find|front)",
+            lambda found: "--front" if found[1] == "front" else "--seams",
+            str(error),
+        )
+        raise InputError(re.sub(r"^command line: (\w+)", r"--\1", message)) from None
+
+
 def fit_to(
     job: FitJob,
     carried: Carried,
@@ -401,6 +433,7 @@ def study_table(fitted: Sequence[Fitted]) -> list[str]:
     return lines
 
 
+@lru_cache(maxsize=4)
 def _common_body(text: str, option: str) -> CommonBody:
     """Return the body of a size, or of a scan's file."""
     from warpflat.mannequin.common_body import common_body_of_mannequin, common_body_of_scan

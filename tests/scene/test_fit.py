@@ -1,0 +1,163 @@
+"""`warpflat fit`: from a garment's file to the pattern for another body."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies import body_of_size
+from command import Command
+
+from warpflat.core.errors import InputError
+from warpflat.scene.fit import FitJob, ease_wishes, require_own_study
+from warpflat.seams.layers import read_garment
+from warpflat.surface.io.file_seams import file_seams
+
+BARE = ("--frames", "0", "--no-picture", "--quiet")
+
+
+def _skirt(path: Path, *, texture: bool = True, shift: float = 0.0, unit: float = 1.0) -> None:
+    """Write a skirt on the body of EU 36, with a panel in front and one behind as its texture."""
+    hips = body_of_size(20.0, "EU 36")
+    turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    rings = [hips.line(level)[:-1] for level in ("hip", "waist")]
+    centre = 0.5 * (rings[0].min(axis=0) + rings[0].max(axis=0))
+    # Narrow at the waist, flared below the hip.
+    at = [hips.levels()["hip"].height - 0.35, *(hips.levels()[level].height for level in ("hip", "waist"))]
+    sides = [0.5 * np.ptp(rings[0], axis=0) + 0.08, *(0.5 * np.ptp(ring, axis=0) + 0.02 for ring in rings)]
+    heights = np.linspace(hips.levels()["hip"].height - 0.35, hips.levels()["waist"].height + 0.02, 22)
+    lines = []
+    for height in heights:
+        wide = [np.interp(height, at, [side[k] for side in sides]) for k in range(3)]
+        x, z = centre[0] + wide[0] * np.sin(turn), centre[2] + wide[2] * np.cos(turn)
+        lines += [f"v {(a + shift) / unit:.6f} {height / unit:.6f} {b / unit:.6f}" for a, b in zip(x, z, strict=True)]
+    if texture:
+        lines += [f"vt {0.02 * k:.4f} {height:.4f}" for height in heights for k in range(21)]
+        lines += [f"vt {0.6 + 0.02 * k:.4f} {height:.4f}" for height in heights for k in range(21)]
+    for row in range(21):
+        for k in range(40):
+            corners = [40 * row + k, 40 * row + (k + 1) % 40, 40 * row + 40 + (k + 1) % 40, 40 * row + 40 + k]
+            # From the left side over the front to the right side, and the other half behind.
+            half, at = divmod((k + 10) % 40, 20)
+            first = 22 * 21 * half + 21 * row + at
+            places = [first, first + 1, first + 22, first + 21]
+            words = (f"{v + 1}/{t + 1}" if texture else f"{v + 1}" for v, t in zip(corners, places, strict=True))
+            lines.append("f " + " ".join(words))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def test_a_skirt_is_fitted_to_another_size(command: Command):
+    _skirt(Path("skirt.obj"))
+    ended = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *BARE)
+    assert (ended.code, ended.err) == (0, "")
+    report = json.loads(Path("fitted/fit.json").read_text(encoding="utf-8"))
+    (entry,) = report["bodies"]
+    assert entry["kept"]
+    assert set(entry["levels"]) == {"waist", "hip"}
+    for level in entry["levels"].values():
+        assert level["ease_mm"] == pytest.approx(level["ease_before_mm"], abs=5.0)
+    grown = body_of_size(20.0, "EU 42").levels()["hip"].girth - body_of_size(20.0, "EU 36").levels()["hip"].girth
+    # It is as much wider as the body is, in space and in the pattern.
+    metrics = json.loads(Path("fitted/metrics.json").read_text(encoding="utf-8"))
+    assert len(metrics["pieces"]) == 2
+    before, after = (read_garment(file, units="m") for file in ("skirt.obj", "fitted/skirt.fitted.obj"))
+    row = slice(40 * 12, 40 * 13)
+    girths = [
+        np.linalg.norm(np.diff(np.vstack([r, r[:1]]), axis=0), axis=1).sum()
+        for r in (before.raw.vertices[row], after.raw.vertices[row])
+    ]
+    assert girths[1] - girths[0] == pytest.approx(grown, abs=0.015)
+    # Its islands, by which it is cut, are still there, and its mesh is the same one.
+    for each in (before, after):
+        assert len(file_seams(each.raw)["uv"].names) == 2
+    assert np.array_equal(before.raw.polygons, after.raw.polygons)
+    files = metrics["files"]["skirt"]
+    assert {"skirt.fitted.obj", "skirt.body.obj", "pattern.json"} <= set(files)
+    # A second time it replaces what it has written.
+    again = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *BARE)
+    assert (again.code, again.err) == (0, "")
+
+
+def test_several_bodies_are_a_study_with_asked_ease(command: Command):
+    _skirt(Path("skirt.obj"), texture=False)
+    ended = command(
+        "fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 36", "--to", "EU 40", "--ease", "hip=90mm",
+        "--out", "study", *BARE,
+    )  # fmt: skip
+    assert (ended.code, ended.err) == (0, "")
+    with Path("study/fit.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["body"] for row in rows] == ["EU 36", "EU 40"]
+    for row in rows:
+        assert float(row["ease_hip_mm"]) == pytest.approx(90.0, abs=4.0)
+        assert row["kept"] == "True"
+    for folder in ("EU_36", "EU_40"):
+        assert Path("study", folder, "pattern.json").is_file()
+
+
+def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
+    _skirt(tmp_path / "skirt.obj", unit=0.01)
+    job = FitJob.start(tmp_path / "skirt.obj", units="cm")
+    assert "was fitted inside" in job.notes[0]
+    carried = job.to("EU 42", {})
+    assert carried.kept()[1]
+    assert carried.vertices.shape == job.read.raw.vertices.shape
+    # Whatever the file's unit, the carried mesh is in metres.
+    assert np.ptp(carried.vertices[:, 1]) == pytest.approx(0.55, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--to", "EU 39"), "--to: size 'EU 39' is in no table"),
+        (("--from", "EU 39", "--to", "EU 40"), "--from: size 'EU 39' is in no table"),
+        (("--to", "gone.obj"), "gone.obj"),
+        (("--to", "skirt.obj"), "--to: skirt.obj: scan"),
+        (("--to", "EU 40", "--to", "EU 40"), "--to: 'EU 40' is given twice"),
+        (("--to", "EU 40", "--ease", "waist"), "give a level and a length with its unit"),
+        (("--to", "EU 40", "--ease", "waist=4"), "give a level and a length with its unit"),
+        (("--to", "EU 40", "--ease", "waist=4e999mm"), "give a level and a length with its unit"),
+        (("--to", "EU 40", "--ease", "wiast=4cm"), "did you mean 'waist'?"),
+        (("--to", "EU 40", "--ease", "waist=9m"), "ease is from -30 to 400 cm"),
+        (("--to", "EU 40", "--ease", "waist=4cm", "--ease", "waist=5cm"), "waist is given twice"),
+        (("--from", "EU 36", "--to", "EU 40", "--ease", "bust=4cm"), "it goes around waist, hip"),
+        (("--to", "EU 40", "--front", "+w"), "--front: should be"),
+        (("--to", "EU 40", "--front", "+y"), "--front '+y'"),
+        (("--to", "EU 40", "--seams", "vu"), "--seams: should be"),
+        (("--to", "EU 40", "--bands", "strait"), "--bands: should be"),
+        (("--to", "EU 40", "--fabric", "tweeed"), "--fabric: unknown fabric 'tweeed'"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(command: Command, options: tuple[str, ...], says: str):
+    _skirt(Path("skirt.obj"))
+    ended = command("fit", "skirt.obj", "--units", "m", "--out", "out", *BARE, *options)
+    assert says in ended.refusal
+
+
+def test_a_garment_that_lies_elsewhere_is_refused(command: Command):
+    _skirt(Path("skirt.obj"), shift=1.0)
+    refusal = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 40", *BARE).refusal
+    assert "cm off EU 36; give the body on which it was made" in refusal
+
+
+def test_files_of_others_are_not_replaced(command: Command):
+    _skirt(Path("skirt.obj"))
+    Path("out").mkdir()
+    Path("out/fit.json").write_text("[1, 2]", encoding="utf-8")
+    refusal = command(
+        "fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 40", "--out", "out", *BARE
+    ).refusal
+    assert "fit.json: is not of warpflat" in refusal
+    Path("out/fit.json").unlink()
+    Path("out/fit.csv").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"fit\.csv: is not of warpflat"):
+        require_own_study(Path("out"))
+
+
+def test_ease_is_read_with_its_unit():
+    assert ease_wishes(["waist=40mm", " hip = 5 cm ", "bust=-1in"]) == pytest.approx(
+        {"waist": 0.04, "hip": 0.05, "bust": -0.0254}
+    )
