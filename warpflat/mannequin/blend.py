@@ -29,6 +29,8 @@ _LEAST_MITRE = 0.5
 _SHARED = 3.0
 # Standard deviation [m] along the arm of the mean that bows a sleeve around the elbow.
 _ELBOW_BOW = 0.03
+# The cloth of a straight leg hangs from the crotch curve down to this share of the way from thigh to knee.
+_HANGS = 0.8
 # Parts of the body whose profiles can be mixed with each other.
 _PARTS = (RING_LEVELS, ARM_LEVELS[1:], LEG_LEVELS[1:])
 
@@ -352,9 +354,32 @@ def _move_legs(
     for grid in layout.legs.values():
         fork = grid[1 : layout.leg_row["leg_thigh"]]
         out[fork] = body[fork] + move[fork]
-        for pair in ruled:
-            if set(pair) & set(LEG_LEVELS):
-                rule_rows(out, grid, row_of, pair, body[grid[1:].reshape(-1)])
+        straight = [pair for pair in ruled if set(pair) & set(LEG_LEVELS)]
+        for pair in straight:
+            rule_rows(out, grid, row_of, pair, body[grid[1:].reshape(-1)])
+        if straight:
+            _hang_fork(out, layout, grid)
+
+
+def _hang_fork(out: FloatArray, layout: Layout, grid: IntArray) -> None:
+    """Let the cloth of a straight leg hang from the crotch curve to the upper thigh, along the inseam and as far as it moves outward.
+
+    On the body the curve's square corner to the front becomes the thigh's round one within a few centimetres: cut like that,
+    the fork would end in a beak.
+    """
+    thigh, knee = layout.leg_row["leg_thigh"], layout.leg_row["leg_knee"]
+    last, count = thigh + round(_HANGS * (knee - thigh)), grid.shape[1]
+    ahead, behind = layout.crotch_point + layout.to_princess, len(layout.crotch) - 1 - layout.crotch_point
+    at = np.arange(count)
+    near = np.maximum(1.0 - at / ahead, 0.0) + np.maximum(1.0 - (count - at) / behind, 0.0)
+    weight = near * near * (3.0 - 2.0 * near)
+    rows = out[grid[: last + 1]]
+    arc = np.cumsum(np.linalg.norm(np.diff(rows, axis=0, prepend=rows[:1]), axis=2), axis=0)
+    share = (arc / arc[-1])[..., None]
+    # It runs into the leg without a corner.
+    away = (1.0 - share * share) * (rows[0] + share * (rows[last] - rows[0]) - rows)
+    outward = np.einsum("rck,rck->rc", away, vertex_normals(out, layout.body_faces)[grid[: last + 1]])
+    out[grid[1:last]] += (weight * (outward > 0.0))[1:last, :, None] * away[1:last]
 
 
 def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float) -> FloatArray:
