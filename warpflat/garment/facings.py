@@ -76,9 +76,9 @@ def with_facings(
     for name, edge in places:
         title = find_unused_name(f"{name}_{edge}_facing".replace(" ", "_"), taken)
         taken.add(title)
-        stand = next((each for each in stands if each.piece == name and _touch(pattern, each, edge)), None)
-        grown_on = stand is not None and stand.grown_on
         sample = pattern.piece(name, pattern.sample)
+        stand = next((each for each in stands if each.piece == name and each.edge in _ends(sample, (edge,))), None)
+        grown_on = stand is not None and stand.grown_on
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == name)
             strip = facing_edges(
@@ -99,7 +99,20 @@ def with_facings(
             words = find_unused_name(f"{name} {stand.edge} facing".replace("_", " "), called)
             seams.append(Seam(name=words, sides=((side,), (replace(side, piece=title),))))
             called.add(words)
-    seams += _joined(pattern, parts, gaps, places[0][1], called)
+    # Facings are sewn to each other where their pieces are.
+    for seam in pattern.seams:
+        both = [row[0] for row in seam.sides]
+        # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
+        centre = both[0].piece == both[1].piece
+        if seam.name in gaps and (
+            centre or not any(pattern.piece(side.piece, pattern.sample).on_fold for side in both)
+        ):
+            continue
+        if all(len(row) == 1 for row in seam.sides) and all((side.piece, side.edge) in parts for side in both):
+            first, second = (_part(side, parts) for side in both)
+            words = find_unused_name(f"{seam.name} of {places[0][1]} facing", called)
+            seams.append(Seam(name=words, sides=((first,), (second,))))
+            called.add(words)
     return replace(pattern, pieces=pieces, seams=seams)
 
 
@@ -133,10 +146,6 @@ def centre_notch(piece: Piece) -> tuple[float, ...] | None:
     return (0.5,) if whole else None
 
 
-def _touch(pattern: Pattern, stand: Stand, edge: str) -> bool:
-    return stand.edge in _ends(pattern.piece(stand.piece, pattern.sample), (edge,))
-
-
 def _chain(piece: Piece, edge: str, stand: Stand | None) -> tuple[str, ...]:
     """Return an edge and the stand beside it in the order of the outline."""
     if stand is None:
@@ -154,25 +163,6 @@ def _part(side: SeamSide, parts: _Parts) -> SeamSide:
     """Return the side of a seam on the facing for one on its piece."""
     piece, edge, flipped = parts[side.piece, side.edge]
     return replace(side, piece=piece, edge=edge, reversed=side.reversed != flipped)
-
-
-def _joined(pattern: Pattern, parts: _Parts, gaps: Collection[str], edge: str, called: set[str]) -> list[Seam]:
-    """Return the seams between facings, where their pieces have one."""
-    seams = []
-    for seam in pattern.seams:
-        both = [row[0] for row in seam.sides]
-        # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
-        centre = both[0].piece == both[1].piece
-        if seam.name in gaps and (
-            centre or not any(pattern.piece(side.piece, pattern.sample).on_fold for side in both)
-        ):
-            continue
-        if all(len(row) == 1 for row in seam.sides) and all((side.piece, side.edge) in parts for side in both):
-            first, second = (_part(side, parts) for side in both)
-            words = find_unused_name(f"{seam.name} of {edge} facing", called)
-            seams.append(Seam(name=words, sides=((first,), (second,))))
-            called.add(words)
-    return seams
 
 
 def facing_edges(piece: Piece, chain: Sequence[str], width: float, *, around: FloatArray | None = None) -> list[Edge]:
