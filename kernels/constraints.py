@@ -22,11 +22,11 @@ class Seams:
     ends: #P, vertices: of the first edge, then of the second (LENGTHS); the vertex, then the ends of its line
     (STRAIGHT).
     kind: #P. LENGTHS: c = l_1 - ratio l_2 - target. STRAIGHT: the distance of the first vertex from the line through
-    the second and the third, minus the target. LINEAR: c = sum_j lever_j . x_j - target.
+    the second and the third, minus the target. LINEAR: c = sum_j coefficient_j . x_j - target.
     ratio: #P, for a seam the intended length of the first edge over the second (1, or with ease); 0 for the first edge
     alone.
     target: #P [m].
-    lever: 4 #P, of LINEAR equations; zero for ends that take no part.
+    coefficient: 4 #P, of LINEAR equations; zero for ends that take no part.
     stiffness: #P [N/m].
     offset: #P [m].
     """
@@ -35,7 +35,7 @@ class Seams:
     kind: wp.array(dtype=wp.int32)
     ratio: wp.array(dtype=wp.float64)
     target: wp.array(dtype=wp.float64)
-    lever: wp.array(dtype=wp.vec2d)
+    coefficient: wp.array(dtype=wp.vec2d)
     stiffness: wp.array(dtype=wp.float64)
     offset: wp.array(dtype=wp.float64)
 
@@ -71,10 +71,10 @@ def gradient_of(position: wp.array(dtype=wp.vec2d), seams: Seams, p: int):
     gradient = Gradient()
     gradient.residual = -seams.target[p]
     if seams.kind[p] == LINEAR:
-        gradient.g0 = seams.lever[4 * p]
-        gradient.g1 = seams.lever[4 * p + 1]
-        gradient.g2 = seams.lever[4 * p + 2]
-        gradient.g3 = seams.lever[4 * p + 3]
+        gradient.g0 = seams.coefficient[4 * p]
+        gradient.g1 = seams.coefficient[4 * p + 1]
+        gradient.g2 = seams.coefficient[4 * p + 2]
+        gradient.g3 = seams.coefficient[4 * p + 3]
         gradient.residual += (
             wp.dot(gradient.g0, x0) + wp.dot(gradient.g1, x1) + wp.dot(gradient.g2, x2) + wp.dot(gradient.g3, x3)
         )

@@ -29,7 +29,7 @@ def seams() -> Seams:
     made.kind = wp.array(KIND, dtype=wp.int32, device=DEVICE)
     made.ratio = wp.array(RATIO, dtype=wp.float64, device=DEVICE)
     made.target = wp.array(TARGET, dtype=wp.float64, device=DEVICE)
-    made.lever = wp.array(LEVER.reshape(-1, 2), dtype=wp.vec2d, device=DEVICE)
+    made.coefficient = wp.array(LEVER.reshape(-1, 2), dtype=wp.vec2d, device=DEVICE)
     made.stiffness = wp.array(STIFFNESS, dtype=wp.float64, device=DEVICE)
     made.offset = wp.array(OFFSET, dtype=wp.float64, device=DEVICE)
     return made

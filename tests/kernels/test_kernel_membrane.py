@@ -17,8 +17,7 @@ from warpflat.kernels.strain import compute_worn_strain
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.model.membrane import make_cloth
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.membrane_stiffness import TangentMatrix
-from warpflat.solver.steps import IMPLICIT_STEP
+from warpflat.solver.steps import IMPLICIT_STEP, TangentMatrix
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface

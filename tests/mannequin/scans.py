@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from body_copies import copy_of_body
 from body_tapes import armpit_and_crotch
 
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.scan import ScanFound, blueprint_from_scan
+from warpflat.mannequin.scan_pose import ScanOptions
 from warpflat.surface.io.read import read_scan
 
 needs_bodies = pytest.mark.skipif(
@@ -29,9 +32,15 @@ def scan(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 @functools.cache
+def _measured(name: str) -> ScanFound:
+    return blueprint_from_scan(*scan(name), ScanOptions())
+
+
+@functools.cache
 def scanned_body(name: str, resolution_mm: float = 20.0) -> Mannequin:
-    """The mannequin on a scan as it is."""
-    return Mannequin.from_scan(*scan(name), resolution_mm=resolution_mm)
+    """The mannequin on a scan as it is; the scan is measured once for all resolutions."""
+    with mock.patch("warpflat.mannequin.scan.blueprint_from_scan", return_value=_measured(name)):
+        return Mannequin.from_scan(*scan(name), resolution_mm=resolution_mm)
 
 
 def triangles_of(faces: np.ndarray) -> np.ndarray:

@@ -10,8 +10,6 @@ import seam_solids as solids
 import trimesh
 
 import warpflat
-from warpflat.cli.main import main
-from warpflat.scene.found_seams import found_seams
 from warpflat.seams.fields import Operators
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
@@ -127,18 +125,6 @@ def test_trousers_as_tight_as_a_skin_have_a_panel_more_in_each_leg() -> None:
     flat = [warpflat.flatten(piece, fabric="woven", datum="grain") for piece in found.pieces]
     area = np.array([piece.fit.area.sum() for piece in flat])
     assert (area * [piece.fit.outside for piece in flat]).sum() < 0.03 * area.sum()
-
-
-def test_the_command_parts_a_garment_and_sews_it(tmp_path: Path) -> None:
-    mesh = write(solids.shirt(step=0.045), tmp_path / "shirt.obj")
-    arguments = ["flatten", str(mesh), "--units", "m", "--fabric", "woven", "--no-picture", "--frames", "0"]
-    assert main([*arguments, "--limit", "1", "--out", str(tmp_path / "out")]) == 0
-    pattern = warpflat.read_pattern_json(tmp_path / "out" / "pattern.json")
-    names = {piece.name for pieces in pattern.pieces.values() for piece in pieces}
-    # The right sleeve is cut by the left one's pattern, turned over.
-    assert names == {"front", "back", "left_sleeve"}
-    tables = {"surface": {"file": str(mesh), "units": "m"}, "seams": {"find": "none"}}
-    assert found_seams(warpflat.make_scene(tables, name="shirt", folder=tmp_path, where="test")) is None
 
 
 def test_two_layers_are_worn_the_same_way_up(tmp_path: Path) -> None:

@@ -11,9 +11,10 @@ import seam_solids as solids
 
 import warpflat
 from warpflat.cli.main import main
+from warpflat.scene.found_seams import found_seams
 from warpflat.seams.find import FoundSeams
 from warpflat.surface.mesh import Surface
-from warpflat.surface.mirror_images import mirror_images
+from warpflat.surface.mirror import mirror_images
 
 
 @cache
@@ -118,8 +119,8 @@ def test_eased_seams_are_as_long_as_each_other_and_cost_less() -> None:
     assert 0.0 <= cost[1] < 0.7 * cost[0]
 
 
-def test_mirrored_pieces_are_drawn_once(tmp_path: Path) -> None:
-    surface = lopsided(0.0)
+def test_the_command_parts_a_garment_sews_it_and_draws_mirrored_pieces_once(tmp_path: Path) -> None:
+    surface = solids.shirt(step=0.045)
     mesh = tmp_path / "shirt.obj"
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
     lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
@@ -138,3 +139,5 @@ def test_mirrored_pieces_are_drawn_once(tmp_path: Path) -> None:
     )
     svg = (tmp_path / "out" / "shirt.svg").read_text(encoding="utf-8")
     assert "Cut 2, 1 mirrored" in svg
+    tables = {"surface": {"file": str(mesh), "units": "m"}, "seams": {"find": "none"}}
+    assert found_seams(warpflat.make_scene(tables, name="shirt", folder=tmp_path, where="test")) is None

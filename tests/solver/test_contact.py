@@ -51,7 +51,7 @@ def test_forces_of_the_barrier_are_the_gradient_of_its_energy():
     here = barrier(layout)
     assert len(here.slope) > 5
     force = np.zeros_like(layout)
-    np.add.at(force, here.vertices.ravel(), (here.slope[:, None, None] * here.lever).reshape(-1, 2))
+    np.add.at(force, here.vertices.ravel(), (here.slope[:, None, None] * here.jacobian).reshape(-1, 2))
     for vertex in np.unique(here.vertices):
         for axis in range(2):
             there = [layout.copy(), layout.copy()]

@@ -31,8 +31,8 @@ def test_the_gradients_of_the_equations_are_their_forces(kind: int):
     alone, sewn = (SpringNetwork.build(surface, find_fabric("isotropic"), flat, device=DEVICE) for _ in range(2))
     ends = np.array([[0, 1, 10, 11], [2, 20, 24, 2], [7, 12, 17, 18]], dtype=np.int32)
     stiffness, target = np.array([300.0, 500.0, 200.0]), np.array([0.01, -0.02, 0.03])
-    lever = random.normal(size=(3, 4, 2)) if kind == LINEAR else None
-    sewn.sew(ends, np.array([1.0, 1.2, 0.0]), stiffness, kind=np.full(3, kind), target=target, lever=lever)
+    coefficient = random.normal(size=(3, 4, 2)) if kind == LINEAR else None
+    sewn.sew(ends, np.array([1.0, 1.2, 0.0]), stiffness, kind=np.full(3, kind), target=target, coefficient=coefficient)
     assert sewn.seams is not None
     sewn.seams.offset.assign(np.array([0.004, -0.001, 0.002]))
     state = Relaxation(sewn, RelaxOptions(), start=flat)

@@ -36,7 +36,7 @@ from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import BorderSeam
-from warpflat.surface.mirror_images import mirror_images
+from warpflat.surface.mirror import mirror_images
 
 __all__ = ["Garment", "flatten_form"]
 

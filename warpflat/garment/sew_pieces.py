@@ -26,7 +26,7 @@ from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import SAME_PLACE, BorderSeam, surface_seams
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.mesh import Surface
-from warpflat.surface.mirror_images import even_sides, mirror_images
+from warpflat.surface.mirror import even_sides, mirror_images
 from warpflat.surface.repair.layers import Layer, lies_within
 
 __all__ = ["Bands", "meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]

@@ -169,7 +169,7 @@ def sew(
             stiffness,
             kind=equations.kind,
             target=equations.target,
-            lever=equations.lever,
+            coefficient=equations.coefficient,
         )
         # Begin with the offsets that are known of the same equations.
         known = offsets or {}

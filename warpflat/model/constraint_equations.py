@@ -52,7 +52,7 @@ class ConstraintEquations:
     """Equations c(x) = 0 of one seam or constraint, or of several (see `kernels.constraints` for the first five).
 
     Attributes:
-        ends: #P by 4. kind: #P. ratio: #P. target: #P [m]. lever: #P by 4 by 2.
+        ends: #P by 4. kind: #P. ratio: #P. target: #P [m]. coefficient: #P by 4 by 2.
         tolerance: #P, tolerance of |c| [m].
         soft: #P, for equations that are only springs, their stiffness over that of the stiffer thread: their residuals
             are neither corrected nor counted; 0 for all others.
@@ -66,7 +66,7 @@ class ConstraintEquations:
     kind: IntArray
     ratio: FloatArray
     target: FloatArray
-    lever: FloatArray
+    coefficient: FloatArray
     tolerance: FloatArray
     soft: FloatArray
     share: FloatArray
@@ -133,7 +133,7 @@ def join_equations(equations: Sequence[ConstraintEquations]) -> ConstraintEquati
         kind=np.concatenate([each.kind for each in equations]),
         ratio=np.concatenate([each.ratio for each in equations]),
         target=np.concatenate([each.target for each in equations]),
-        lever=np.concatenate([each.lever for each in equations]),
+        coefficient=np.concatenate([each.coefficient for each in equations]),
         tolerance=np.concatenate([each.tolerance for each in equations]),
         soft=np.concatenate([each.soft for each in equations]),
         share=np.concatenate([each.share for each in equations]),
@@ -294,19 +294,19 @@ def _from_mirror_image(
     """
     rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
     ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
-    lever = np.zeros((len(rows), 4, 2))
-    lever[:, 0, 1], lever[:, 1, 1] = -1.0, 1.0
-    target = np.einsum("pjk,pjk->p", lever, positions[ends])
-    springs = _equations(ends, LINEAR, target=target, lever=lever, tolerance=np.inf)
+    coefficient = np.zeros((len(rows), 4, 2))
+    coefficient[:, 0, 1], coefficient[:, 1, 1] = -1.0, 1.0
+    target = np.einsum("pjk,pjk->p", coefficient, positions[ends])
+    springs = _equations(ends, LINEAR, target=target, coefficient=coefficient, tolerance=np.inf)
     return replace(springs, soft=np.full(len(rows), soft / 2))
 
 
 def level_equations(line: IntArray, across: FloatArray) -> ConstraintEquations:
     """Return the equation that puts both ends of a row at the same place along the unit vector `across`."""
     ends = np.array([[line[0], line[-1], line[0], line[0]]])
-    lever = np.zeros((1, 4, 2))
-    lever[0, 0], lever[0, 1] = -across, across
-    return _equations(ends, LINEAR, lever=lever, tolerance=_PLACE_TOLERANCE)
+    coefficient = np.zeros((1, 4, 2))
+    coefficient[0, 0], coefficient[0, 1] = -across, across
+    return _equations(ends, LINEAR, coefficient=coefficient, tolerance=_PLACE_TOLERANCE)
 
 
 def mirror_equations(pairs: IntArray, axis: IntArray, across: FloatArray, place: float) -> ConstraintEquations:
@@ -321,13 +321,15 @@ def mirror_equations(pairs: IntArray, axis: IntArray, across: FloatArray, place:
     first, second = pairs[:, 0], pairs[:, 1]
     both = np.column_stack([first, second, first, first])
     own = np.column_stack([axis, axis, axis, axis])
-    lever = np.zeros((2 * len(pairs) + len(axis), 4, 2))
+    coefficient = np.zeros((2 * len(pairs) + len(axis), 4, 2))
     count = len(pairs)
-    lever[:count, 0] = lever[:count, 1] = across
-    lever[count : 2 * count, 0], lever[count : 2 * count, 1] = along, -along
-    lever[2 * count :, 0] = across
+    coefficient[:count, 0] = coefficient[:count, 1] = across
+    coefficient[count : 2 * count, 0], coefficient[count : 2 * count, 1] = along, -along
+    coefficient[2 * count :, 0] = across
     target = np.concatenate([np.full(count, 2.0 * place), np.zeros(count), np.full(len(axis), place)])
-    return _equations(np.concatenate([both, both, own]), LINEAR, target=target, lever=lever, tolerance=_PLACE_TOLERANCE)
+    return _equations(
+        np.concatenate([both, both, own]), LINEAR, target=target, coefficient=coefficient, tolerance=_PLACE_TOLERANCE
+    )
 
 
 def _equations(
@@ -336,7 +338,7 @@ def _equations(
     *,
     ratio: FloatArray | float = 0.0,
     target: FloatArray | float = 0.0,
-    lever: FloatArray | None = None,
+    coefficient: FloatArray | None = None,
     tolerance: float,
     sum_tolerance: float | None = np.inf,
 ) -> ConstraintEquations:
@@ -347,7 +349,7 @@ def _equations(
         kind=np.full(count, int(kind), dtype=np.int32),
         ratio=np.broadcast_to(np.asarray(ratio, dtype=np.float64), (count,)).copy(),
         target=np.broadcast_to(np.asarray(target, dtype=np.float64), (count,)).copy(),
-        lever=np.zeros((count, 4, 2)) if lever is None else lever,
+        coefficient=np.zeros((count, 4, 2)) if coefficient is None else coefficient,
         tolerance=np.full(count, tolerance),
         soft=np.zeros(count),
         share=np.zeros(count),

@@ -83,20 +83,15 @@ def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> Spring
     edge = range_offsets([s.edge_count for s in springs])
     diagonal = edge[-1] + range_offsets([s.count - s.edge_count for s in springs])
     around = [s.around for s in springs]
-
-    def numbers() -> IntArray:
-        own = [a.entry for a in around]
-        entries = [
-            of + np.where(of < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
-            for k, (s, of) in enumerate(zip(springs, own, strict=True))
-        ]
-        return np.concatenate(entries)
-
+    numbers = [
+        of.entry + np.where(of.entry < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
+        for k, (s, of) in enumerate(zip(springs, around, strict=True))
+    ]
     return SpringArrays(
         around=SpringsAround(
             offset=_join_offsets([a.offset for a in around]),
-            numbering=numbers,
             neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
+            entry=np.concatenate(numbers),
         ),
         listed_length=np.concatenate([s.listed_length for s in springs]),
         listed_stiffness=np.concatenate([s.listed_stiffness for s in springs]),

@@ -285,7 +285,7 @@ class SpringNetwork:
         *,
         kind: IntArray | None = None,
         target: FloatArray | None = None,
-        lever: FloatArray | None = None,
+        coefficient: FloatArray | None = None,
     ) -> None:
         """Add seam and constraint equations (see `kernels.constraints`); by default, sew pairs of edges together.
 
@@ -295,7 +295,7 @@ class SpringNetwork:
             stiffness: #P [N/m].
             kind: #P, as in `kernels.constraints`.
             target: #P [m].
-            lever: #P by 4 by 2.
+            coefficient: #P by 4 by 2.
         """
         count, device = len(ends), self.device
         seams = Seams()
@@ -303,8 +303,8 @@ class SpringNetwork:
         seams.kind = wp.array(np.zeros(count, dtype=np.int32) if kind is None else kind, dtype=wp.int32, device=device)
         seams.ratio = wp.array(ratio, dtype=wp.float64, device=device)
         seams.target = wp.array(np.zeros(count) if target is None else target, dtype=wp.float64, device=device)
-        levers = np.zeros((4 * count, 2)) if lever is None else lever.reshape(-1, 2)
-        seams.lever = wp.array(levers, dtype=wp.vec2d, device=device)
+        coefficients = np.zeros((4 * count, 2)) if coefficient is None else coefficient.reshape(-1, 2)
+        seams.coefficient = wp.array(coefficients, dtype=wp.vec2d, device=device)
         seams.stiffness = wp.array(stiffness, dtype=wp.float64, device=device)
         seams.offset = wp.zeros(count, dtype=wp.float64, device=device)
         self.seams = seams

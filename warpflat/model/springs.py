@@ -5,9 +5,8 @@ Each quad has four structural edges and two diagonals; a triangle has its edges 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from warpflat.kernels.stiffness import (
     weigh_triangles,
 )
 from warpflat.surface.cells import CellArrays, face_creases, first_of_faces, make_cells
-from warpflat.surface.half_edges import half_edges, half_edges_of
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
 from warpflat.surface.triangles import selected_rows, unfold_quad_diagonals
 
@@ -67,21 +66,12 @@ class SpringsAround:
     Attributes:
         offset: #V+1, where the entries of each vertex begin.
         neighbor: 2 #S, for each entry the vertex at the far end, by which they are sorted.
-        numbering: makes the springs' numbers, which are needed when a network is made and seldom later.
+        entry: 2 #S, the number of the spring of each entry; mesh edges have the first numbers.
     """
 
     offset: IntArray
     neighbor: IntArray
-    numbering: Callable[[], IntArray]
-
-    @cached_property
-    def entry(self) -> IntArray:
-        """The number of the spring of each entry, 2 #S; mesh edges have the first numbers."""
-        return self.numbering()
-
-    def drop_numbers(self) -> None:
-        """Drop the springs' numbers; they are made again when they are next needed."""
-        vars(self).pop("entry", None)
+    entry: IntArray
 
     def listed(self, values: FloatArray) -> FloatArray:
         """Return the springs' values (#S) at both of their ends, 2 #S."""
@@ -206,10 +196,12 @@ def springs_of(
             "aligned": _off_threads(angle) <= _OFF_GRAIN,
             "shear_excess": lattice.shear / fabric.shear_stiffness,
         }
+    # Every face that a mesh edge has adds to its stiffness.
+    at_edges = np.bincount(half_edges_of(surface).edge, of_side, minlength=own.edge_count)
     return SpringArrays(
         around=own.around,
         listed_length=own.listed_length,
-        listed_stiffness=_listed_stiffness(surface, own, of_side, diagonal),
+        listed_stiffness=own.around.listed(np.concatenate([at_edges, diagonal, diagonal])),
         edge_count=own.edge_count,
         **quads,
     )
@@ -268,19 +260,6 @@ def hourglass_weights(corners: FloatArray, stiffness: FloatArray) -> FloatArray:
     mode = np.array([[1.0, -1.0, 1.0, -1.0]])
     mode = mode + np.outer(along_u, [1.0, -1.0, -1.0, 1.0]) + np.outer(along_v, [1.0, 1.0, -1.0, -1.0])
     return np.asarray(mode * np.where(has_shape, np.sqrt(stiffness), 0.0)[:, None])
-
-
-def _listed_stiffness(surface: Surface, own: _SpringGeometry, of_side: FloatArray, diagonal: FloatArray) -> FloatArray:
-    """Return the stiffnesses of the listed springs, 2 #S [N/m].
-
-    Args:
-        surface: of faces.
-        own: its springs.
-        of_side: #H, stiffness that a face gives to the springs along its sides [N/m].
-        diagonal: #Q, stiffness of both diagonals of a quad [N/m].
-    """
-    at_edges = np.bincount(half_edges_of(surface).edge, of_side, minlength=own.edge_count)
-    return own.around.listed(np.concatenate([at_edges, diagonal, diagonal]))
 
 
 def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
@@ -359,30 +338,13 @@ def spring_geometry(surface: Surface) -> _SpringGeometry:
 
 @once_per_faces
 def _springs_around(surface: Surface) -> SpringsAround:
-    """Return the springs around each vertex, edges first, then diagonals."""
-    faces, count = surface.faces, len(surface.vertices)
-    offset, neighbor, spring = _sorted_springs(half_edges_of(surface).edges, faces, count)
-    around = SpringsAround(offset=offset, neighbor=neighbor, numbering=partial(_spring_numbers, faces, count))
-    vars(around)["entry"] = spring
-    return read_only(around)
-
-
-def _spring_numbers(faces: IntArray, count: int) -> IntArray:
-    return _sorted_springs(half_edges(faces).edges, faces, count)[2]
-
-
-def _sorted_springs(edges: IntArray, faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the edges and diagonals around each of `count` vertices, sorted by their far ends.
-
-    Returns:
-        #V+1, where the entries of each vertex begin; 2 #S, the vertices at the far ends; 2 #S, the springs' numbers.
-    """
-    corner = selected_rows(faces, faces[:, 3] >= 0)
-    ends = np.concatenate([edges, corner[:, 0::2], corner[:, 1::2]])
+    """Return the edges and diagonals around each vertex, sorted by their far ends; edges are numbered first."""
+    count, corner = len(surface.vertices), selected_rows(surface.faces, surface.faces[:, 3] >= 0)
+    ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])
     end, offset = counting_sort(ends[:, ::-1].T.ravel(), count)
     neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
     launch_each(list_springs, count, [offset, end, ends, len(ends)], [neighbor, spring])
-    return offset, neighbor, spring
+    return read_only(SpringsAround(offset=offset, neighbor=neighbor, entry=spring))
 
 
 def shorten_springs(

@@ -136,7 +136,7 @@ class Barrier:
         return Contacts(
             energy=float((-k * short**2 * log).sum()),
             vertices=vertices,
-            lever=share[:, :, None] * away[:, None],
+            jacobian=share[:, :, None] * away[:, None],
             slope=-k * (2 * short * log + short**2 / r),
             bend=-k * (2 * log + 4 * short / r - (short / r) ** 2),
         )

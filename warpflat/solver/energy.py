@@ -24,30 +24,30 @@ class Contacts:
     Attributes:
         energy: of the barrier [J]; infinite where the border is not simple.
         vertices: #C by 3, a vertex and the two ends of the edge near it.
-        lever: #C by 3 by 2, derivative of the distance by the places of these vertices.
+        jacobian: #C by 3 by 2, derivative of the distance by the places of these vertices.
         slope, bend: #C, first and second derivative of the barrier by the distance [N], [N/m].
     """
 
     energy: float
     vertices: IntArray
-    lever: FloatArray
+    jacobian: FloatArray
     slope: FloatArray
     bend: FloatArray
 
     def add_gradient(self, gradient: FloatArray) -> None:
         """Add the gradient of the barrier to #V by 2 [N], in place."""
-        np.add.at(gradient, self.vertices.ravel(), (self.slope[:, None, None] * self.lever).reshape(-1, 2))
+        np.add.at(gradient, self.vertices.ravel(), (self.slope[:, None, None] * self.jacobian).reshape(-1, 2))
 
     @property
     def rows(self) -> FloatArray:
         """The rows J of the barrier's stiffness J^T J where it is convex, #C by 3 by 2 [(N/m)^1/2]."""
-        return np.asarray(np.sqrt(np.maximum(self.bend, 0.0))[:, None, None] * self.lever)
+        return np.asarray(np.sqrt(np.maximum(self.bend, 0.0))[:, None, None] * self.jacobian)
 
 
 NO_CONTACTS = Contacts(
     energy=0.0,
     vertices=np.empty((0, 3), dtype=np.int32),
-    lever=np.empty((0, 3, 2)),
+    jacobian=np.empty((0, 3, 2)),
     slope=np.empty(0),
     bend=np.empty(0),
 )

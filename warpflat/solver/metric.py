@@ -195,25 +195,25 @@ class Metric:
     def _without_contacts(self) -> Solve:
         return self._solver(np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3, 2)))
 
-    def solver(self, vertices: IntArray, lever: FloatArray) -> Solve:
+    def solver(self, vertices: IntArray, jacobian: FloatArray) -> Solve:
         """Return the solution by the factor plus a row R^T R for each contact; it does not move chords sideways.
 
         Args:
             vertices: #C by 3, of contacts, if any.
-            lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
+            jacobian: #C by 3 by 2, the row's entries [(N/m)^1/2].
         """
-        return self._solver(vertices, lever) if len(vertices) else self._without_contacts
+        return self._solver(vertices, jacobian) if len(vertices) else self._without_contacts
 
-    def _solver(self, vertices: IntArray, lever: FloatArray) -> Solve:
+    def _solver(self, vertices: IntArray, jacobian: FloatArray) -> Solve:
         factor, count = self._factor, len(self._chords)
         chord = np.zeros((count, 3, 2))
         chord[:, 0], chord[:, 1] = self._across, -self._across
-        vertices, lever = np.concatenate([self._chords, vertices]), np.concatenate([chord, lever])
+        vertices, jacobian = np.concatenate([self._chords, vertices]), np.concatenate([chord, jacobian])
         if len(vertices) == 0:
             return factor.solve
         own, at = np.unique(vertices, return_inverse=True)
         rows = np.zeros((len(vertices), len(own), 2))
-        np.add.at(rows, (np.repeat(np.arange(len(vertices)), 3), at.ravel()), lever.reshape(-1, 2))
+        np.add.at(rows, (np.repeat(np.arange(len(vertices)), 3), at.ravel()), jacobian.reshape(-1, 2))
         flat = rows.reshape(len(rows), -1)
         columns = factor.columns(own)
         inner = flat @ factor.between(columns, own) @ flat.T
@@ -303,7 +303,7 @@ def equation_rows(network: SpringNetwork, positions: FloatArray) -> csr_array:
     seams = network.seams
     assert seams is not None
     ends, kind = seams.ends.numpy().reshape(-1, 4), seams.kind.numpy()
-    gradient = np.array(seams.lever.numpy()).reshape(-1, 4, 2) * (kind == LINEAR)[:, None, None]
+    gradient = np.array(seams.coefficient.numpy()).reshape(-1, 4, 2) * (kind == LINEAR)[:, None, None]
     x = positions[ends]
     first, second = _unit(x[:, 1] - x[:, 0]), _unit(x[:, 3] - x[:, 2])
     ratio = seams.ratio.numpy()[:, None]

@@ -29,6 +29,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.compile import launch_quietly
 from warpflat.core.errors import InputError
 from warpflat.core.launch import Launch, record
 from warpflat.core.launch import Sequence as LaunchSequence
@@ -43,14 +44,24 @@ from warpflat.kernels.implicit import (
     gather_potential,
     stop,
 )
+from warpflat.kernels.membrane import bound_membrane
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
+from warpflat.model.membrane import corner_sums
 from warpflat.model.network import SpringNetwork
+from warpflat.model.springs import springs_along_cells
 from warpflat.solver.grain import GrainAlignment, align_grain, hold_grain, remove_rotation
-from warpflat.solver.membrane_stiffness import TangentMatrix
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.stop import Energies, Outcome, Status, relative_change
 
-__all__ = ["IMPLICIT_STEP", "IMPLICIT_STEP_AT_REST", "Relaxation", "Watch", "relax_by_steps", "take_first_steps"]
+__all__ = [
+    "IMPLICIT_STEP",
+    "IMPLICIT_STEP_AT_REST",
+    "Relaxation",
+    "TangentMatrix",
+    "Watch",
+    "relax_by_steps",
+    "take_first_steps",
+]
 
 # Factors of the viscosity, of the velocity and of its change in `kernels.implicit`: the paper's step, and from zero velocities, where the
 # viscosity is zero.
@@ -265,10 +276,6 @@ class Relaxation:
         """Return the forces of the cloth and its seams in the present layout at rest, #V by 2 [N]; no step may follow."""
         return self.evaluate()[1]
 
-    def has_mirrored_cells(self) -> bool:
-        """Return whether a cell is mirrored or collapsed at the last evaluated state."""
-        return bool((self._cell_forces.clearance.numpy() <= 0.0).any())
-
     def cloth_force(self) -> FloatArray:
         """Return the forces of the cloth and its seams, without the load, at the last evaluated state, #V by 2 [N]."""
         return np.asarray(self.force.numpy() - self.load.numpy())
@@ -471,3 +478,34 @@ def relax_by_steps(state: Relaxation, *, watch: Watch | None = None, each_step: 
         if watch is not None:
             watch(state)
     return state.make_outcome(steps_before, work_before, began_at=began_at)
+
+
+class TangentMatrix:
+    """The k_ij of a network whose model is the membrane.
+
+    A network is built with the k_ij of a cloth at rest. A cell whose shape in the plane differs much from that on the
+    body, such as a sliver that the development has opened, is much softer. With the stiffness at rest its corners would
+    creep back for ten thousand steps.
+    """
+
+    def __init__(self, network: SpringNetwork) -> None:
+        """Prepare updates of this network; nothing is changed before `update` is called."""
+        self._network = network
+        self._side = springs_along_cells(network.spring_arrays, network.cell_arrays)
+        self._weight = wp.zeros(3 * network.cell_count, dtype=wp.float64, device=network.device)
+
+    def update(self, position: wp.array) -> None:
+        """Set the k_ij to a bound of the membrane's stiffness at positions (#V vec2d [m]) without mirrored cells."""
+        network = self._network
+        assert network.cloth is not None
+        launch_quietly(
+            bound_membrane,
+            dim=network.face_count,
+            inputs=[position, network.cells, network.cloth, 0],
+            outputs=[self._weight],
+            device=network.device,
+        )
+        weight = np.array(self._weight.numpy())
+        stiffness = np.bincount(self._side, weight, minlength=network.spring_count).astype(np.float64)
+        network.update_stiffness(stiffness)
+        network.cloth.held.assign(corner_sums(weight.reshape(-1, 3)).ravel())

@@ -1,17 +1,24 @@
-"""Mirror images of vertices, found by walking over the mesh from a line to both sides at once."""
+"""Mirror images: of vertices across a line, found by walking over the mesh to both sides at once, and of a garment's pieces."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.surface.border_seams import SAME_PLACE
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.half_edges import half_edges
+from warpflat.surface.mesh import Surface
 
-__all__ = ["mirror_partners"]
+__all__ = ["even_sides", "mirror_images", "mirror_partners"]
+
+#: Layouts of which one is the other's mirror image within this [m] become so exactly.
+NEARLY = 5e-4
 
 
 def mirror_partners(faces: IntArray, axis: IntArray, *, vertex_count: int) -> IntArray:
@@ -76,3 +83,67 @@ def _unlike(vertex: int) -> str:
         f"the mesh is not its own mirror image about the line (first seen at vertex {vertex}): symmetry needs a mesh whose "
         "faces lie alike on both sides, as a mannequin's do"
     )
+
+
+def mirror_images(surfaces: Mapping[str, Surface]) -> dict[str, tuple[str, IntArray]]:
+    """Return for each piece of a garment its mirror image, perhaps itself, and for each of its vertices the image's.
+
+    Matched are faces, vertex by vertex, in one plane of symmetry of all pieces in space; pieces without an image are left out.
+    """
+    from scipy.spatial import cKDTree
+
+    names = list(surfaces)
+    points = np.concatenate([surface.vertices for surface in surfaces.values()])
+    middle = points.mean(axis=0)
+    tree = cKDTree(points)
+    some = points[:: max(1, len(points) // 200)]
+
+    def image(at: FloatArray, normal: FloatArray) -> FloatArray:
+        return np.asarray(at - 2.0 * ((at - middle) @ normal)[:, None] * normal)
+
+    # The normal of a plane of symmetry is a principal axis.
+    axes = np.linalg.eigh(np.cov((points - middle).T))[1].T
+    axis = next((one for one in axes if np.median(tree.query(image(some, one))[0]) < SAME_PLACE), None)
+    if axis is None:
+        return {}
+    place = join_labels(len(points), *tree.query_pairs(SAME_PLACE, output_type="ndarray").T)
+    away, nearest = tree.query(image(points, axis))
+    opposite = np.where(away < 2.0 * SAME_PLACE, place[nearest], -1)
+    first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces.values())])
+    where: dict[frozenset[int], tuple[int, dict[int, int]]] = {}
+    for number, surface in enumerate(surfaces.values()):
+        for face in surface.faces.tolist():
+            own = {int(place[first[number] + vertex]): vertex for vertex in face if vertex >= 0}
+            where[frozenset(own)] = number, own
+    found = {}
+    for number, (name, surface) in enumerate(surfaces.items()):
+        partners, mates = np.full(len(surface.vertices), -1, dtype=np.int32), set[int]()
+        for face in surface.faces.tolist():
+            corners = [vertex for vertex in face if vertex >= 0]
+            there = opposite[first[number] + np.array(corners)].tolist()
+            mate, own = where.get(frozenset(there), (-1, {}))
+            mates.add(mate)
+            for vertex, at in zip(corners, there, strict=True):
+                partners[vertex] = own.get(at, -1)
+        mate = next(iter(mates))
+        if (
+            len(mates) == 1
+            and mate >= 0
+            and len(surfaces[names[mate]].vertices) == len(partners) == len(set(partners.tolist()))
+        ):
+            found[name] = names[mate], partners
+    return found
+
+
+def even_sides(layouts: Mapping[str, FloatArray], images: Mapping[str, tuple[str, IntArray]]) -> dict[str, FloatArray]:
+    """Return layouts (#P by 2 [m]) of which each is the mean of itself and of its mirror image's; as they are unless all are nearly that.
+
+    All or none: seams between pieces of which one has moved would not be equal any more.
+    """
+    made = dict[str, FloatArray]()
+    for name, (mate, partners) in images.items():
+        own, other = layouts[name], layouts[mate][partners] * [-1.0, 1.0]
+        other = other + own.mean(axis=0) - other.mean(axis=0)
+        if np.abs(own - other).max() < NEARLY:
+            made[name] = 0.5 * (own + other)
+    return made if made.keys() == layouts.keys() else dict(layouts)
