@@ -17,6 +17,7 @@ from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
 from warpflat.pattern.seam_difference import eased_length
+from warpflat.pattern.worn import Worn
 from warpflat.pattern.words import translate_name
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
@@ -225,6 +226,7 @@ class Pattern:
         seams: by name of piece and edge.
         sample_size: the size that files of one size show; None takes the middle one.
         words: what is printed instead of English words and names (see `warpflat.pattern.words`).
+        worn: how it looks and what it measures on its body; None where that is not known.
     """
 
     __repr__ = short_repr
@@ -234,6 +236,7 @@ class Pattern:
     seams: Sequence[Seam] = ()
     sample_size: str | None = None
     words: Mapping[str, str] = field(default_factory=dict)
+    worn: Worn | None = None
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):
