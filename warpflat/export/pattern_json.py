@@ -39,6 +39,7 @@ from warpflat.pattern.drafted import (
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 
 __all__ = [
     "SCHEMA",
@@ -267,8 +268,41 @@ class ElasticEntry(Entry):
     count: Annotated[int, Field(ge=1, le=1000)] = 1
 
 
+class ViewEntry(Entry):
+    """A piece in the line drawing (see `warpflat.pattern.worn.ViewedPiece`)."""
+
+    outlines: list[Ring]
+    lines: list[Line]
+
+
+class MeasureEntry(Entry):
+    """A girth of the body and of the finished garment [m]."""
+
+    name: Name
+    body: Length
+    finished: Length
+
+
+class NeededEntry(Entry):
+    """A way around the garment that needs an opening [m]."""
+
+    ring: Name
+    length: Length
+    over: Text
+    girth: Length
+    depth: Length
+
+
+class WornEntry(Entry):
+    """The garment on its body."""
+
+    views: dict[Literal["front", "back"], list[ViewEntry]] = Field(default_factory=dict)
+    measures: dict[Text, list[MeasureEntry]] = Field(default_factory=dict)
+    needed: list[NeededEntry] = Field(default_factory=list)
+
+
 class PatternEntry(Entry):
-    """The whole file: pieces by size and name, stitches, and the lengths of seams."""
+    """The whole file: pieces by size and name, stitches, the lengths of seams, and the garment as it is worn."""
 
     name: Name
     sample_size: Text
@@ -277,6 +311,7 @@ class PatternEntry(Entry):
     stitches: list[StitchEntry]
     seams: list[SeamEntry]
     elastics: list[ElasticEntry] = Field(default_factory=list)
+    worn: WornEntry | None = None
 
 
 #: Increased when a reader of the old form would misread the new one.
@@ -331,6 +366,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
         },
         "stitches": stitches,
         "elastics": [asdict(elastic) for elastic in garment.garment.elastics],
+        "worn": None if garment.garment.worn is None else _worn(garment.garment.worn),
         "seams": [
             {
                 "name": report.name,
@@ -496,6 +532,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
             sample_size=data.sample_size,
             words=data.words,
             elastics=tuple(Elastic(**each.model_dump()) for each in data.elastics),
+            worn=None if data.worn is None else _read_worn(data.worn),
         )
         reports = tuple(
             SeamReport(
@@ -512,6 +549,38 @@ def pattern_from_json(data: Any) -> DraftedGarment:
         return DraftedGarment(garment=garment, pieces=drafted, seams=reports)
     except InputError as error:
         raise InputError(f"{error}; run the scene again") from None
+
+
+def _worn(worn: Worn) -> dict[str, Any]:
+    """Return the entry of a garment as it is worn."""
+    return {
+        "views": {
+            side: [
+                {"outlines": [x.tolist() for x in each.outlines], "lines": [x.tolist() for x in each.lines]}
+                for each in row
+            ]
+            for side, row in worn.views.items()
+        },
+        "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},
+        "needed": [asdict(each) for each in worn.needed],
+    }
+
+
+def _read_worn(data: WornEntry) -> Worn:
+    """Return a garment as it is worn."""
+    return Worn(
+        views={
+            side: tuple(
+                ViewedPiece(
+                    outlines=tuple(np.array(x) for x in each.outlines), lines=tuple(np.array(x) for x in each.lines)
+                )
+                for each in row
+            )
+            for side, row in data.views.items()
+        },
+        measures={size: tuple(Measure(**each.model_dump()) for each in row) for size, row in data.measures.items()},
+        needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
+    )
 
 
 def _read_side(parts: Sequence[SideEntry]) -> tuple[SeamSide, ...]:

@@ -71,8 +71,8 @@ def write_pdf(
     Args:
         garment: drafted.
         path: of the file.
-        paper: "A4", "Letter" (tiled, with first pages of instructions), "A0" (whole pieces wherever they fit) or
-            "Projector" (everything on one page, in wide lines).
+        paper: "A4", "Letter" (tiled), "A0" (whole pieces wherever they fit) or
+            "Projector" (everything on one page, in wide lines). The first pages of the latter two are A4.
         sizes: those to print; several lie upon each other as a nest, told apart by dashes and colour, each on a layer
             of its own that readers can hide; None prints all.
 
@@ -94,9 +94,8 @@ def write_pdf(
             raise InputError(f"{path}: {fault}")
         tiling, drawings = draw_sheet(printed, paper)
         content, guided = b"", list[str]()
-        if tiling.paper.tiled:
-            with optional_file(path, guided, part="the guide"):
-                content = _pages(whole, printed, tiling, drawings, guide=True)
+        with optional_file(path, guided, part="the guide"):
+            content = _pages(whole, printed, tiling, drawings, guide=True)
         if not guided:
             content = _pages(whole, printed, tiling, drawings, guide=False)
         with atomic_path(path) as temporary:
@@ -195,8 +194,13 @@ def _pages(
         draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
     canvas.endForm()
     if guide:
-        legend_page(canvas, printed, chosen, tiling.sheet, tiling)
-        guide_pages(canvas, whole, printed, kind)
+        if kind.tiled:
+            legend_page(canvas, printed, chosen, tiling.sheet, tiling)
+        # What is read at the machine is small, whatever the pattern is printed on.
+        small = kind if kind.tiled else PAPERS["A4"]
+        canvas.setPageSize((small.width * POINT, small.height * POINT))
+        guide_pages(canvas, whole, printed, small)
+        canvas.setPageSize((kind.width * POINT, kind.height * POINT))
     names = sheet_names(tiling, drawings) if tiling.joined else {}
     for row, column in tiling.tiles:
         title = whole.name.replace("_", " ")
@@ -310,8 +314,36 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
         paper = replace(paper, width=float(width), height=float(height))
         return sheet, make_tiling(sheet, paper)
     width = paper.step[0] + paper.overlap
+    # As many sheets as the pieces take: the legend goes where they leave room.
+    bare = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]))
+    tiling = make_tiling(bare, paper)
+    places = [_free_place(tiling, tile) for tile in tiling.tiles]
+    found = next((place for place in places if place is not None), None)
+    if found is not None:
+        return replace(bare, reserved=found), replace(tiling, sheet=replace(bare, reserved=found))
     sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
     return sheet, make_tiling(sheet, paper)
+
+
+def _free_place(tiling: Tiling, tile: tuple[int, int]) -> FloatArray | None:
+    """Return the lower left [m] of a place for the legend on a tile where no piece and no label beside one lies; None without one."""
+    import shapely
+
+    shapes = [
+        shapely.Polygon(placed.on_sheet(piece.cut_line)) for placed in tiling.sheet.placed for piece in placed.pieces
+    ]
+    shapes += [
+        shapely.Polygon(placed.on_sheet(label.box))
+        for placed in tiling.sheet.placed
+        if (label := nest_label(placed.pieces)).leader is not None
+    ]
+    taken = shapely.union_all(shapes).buffer(0.005)
+    low = tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) + 0.005
+    room = tiling.paper.step - 0.010 - LEGEND_SIZE
+    places = [low + room * (x / 24, y / 32) for y in range(32, -1, -1) for x in range(25)]
+    boxes = shapely.box(*np.transpose(places), *(np.transpose(places) + np.reshape(LEGEND_SIZE, (2, 1))))
+    free = np.flatnonzero(shapely.disjoint(boxes, taken))
+    return places[int(free[0])] if len(free) else None
 
 
 def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:

@@ -14,8 +14,9 @@ from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
 from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
-from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams
-from warpflat.pattern.words import translate
+from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams, step_pictures, tools
+from warpflat.pattern.words import translate, translate_name
+from warpflat.pattern.worn import Worn
 
 if TYPE_CHECKING:
     from warpflat.export.pdf_tiling import Paper
@@ -24,8 +25,10 @@ __all__ = ["guide_pages"]
 
 
 POINT = 72 / 0.0254
-#: Size of a thumbnail [m], and how many stand in a row.
-THUMBNAIL, IN_ROW = (0.026, 0.034), 6
+#: Size of a thumbnail [m], and how many stand in a row at most.
+THUMBNAIL, IN_ROW = (0.026, 0.034), 7
+#: The pictures of a step: their height and width in all [m], and how many there are at most.
+STEP_HEIGHT, STEP_WIDTH, STEP_PIECES = 0.013, 0.048, 4
 #: Sizes of type [pt] and distance of lines [m].
 HEADING, TEXT, LINE = 11.0, 8.0, 0.0046
 
@@ -98,12 +101,19 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     # The pieces, small, with what to cut of each.
     pieces = printed.pieces[size]
     titles = piece_titles([piece.piece for piece in pieces])
+    if whole.garment.worn is not None:
+        _worn(page, whole.garment.worn, size, units)
+    page.heading(translate("You need"), 3 * LINE)
+    page.paragraph(", ".join(notions(whole, size)), indent=0.030, lead=translate("Notions"))
+    page.paragraph(tools(whole, size), indent=0.030, lead=translate("Tools"))
+    _cloth(page, whole, units)
     page.heading(translate("Cut"), THUMBNAIL[1] + 0.02)
     highest = max(float(np.ptp(piece.cut_line, axis=0).max()) for piece in pieces)
     scale = min(THUMBNAIL[1] / highest, 0.06)
-    step = page.width / IN_ROW
-    for start in range(0, len(pieces), IN_ROW):
-        row = pieces[start : start + IN_ROW]
+    in_row = -(-len(pieces) // -(-len(pieces) // IN_ROW))
+    step = page.width / max(in_row, 5)
+    for start in range(0, len(pieces), in_row):
+        row = pieces[start : start + in_row]
         page.need(THUMBNAIL[1] + 4 * LINE)
         top = page.y - 0.002
         for number, piece in enumerate(row):
@@ -148,18 +158,16 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
                 for entry in entries
             ]
             page.paragraph(", ".join(cut), indent=0.030, lead=cloth)
-    _cloth(page, whole, units)
-    needed = notions(whole, size)
-    if needed:
-        page.heading(translate("Notions"), LINE)
-        page.paragraph(", ".join(needed))
     steps = sewing_steps(whole, size)
     page.heading(translate("Sewing order"), 3 * LINE)
     page.paragraph(
         translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
     )
-    for number, words in enumerate(steps, 1):
-        page.paragraph(words, indent=0.006, lead=str(number))
+    pictures = step_pictures(whole, size, steps)
+    for number, (words, picture) in enumerate(zip(steps, pictures, strict=True), 1):
+        _step(
+            page, number, words, [(piece, picture[piece.name]) for piece in whole.pieces[size] if piece.name in picture]
+        )
     seams = sewn_seams(whole, size)
     if seams:
         page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
@@ -184,8 +192,97 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     page.end()
 
 
-def _thumbnail(canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: float) -> None:
-    """Draw one piece, small, about a centre [m]; the fold in dashes."""
+def _worn(page: _Page, worn: Worn, size: str, units: str) -> None:
+    """Draw the garment from the front and the back, with its measures and the openings that it needs beside it."""
+    top, high = page.y - 0.012, 0.088
+    rings = [ring for row in worn.views.values() for each in row for ring in each.outlines]
+    if rings:
+        points = np.concatenate(rings)
+        low, extent = points[:, 1].min(), np.ptp(points[:, 1])
+        widths = {side: np.concatenate([r for p in row for r in p.outlines])[:, 0] for side, row in worn.views.items()}
+        scale = min(high / extent, 0.042 / max(float(np.ptp(x)) for x in widths.values()))
+        for number, (side, row) in enumerate(worn.views.items()):
+            middle = np.array([page.left + 0.024 + 0.047 * number, top - high / 2])
+            centre = np.array([(widths[side].min() + widths[side].max()) / 2, low + extent / 2])
+            for piece in row:
+                page.canvas.setLineJoin(1)
+                for lines, fill, width in ((piece.outlines, 1, 0.7), (piece.lines, 0, 0.45)):
+                    for line in lines:
+                        page.canvas.setFillColor("#ffffff")
+                        page.canvas.setStrokeColor("#000000")
+                        page.canvas.setLineWidth(width)
+                        placed = (middle + scale * (line - centre)) * POINT
+                        path = page.canvas.beginPath()
+                        path.moveTo(*placed[0])
+                        for point in placed[1:]:
+                            path.lineTo(*point)
+                        if fill:
+                            path.close()
+                        page.canvas.drawPath(path, stroke=1, fill=fill)
+            page.y = top - high - 0.004
+            page.text(float(middle[0]) - 0.010, translate(f"from the {side}"))
+    page.y = top + 0.004
+    left, page.left, page.width = page.left, page.left + 0.100, page.width - 0.100
+    measures = worn.measures.get(size, ())
+    if measures:
+        page.text(page.left, translate("Measures") + (f", {printed_size(size)}" if size else ""), HEADING, bold=True)
+        page.y -= 0.003
+        rows = [
+            [
+                translate_name(measure.name),
+                length_words(measure.body, units),
+                length_words(measure.finished, units),
+                f"{'+' if measure.ease >= 0 else '-'}{length_words(abs(measure.ease), units)}",
+            ]
+            for measure in measures
+        ]
+        page.table(["", *(translate(word) for word in ("body", "finished", "ease"))], rows, (0.31, 0.23, 0.23, 0.23))
+    page.y -= 0.006
+    if worn.needed:
+        page.paragraph(translate("Too small to put on without an opening:"))
+        for need in worn.needed:
+            page.paragraph(
+                translate(
+                    "{ring}: {length} around, {girth} must pass ({over}); open it {depth} deep.",
+                    ring=translate_name(need.ring),
+                    length=length_words(need.length, units),
+                    girth=length_words(need.girth, units),
+                    over=translate_name(need.over),
+                    depth=length_words(need.depth, units),
+                )
+            )
+    elif measures:
+        page.paragraph(translate("It can be put on: every edge and level passes what of the body goes through it."))
+    page.left, page.width = left, page.width + 0.100
+    page.y = min(page.y, top - high - 0.006)
+
+
+def _step(page: _Page, number: int, words: str, pieces: Sequence[tuple[DraftedPiece, frozenset[str]]]) -> None:
+    """Write a step with a small picture of its pieces, what is sewn in colour."""
+    shown = pieces[:STEP_PIECES]
+    rows = wrap_text(words, TEXT * CAPITALS / POINT, page.width - 0.006 - STEP_WIDTH).split("\n")
+    height = max(LINE * len(rows), STEP_HEIGHT if shown else 0.0) + 0.0012
+    page.need(height)
+    top = page.y
+    for row_number, row in enumerate(rows):
+        page.y -= LINE
+        if row_number == 0:
+            page.text(page.left, str(number), bold=True)
+        page.text(page.left + 0.006, row)
+    if shown:
+        room = STEP_WIDTH / STEP_PIECES
+        largest = np.max([np.ptp(piece.cut_line, axis=0) for piece, _ in shown], axis=0)
+        scale = min((STEP_HEIGHT - 0.002) / largest[1], (room - 0.002) / largest[0])
+        for k, (piece, sewn) in enumerate(shown):
+            x = page.left + page.width - room * (len(shown) - k - 0.5)
+            _thumbnail(page.canvas, piece, np.array([x, top - height / 2]), float(scale), sewn)
+    page.y = top - height
+
+
+def _thumbnail(
+    canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: float, sewn: frozenset[str] | None = None
+) -> None:
+    """Draw one piece, small, about a centre [m]; the fold in dashes; with `sewn`, these edges in colour in place of the grain."""
     low, high = piece.cut_line.min(axis=0), piece.cut_line.max(axis=0)
     canvas.setStrokeColor("#000000")
     canvas.setDash([])
@@ -201,13 +298,19 @@ def _thumbnail(canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: floa
             path.close()
         canvas.drawPath(path)
 
-    draw(piece.cut_line, 0.7, closed=True)
-    draw(piece.grain, 0.4, closed=False)
+    draw(piece.cut_line, 0.7 if sewn is None else 0.4, closed=True)
+    if sewn is None:
+        draw(piece.grain, 0.4, closed=False)
     for dart in piece.darts:
         for leg in (dart.dart.left, dart.dart.right):
             draw(piece.drawn_line(piece.edge(leg)), 0.4, closed=False)
-    canvas.setDash([2, 1.2])
+    for line in piece.fisheyes.values():
+        draw(line, 0.4, closed=True)
     canvas.setStrokeColor("#b8460b")
+    for name, line in ({edge.name: piece.drawn_line(edge) for edge in piece.edges} | dict(piece.fisheyes)).items():
+        if sewn and name in sewn:
+            draw(line, 1.5, closed=name in piece.fisheyes)
+    canvas.setDash([2, 1.2])
     for edge in piece.fold_edges:
         draw(edge.line, 1.4, closed=False)
     canvas.setDash([])

@@ -25,6 +25,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges
 from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
+from warpflat.garment.line_drawing import describe_worn
 from warpflat.garment.mark_openings import mark_openings
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
 from warpflat.garment.openings import one_sided, place_opening
@@ -87,6 +88,7 @@ def pattern_of_garment(
         )
         if len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
             return pattern, notes
+        pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
         drawn, more = _drawn_once(pattern.pieces, pairs)
         return replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs)), (*notes, *more)
@@ -182,7 +184,8 @@ def pattern_of_garment(
             head = garment.mannequin.extremity("head")
             girths[size] |= {} if head is None else {"head": head}
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
-    return add_pockets(pattern, sample.pockets), notes
+    pattern = add_pockets(pattern, sample.pockets)
+    return replace(pattern, worn=describe_worn(garments, pattern.sample)), notes
 
 
 def _drawn_once(

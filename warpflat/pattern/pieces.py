@@ -18,6 +18,7 @@ from warpflat.pattern.measures import UNITS
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
 from warpflat.pattern.seam_difference import eased_length
 from warpflat.pattern.words import translate_name
+from warpflat.pattern.worn import Worn
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 if TYPE_CHECKING:
@@ -243,6 +244,7 @@ class Pattern:
         sample_size: the size that files of one size show; None takes the middle one.
         words: what is printed instead of English words and names (see `warpflat.pattern.words`).
         elastics: that are threaded through its casings.
+        worn: how it looks and what it measures on its body; None where that is not known.
     """
 
     __repr__ = short_repr
@@ -253,6 +255,7 @@ class Pattern:
     sample_size: str | None = None
     words: Mapping[str, str] = field(default_factory=dict)
     elastics: Sequence[Elastic] = ()
+    worn: Worn | None = None
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):

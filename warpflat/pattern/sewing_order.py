@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from string import ascii_uppercase
@@ -12,7 +13,16 @@ from warpflat.pattern.measures import length_words
 from warpflat.pattern.pieces import Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.words import translate, translate_name
 
-__all__ = ["SewnSeam", "notions", "piece_titles", "seam_letters", "sewing_steps", "sewn_seams"]
+__all__ = [
+    "SewnSeam",
+    "notions",
+    "piece_titles",
+    "seam_letters",
+    "sewing_steps",
+    "sewn_seams",
+    "step_pictures",
+    "tools",
+]
 
 
 #: Seams of the shell in the order in which they are closed, by words of their names; what has none of them comes with the panels.
@@ -302,12 +312,68 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     buttons = list(_buttons(garment.pieces[size]).values())
     at_ends = sum(piece.piece.quantity for piece in garment.pieces[size] if _buttons_at_one_end(piece))
     buttons += [at_ends] if at_ends else []
-    return (*zips, *elastics, *(translate("{count} buttons", count=count) for count in buttons))
+    return (
+        translate("sewing thread"),
+        *zips,
+        *elastics,
+        *(translate("{count} buttons", count=count) for count in buttons),
+    )
 
 
 def _buttons_at_one_end(piece: DraftedPiece) -> bool:
     """Return whether a strip buttons upon itself: a cuff, or the stand of a collar."""
     return piece.piece.role in ("cuff", "collar", "waistband") and "button" in piece.piece.marks
+
+
+def tools(garment: DraftedGarment, size: str) -> str:
+    """Return what the garment is made with, in words."""
+    steps = [
+        "paper scissors and glue or tape",
+        "cloth scissors",
+        "tape measure",
+        "chalk",
+        "pins",
+        "iron",
+        "sewing machine",
+    ]
+    steps += ["hand needle"]
+    if any(_zips(seam) for seam in sewn_seams(garment, size)):
+        steps.append("zip foot")
+    if _buttons(garment.pieces[size]) or any(map(_buttons_at_one_end, garment.pieces[size])):
+        steps.append("buttonhole foot")
+    return ", ".join(translate(word) for word in steps)
+
+
+def step_pictures(garment: DraftedGarment, size: str, steps: Sequence[str]) -> list[dict[str, frozenset[str]]]:
+    """Return for each step its pieces, and of each the edges that are sewn.
+
+    A step names its seams by their letters, and its pieces by their titles.
+    """
+    pieces = {piece.name: piece for piece in garment.pieces[size]}
+    titles = piece_titles([piece.piece for piece in pieces.values()])
+    letters = seam_letters(garment)
+    darts = translate("Sew the darts, from the edge to the tip, and press them: {darts}.", darts="\n").split("\n")[0]
+    hems = translate("Turn up and sew the hems: {edges}.", edges="\n").split("\n")[0]
+    found = []
+    for step in steps:
+        named = set(re.findall(r"(?<!\w)([A-Z]{1,2})(?= \()", step)) | set(
+            re.findall(r"(?<= )([A-Z]{1,2})(?= [a-z])", step)
+        )
+        sewn: dict[str, set[str]] = {}
+        for seam in garment.garment.seams:
+            if letters[seam.name] in named:
+                for side in (side for row in seam.sides for side in row):
+                    sewn.setdefault(side.piece, set()).add(side.edge)
+        if not sewn:
+            rest = step
+            for name, title in sorted(titles.items(), key=lambda each: -len(each[1])):
+                if re.search(rf"(?<!\w){re.escape(title)}(?!\w)", rest):
+                    rest = re.sub(rf"(?<!\w){re.escape(title)}(?!\w)", "", rest)
+                    kind = "dart" if step.startswith(darts) else "hem" if step.startswith(hems) else ""
+                    sewn[name] = {edge.name for edge in pieces[name].edges if edge.kind == kind}
+                    sewn[name] |= set(pieces[name].fisheyes) if kind == "dart" else set()
+        found.append({name: frozenset(edges) for name, edges in sewn.items()})
+    return found
 
 
 def _buttons(pieces: Sequence[DraftedPiece]) -> dict[str, int]:

@@ -1,0 +1,71 @@
+"""A garment as it is worn: its line drawing, its measures beside the body's, and openings that it needs; for a pattern's first page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from warpflat.core.arrays import FloatArray
+
+__all__ = ["Measure", "NeededOpening", "ViewedPiece", "Worn"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ViewedPiece:
+    """A piece as it is seen from one side.
+
+    Attributes:
+        outlines: #P by 2 [m], closed, first point not repeated: what it covers.
+        lines: #P by 2 [m], its edges and darts on the near side.
+    """
+
+    outlines: tuple[FloatArray, ...]
+    lines: tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measure:
+    """A girth [m] of the body and of the finished garment."""
+
+    name: str
+    body: float
+    finished: float
+
+    @property
+    def ease(self) -> float:
+        """What the garment has more than the body [m], to a millimetre."""
+        return round(self.finished - self.body, 3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NeededOpening:
+    """A way around the garment [m] that is too small for what must pass it, and how deep it has to be opened.
+
+    Attributes:
+        ring: the line or level.
+        length: of the ring in the pattern.
+        over: what of the body must pass.
+        girth: of that.
+        depth: of the opening.
+    """
+
+    ring: str
+    length: float
+    over: str
+    girth: float
+    depth: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Worn:
+    """What is known of a garment on its body.
+
+    Attributes:
+        views: "front" and "back", the farthest piece first; x to the right, y up [m].
+        measures: by size.
+        needed: openings that are missing, of the sample size.
+    """
+
+    views: Mapping[str, tuple[ViewedPiece, ...]] = field(default_factory=dict)
+    measures: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
+    needed: tuple[NeededOpening, ...] = ()
