@@ -106,7 +106,7 @@ def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):
     steps = sewing_steps(draft_garment(pattern), "")
     assert any("slits" in step for step in steps)
     assert any("buttonhole at one end" in step and "cuff" in step for step in steps)
-    assert "2 buttons" in notions(draft_garment(pattern), "")
+    assert "2 small buttons" in notions(draft_garment(pattern), "")
     with pytest.raises(InputError, match="does not lie within the piece"):
         finished(shirt, replace(cuff, placket=0.9))
 

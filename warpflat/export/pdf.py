@@ -317,8 +317,8 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
     # As many sheets as the pieces take: the legend goes where they leave room.
     bare = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]))
     tiling = make_tiling(bare, paper)
-    places = [_free_place(tiling, tile) for tile in tiling.tiles]
-    found = next((place for place in places if place is not None), None)
+    legends = [_free_place(tiling, tile) for tile in tiling.tiles]
+    found = next((place for place in legends if place is not None), None)
     if found is not None:
         return replace(bare, reserved=found), replace(tiling, sheet=replace(bare, reserved=found))
     sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)

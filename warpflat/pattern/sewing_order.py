@@ -309,14 +309,19 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         )
         for elastic in garment.garment.elastics
     ]
-    buttons = list(_buttons(garment.pieces[size]).values())
-    at_ends = sum(piece.piece.quantity for piece in garment.pieces[size] if _buttons_at_one_end(piece))
-    buttons += [at_ends] if at_ends else []
+    buttons = _buttons(garment.pieces[size]).values()
+    # Both layers of a collar have one button.
+    small = sum(
+        piece.piece.quantity // (2 if piece.piece.role == "collar" else 1)
+        for piece in garment.pieces[size]
+        if _buttons_at_one_end(piece)
+    )
     return (
         translate("sewing thread"),
         *zips,
         *elastics,
         *(translate("{count} buttons", count=count) for count in buttons),
+        *([translate("{count} small buttons", count=small)] if small else []),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.resources
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -79,7 +80,12 @@ def taken_options(offer: GarmentOffer, chosen: Mapping[str, str]) -> dict[str, s
 
 
 def scene_text(
-    offer: GarmentOffer, mannequin: Mapping[str, Any], chosen: Mapping[str, str], *, fabric: str | None = None
+    offer: GarmentOffer,
+    mannequin: Mapping[str, Any],
+    chosen: Mapping[str, str],
+    *,
+    file: str,
+    fabric: str | None = None,
 ) -> str:
     """Return the text of a scene file.
 
@@ -87,6 +93,7 @@ def scene_text(
         offer: the garment.
         mannequin: the table of the body.
         chosen: option by choice; the first one where nothing is said.
+        file: where it will lie.
         fabric: another cloth than the garment's own.
 
     Raises:
@@ -99,11 +106,12 @@ def scene_text(
     if fabric is not None:
         tables["fabric"] = fabric
     tables["mannequin"] = dict(mannequin)
-    options = "".join(
-        f"#   {choice}: {option}, {offer.choices[choice][option][0]}\n" for choice, option in taken.items()
-    )
-    head = f"# {offer.about[0].upper()}{offer.about[1:]}.\n"
-    return f"{head}#\n{options}{'#' + chr(10) if options else ''}#     warpflat run THIS_FILE\n\n{document_as_toml(tables)}"
+    words = [
+        f"{choice.capitalize()}: {option}, {offer.choices[choice][option][0]}." for choice, option in taken.items()
+    ]
+    about = " ".join([f"{offer.about[0].upper()}{offer.about[1:]}.", *words])
+    head = [*textwrap.wrap(about, 116), "", f"    warpflat run {file}"]
+    return "".join(f"# {line}".rstrip() + "\n" for line in head) + f"\n{document_as_toml(tables)}"
 
 
 def _laid_over(base: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
