@@ -268,21 +268,17 @@ def smooth_equations(line: IntArray, positions: FloatArray, fold: IntArray | Non
     springs, reach = [], 1
     while reach == 1 or (2 * reach * step <= WAVE and 2 * reach < len(line)):
         soft = SMOOTH * WAVE / (2 * step) / reach**2
-        springs.append(_from_chords(line, positions, reach, soft))
+        # Each vertex keeps its distance from the chord of those `reach` edges before and after.
+        here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
+        chord, away = positions[after] - positions[before], positions[here] - positions[before]
+        cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
+        distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
+        held = _equations(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
+        springs.append(replace(held, soft=np.full(len(here), soft)))
         if fold is not None:
             springs.append(_from_mirror_image(line, positions, fold, reach, soft))
         reach *= 2
     return one_group(*springs)
-
-
-def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float) -> ConstraintEquations:
-    """Return springs that hold each vertex's distance from the chord of those `reach` edges before and after."""
-    here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
-    chord, away = positions[after] - positions[before], positions[here] - positions[before]
-    cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
-    distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
-    springs = _equations(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
-    return replace(springs, soft=np.full(len(here), soft))
 
 
 def _from_mirror_image(

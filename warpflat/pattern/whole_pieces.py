@@ -64,22 +64,15 @@ def whole_pieces(
                 raise InputError(f"seam {seam.name!r}: {side.piece!r} is not cut; its piece needs a quantity of 2")
         taken |= edges
         found.append(plain)
-    found += [seam for piece in whole.values() for seam in _dart_seams(piece)]
+    for piece in whole.values():
+        darts = [(dart.name, dart.left, dart.right) for dart in piece.darts]
+        darts += [(hole.name, f"{hole.name} left", f"{hole.name} right") for hole in piece.holes if hole.kind == "dart"]
+        for name, left, right in darts:
+            legs = SeamSide(piece=piece.name, edge=left), SeamSide(piece=piece.name, edge=right, reversed=True)
+            found.append(Seam(name=f"{piece.name}.{name}", sides=((legs[0],), (legs[1],))))
     left_out = sorted(set(given) - sewn)
     notes = [f"left out, as no seam joins them: {', '.join(left_out)}"] if left_out else []
     return whole, found, notes
-
-
-def _dart_seams(piece: Piece) -> list[Seam]:
-    darts = [(dart.name, dart.left, dart.right) for dart in piece.darts]
-    darts += [(hole.name, f"{hole.name} left", f"{hole.name} right") for hole in piece.holes if hole.kind == "dart"]
-    return [
-        Seam(
-            name=f"{piece.name}.{name}",
-            sides=((SeamSide(piece=piece.name, edge=left),), (SeamSide(piece=piece.name, edge=right, reversed=True),)),
-        )
-        for name, left, right in darts
-    ]
 
 
 def hole_edges(hole: Hole) -> list[Edge]:

@@ -87,7 +87,18 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
     place = np.empty(grid.size, dtype=np.int32)
     place[grid.ravel()] = np.arange(grid.size, dtype=np.int32)
     lines = [np.union1d(np.arange(0, count, 2), count - 1) for count in grid.shape]
-    between, nearest = zip(*(_linear(kept, count) for kept, count in zip(lines, grid.shape, strict=True)), strict=True)
+    # The weights by which the lines kept interpolate all of them, and the nearest of these to each.
+    between, nearest = list[csr_array](), list[IntArray]()
+    for line, count in zip(lines, grid.shape, strict=True):
+        every = np.arange(count)
+        before = np.minimum(np.searchsorted(line, every, side="right") - 1, len(line) - 2)
+        share = (every - line[before]) / (line[before + 1] - line[before])
+        entries = np.column_stack([1.0 - share, share]).ravel()
+        columns = np.column_stack([before, before + 1]).astype(np.int32).ravel()
+        weights = csr_array((entries, columns, 2 * np.arange(count + 1, dtype=np.int32)), shape=(count, len(line)))
+        weights.eliminate_zeros()
+        between.append(weights)
+        nearest.append(before + (share > 0.5))
     kept = grid[np.ix_(*lines)]
     number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
     faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
@@ -108,18 +119,6 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
         prolongation=csr_array(kron(*between, format="csr"))[place],
         face_of=face_at[np.ix_(*(line[:-1] for line in lines))].ravel(),
     )
-
-
-def _linear(kept: IntArray, count: int) -> tuple[csr_array, IntArray]:
-    """Return the weights by which the lines kept interpolate all of them, `count` by #kept, and the nearest of these to each."""
-    every = np.arange(count)
-    before = np.minimum(np.searchsorted(kept, every, side="right") - 1, len(kept) - 2)
-    share = (every - kept[before]) / (kept[before + 1] - kept[before])
-    entries = np.column_stack([1.0 - share, share]).ravel()
-    columns = np.column_stack([before, before + 1]).astype(np.int32).ravel()
-    weights = csr_array((entries, columns, 2 * np.arange(count + 1, dtype=np.int32)), shape=(count, len(kept)))
-    weights.eliminate_zeros()
-    return weights, before + (share > 0.5)
 
 
 def coarsen(surface: Surface) -> Coarsening | None:
@@ -147,7 +146,11 @@ def coarsen(surface: Surface) -> Coarsening | None:
     weight = wp.empty(count, dtype=wp.vec3d, device="cpu")
     record(locate, dim=count, inputs=[ring, gone, target], outputs=[parent, weight], device="cpu").launch()
     kept = np.flatnonzero(gone.numpy() == 0).astype(np.int32)
-    into = _final_vertices(gone.numpy(), parent.numpy()[:, 0])
+    # The kept vertex into which each vertex has finally collapsed: pointers are doubled until they end there.
+    last = np.where(gone.numpy() == 0, np.arange(count, dtype=np.int32), parent.numpy()[:, 0])
+    for _ in range(int(gone.numpy().max()).bit_length()):
+        last = last[last]
+    into = (np.cumsum(gone.numpy() == 0, dtype=np.int32) - 1)[last]
     corners = into[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     corners = corners[whole]
@@ -161,19 +164,6 @@ def coarsen(surface: Surface) -> Coarsening | None:
     )
     prolongation = _prolongation(gone, parent, weight, int(passes[0]))
     return Coarsening(surface=coarse, kept=kept, into=into, prolongation=prolongation, face_of=face[whole])
-
-
-def _final_vertices(gone: IntArray, into: IntArray) -> IntArray:
-    """Return the kept vertex into which each vertex has finally collapsed, #V, by its number among those kept.
-
-    Args:
-        gone: #V, the pass in which a vertex collapsed; 0 if it is kept.
-        into: #V, the vertex into which it collapsed then.
-    """
-    end = np.where(gone == 0, np.arange(len(gone), dtype=np.int32), into)
-    for _ in range(int(gone.max()).bit_length()):
-        end = end[end]
-    return (np.cumsum(gone == 0, dtype=np.int32) - 1)[end]
 
 
 def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: int) -> csr_array:

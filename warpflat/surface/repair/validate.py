@@ -141,7 +141,12 @@ def make_surface(
             mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
         _take_outer_sheet(mesh)
         _separate_touching_fans(mesh)
-        _drop_unused(mesh)
+        kept = _used_vertices(mesh.faces)
+        if len(kept) < len(mesh.vertices):
+            new = np.full(len(mesh.vertices) + 1, -1, dtype=np.int32)
+            new[kept] = np.arange(len(kept), dtype=np.int32)
+            mesh.faces = new[mesh.faces]
+            mesh.vertices, mesh.index = mesh.vertices[kept], mesh.index[kept]
         kept_lines, off = renumber_lines(
             mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
         )
@@ -477,17 +482,6 @@ def _separate_touching_fans(mesh: _Mesh) -> None:
     mesh.faces = faces
     names = list_some(np.unique(vertex[extra]))
     mesh.notes.append(f"parts that touched only in a point were separated at vertices {names}")
-
-
-def _drop_unused(mesh: _Mesh) -> None:
-    used = _used_vertices(mesh.faces)
-    unused = len(mesh.vertices) - len(used)
-    if unused == 0:
-        return
-    new = np.full(len(mesh.vertices) + 1, -1, dtype=np.int32)
-    new[used] = np.arange(len(used), dtype=np.int32)
-    mesh.faces = new[mesh.faces]
-    mesh.vertices, mesh.index = mesh.vertices[used], mesh.index[used]
 
 
 def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
