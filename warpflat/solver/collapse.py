@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 from scipy.sparse import csr_array, kron
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.core.compile import launch_quietly
 from warpflat.core.launch import record
 from warpflat.core.sums import range_offsets
@@ -127,7 +127,19 @@ def coarsen(surface: Surface) -> Coarsening | None:
     triangles, face = surface.faces[:, :3], np.arange(len(surface.faces), dtype=np.int32)
     if surface.is_quad.any():
         triangles, face = triangulate(surface.faces)
-    ring = _make_ring(surface.vertices, triangles)
+    # The vertices around each vertex, in their order.
+    ring = Ring()
+    ring.vertices = _as_input(surface.vertices, wp.vec3d)
+    around = np.bincount(triangles.ravel(), minlength=count)
+    slots, sides = (range_offsets(places) for places in (np.maximum(around + 2, _RING_CAPACITY), around))
+    ring.offset = _as_input(slots, wp.int32)
+    ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
+    ring.neighbor = wp.empty(int(slots[-1]), dtype=wp.int32, device="cpu")
+    side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
+    begin, corners = _as_input(sides, wp.int32), _as_input(triangles, wp.vec3i)
+    launch_quietly(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
+    ordered = [ring.degree, ring.neighbor]
+    record(order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=ordered, device="cpu").launch()
     if ring.degree.numpy().min() < 0:
         return None
     target, beside, gone = (wp.zeros(count, dtype=wp.int32, device="cpu") for _ in range(3))
@@ -177,25 +189,6 @@ def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: in
         capacity *= 2
     kept, end = count - np.count_nonzero(gone.numpy()), offset[-1]
     return csr_array(csr_array((value[:end], column[:end], offset), shape=(count, kept))[row])
-
-
-def _make_ring(vertices: FloatArray, triangles: IntArray) -> Ring:
-    count = len(vertices)
-    ring = Ring()
-    ring.vertices = _as_input(vertices, wp.vec3d)
-    around = np.bincount(triangles.ravel(), minlength=count)
-    slots, sides = (range_offsets(places) for places in (np.maximum(around + 2, _RING_CAPACITY), around))
-    ring.offset = _as_input(slots, wp.int32)
-    ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
-    ring.neighbor = wp.empty(int(slots[-1]), dtype=wp.int32, device="cpu")
-    side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
-    begin, corners = _as_input(sides, wp.int32), _as_input(triangles, wp.vec3i)
-    launch_quietly(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
-    order = record(
-        order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=[ring.degree, ring.neighbor], device="cpu"
-    )
-    order.launch()
-    return ring
 
 
 def _as_input(values: np.ndarray[Any, Any], dtype: type) -> wp.array:

@@ -251,21 +251,17 @@ class _Patch:
             through = [row for row in self.lines.values() if gone in row] if line else []
             if not all(any({x, y} == {gone, kept} for x, y in pairwise(row)) for row in through):
                 continue
-            if self._collapse(gone, kept):
-                return True
+            new = self._faces_after_collapse(gone, kept) if self._may_collapse(gone, kept) else None
+            if new is None:
+                # That would spoil the surface.
+                continue
+            for face, ring in new.items():
+                self.replace_face(face, ring)
+            for name, row in self.lines.items():
+                moved = [kept if v == gone else v for v in row]
+                self.lines[name] = [v for i, v in enumerate(moved) if i == 0 or v != moved[i - 1]]
+            return True
         return False
-
-    def _collapse(self, gone: int, kept: int) -> bool:
-        """Merge the vertex `gone` into `kept`; false, and nothing is changed, where that would spoil the surface."""
-        new = self._faces_after_collapse(gone, kept) if self._may_collapse(gone, kept) else None
-        if new is None:
-            return False
-        for face, ring in new.items():
-            self.replace_face(face, ring)
-        for name, line in self.lines.items():
-            moved = [kept if v == gone else v for v in line]
-            self.lines[name] = [v for i, v in enumerate(moved) if i == 0 or v != moved[i - 1]]
-        return True
 
     def _may_collapse(self, gone: int, kept: int) -> bool:
         """Return whether the surface stays manifold, with the same border, when the edge between two vertices is collapsed."""
