@@ -276,25 +276,16 @@ def smooth_equations(line: IntArray, positions: FloatArray, fold: IntArray | Non
         held = _equations(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
         springs.append(replace(held, soft=np.full(len(here), soft)))
         if fold is not None:
-            springs.append(_from_mirror_image(line, positions, fold, reach, soft))
+            # Ends on a fold keep their distance from the chord between the vertex `reach` edges before and its mirror image.
+            rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
+            ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
+            coefficient = np.zeros((len(rows), 4, 2))
+            coefficient[:, 0, 1], coefficient[:, 1, 1] = -1.0, 1.0
+            target = np.einsum("pjk,pjk->p", coefficient, positions[ends])
+            held = _equations(ends, LINEAR, target=target, coefficient=coefficient, tolerance=np.inf)
+            springs.append(replace(held, soft=np.full(len(rows), soft / 2)))
         reach *= 2
     return one_group(*springs)
-
-
-def _from_mirror_image(
-    line: IntArray, positions: FloatArray, fold: IntArray, reach: int, soft: float
-) -> ConstraintEquations:
-    """Return springs that hold the ends on a fold at their distance from the chord to the vertex `reach` edges before.
-
-    The chord runs between that vertex and its mirror image.
-    """
-    rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
-    ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
-    coefficient = np.zeros((len(rows), 4, 2))
-    coefficient[:, 0, 1], coefficient[:, 1, 1] = -1.0, 1.0
-    target = np.einsum("pjk,pjk->p", coefficient, positions[ends])
-    springs = _equations(ends, LINEAR, target=target, coefficient=coefficient, tolerance=np.inf)
-    return replace(springs, soft=np.full(len(rows), soft / 2))
 
 
 def level_equations(line: IntArray, across: FloatArray) -> ConstraintEquations:

@@ -147,26 +147,21 @@ def fit_curve(
     for a, b in pairwise(breaks):
         run = clean[a : b + 1]
         curve = _fit_run(run, tolerance, None if wanted is None else wanted[a : b + 1] - wanted[a])
-        runs.append(_within_tolerance(curve, run, tolerance) if near else curve)
+        for share in INSIDE if near else ():
+            if farthest(curve.sample(), run) <= tolerance:
+                break
+            # The lengths [m] (#P) of a curve that runs inside the points, no more than a share of the tolerance.
+            step, turn = segment_lengths(run), np.abs(turning_angles(run))
+            both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
+            longer = np.maximum(0.0, step * both**2 / 24 - share * tolerance * both)
+            inside = np.concatenate([[0.0], np.cumsum(step + longer)])
+            # Measured on the chords by which the curve is drawn.
+            curve = _fit_run(run, tolerance, inside, room=tolerance - CHORD / 2)
+        runs.append(curve)
     whole = Curve(
         bezier=np.concatenate([run.bezier for run in runs]), straight=np.concatenate([run.straight for run in runs])
     )
     return whole.reversed() if from_end else whole
-
-
-def _within_tolerance(curve: Curve, points: FloatArray, tolerance: float) -> Curve:
-    """Return the curve, or one that is as much longer as it takes to keep within the tolerance of the points."""
-    # Measured on the chords by which the curve is drawn.
-    room = tolerance - CHORD / 2
-    for share in INSIDE:
-        if farthest(curve.sample(), points) <= tolerance:
-            break
-        # The lengths [m] (#P) of a curve that runs inside the points, no more than a share of the tolerance.
-        step, turn = segment_lengths(points), np.abs(turning_angles(points))
-        both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
-        longer = np.maximum(0.0, step * both**2 / 24 - share * tolerance * both)
-        curve = _fit_run(points, tolerance, np.concatenate([[0.0], np.cumsum(step + longer)]), room=room)
-    return curve
 
 
 def _fit_run(

@@ -139,7 +139,13 @@ def make_surface(
         if turned:
             mesh.faces = faces
             mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
-        _take_outer_sheet(mesh)
+        if (mesh.half_edges.count == 2).all() and (sheet := outer_sheet(mesh.vertices, mesh.half_edges)) is not None:
+            # A closed surface that is cloth drawn with its thickness.
+            mesh.keep(sheet.faces)
+            mesh.notes.append(
+                f"cloth drawn {1e3 * sheet.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
+                f"({1e4 * sheet.left_out:.0f} cm2) left out"
+            )
         _separate_touching_fans(mesh)
         kept = _used_vertices(mesh.faces)
         if len(kept) < len(mesh.vertices):
@@ -439,19 +445,6 @@ def _part_sheets(mesh: _Mesh) -> None:
         f"{format_count(len(crowded), 'edge')} at which more than two faces meet: the sheets were parted there"
         + (f", {format_count(len(off), 'sheet')} came off ({', '.join(off[:4])} cm2)" if off else "")
     )
-
-
-def _take_outer_sheet(mesh: _Mesh) -> None:
-    """Take the outer sheet of a closed surface that is cloth drawn with its thickness."""
-    if (mesh.half_edges.count != 2).any():
-        return
-    sheet = outer_sheet(mesh.vertices, mesh.half_edges)
-    if sheet is not None:
-        mesh.keep(sheet.faces)
-        mesh.notes.append(
-            f"cloth drawn {1e3 * sheet.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
-            f"({1e4 * sheet.left_out:.0f} cm2) left out"
-        )
 
 
 def _separate_touching_fans(mesh: _Mesh) -> None:
