@@ -227,6 +227,7 @@ def _length(placements: list[Copy]) -> float:
 
 def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seconds: int, seed: int) -> list[Copy]:
     """Nest the copies with sparrow, and return them in the order in which the cutter meets them."""
+    import shapely
     import spyrrow
 
     items, matrices, usable = [], [], cloth.width - 2 * cloth.gap
@@ -242,7 +243,12 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
             )
         matrices.append(matrix)
         angles = [0.0] if cloth.one_way else [0.0, 180.0]
-        items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in _simpler(cut).tolist()], 1, angles))
+        # A polygon with few corners that contains the cut line.
+        exact = shapely.Polygon(cut)
+        simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
+        simple = simple if simple.contains(exact) else exact
+        corners = np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
+        items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in corners.tolist()], 1, angles))
     instance = spyrrow.StripPackingInstance(name, usable * 1000, items)
     config = spyrrow.StripPackingConfig(
         total_computation_time=seconds, num_workers=1, seed=seed, min_items_separation=cloth.gap * 1000 or None
@@ -318,16 +324,6 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
 def _onto_cloth(mirrored: bool) -> FloatArray:
     """Return the matrix (2 by 2) that lays the grain, upwards in a drafted piece, along x."""
     return np.array([[0.0, 1.0], [1.0, 0.0]]) if mirrored else np.array([[0.0, 1.0], [-1.0, 0.0]])
-
-
-def _simpler(cut: FloatArray) -> FloatArray:
-    """Return a polygon with few corners that contains the cut line."""
-    import shapely
-
-    exact = shapely.Polygon(cut)
-    simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
-    simple = simple if simple.contains(exact) else exact
-    return np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
 
 
 def _placed(

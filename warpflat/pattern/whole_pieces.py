@@ -45,7 +45,18 @@ def whole_pieces(
         name for name, p in given.items() if name not in halves and (name in asked or (p.quantity == 2 and p.paired))
     }
     whole = {name: _unfolded(piece) if name in halves else piece for name, piece in given.items() if name in sewn}
-    whole |= {name + MIRRORED: _turned(given[name]) for name in twice if name in sewn}
+    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
+    for piece in [given[name] for name in twice if name in sewn]:
+        # Cut turned over.
+        turned = [replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]]
+        title = piece.name + MIRRORED
+        whole[title] = replace(
+            piece, name=title, edges=turned, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
+            holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
+            internal_lines={name: line * across for name, line in piece.internal_lines.items()},
+            grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
+            placement=None if piece.placement is None else flip @ piece.placement @ flip,
+        )  # fmt: skip
     found: list[Seam] = []
     taken: set[tuple[str, str]] = set()
     # Seams on the other side of the body.
@@ -119,19 +130,6 @@ def _unfolded(piece: Piece) -> Piece:
     return replace(
         piece, edges=[*edges, *others], darts=[*piece.darts, *darts], holes=[*piece.holes, *holes],
         internal_lines={**piece.internal_lines, **lines},
-    )  # fmt: skip
-
-
-def _turned(piece: Piece) -> Piece:
-    """Return a piece cut turned over."""
-    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
-    edges = [replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]]
-    return replace(
-        piece, name=piece.name + MIRRORED, edges=edges, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
-        holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
-        internal_lines={name: line * across for name, line in piece.internal_lines.items()},
-        grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
-        placement=None if piece.placement is None else flip @ piece.placement @ flip,
     )  # fmt: skip
 
 

@@ -67,7 +67,16 @@ def coarse_minimum(state: Relaxation) -> FloatArray:
         # Measured on the finest mesh only.
         buckling_stiffness=float(fine.buckling_stiffness),
     )
-    _calibrate(network, layout, fine, start)
+    if network.model == "springs":
+        # Springs are weighed by direction, so that the network stores the fine one's energy under uniform strain. Edge springs on
+        # triangles store that energy only roughly, each mesh with an error of its own.
+        target, _ = _strain_fields(fine, start)
+        _, products = _strain_fields(network, layout, products=True)
+        factor = np.linalg.lstsq(products, target, rcond=1e-6)[0]
+        s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
+        given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_FACTOR_BOUNDS]
+        launch_each(weigh_by_direction, network.vertex_count, given, [stiffness])
+        network.replace_stiffness(stiffness)
     # Chords run between the coarser mesh's vertices that are nearest to their ends.
     alignments, every = [], np.arange(len(into))
     for each in state.alignments:
@@ -90,22 +99,6 @@ def coarse_minimum(state: Relaxation) -> FloatArray:
     if not state.energies().potential < before:
         state.place(start)
     return state.positions()
-
-
-def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray) -> None:
-    """Weigh the springs of a coarse network by direction, so that it stores the fine one's energy under uniform strain.
-
-    Edge springs on triangles store that energy only roughly, each mesh with an error of its own.
-    """
-    if network.model != "springs":
-        return
-    target, _ = _strain_fields(fine, fine_layout)
-    _, products = _strain_fields(network, layout, products=True)
-    factor = np.linalg.lstsq(products, target, rcond=1e-6)[0]
-    s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
-    given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_FACTOR_BOUNDS]
-    launch_each(weigh_by_direction, network.vertex_count, given, [stiffness])
-    network.replace_stiffness(stiffness)
 
 
 def _strain_fields(network: SpringNetwork, layout: FloatArray, *, products: bool = False) -> tuple[FloatArray, ...]:
