@@ -181,8 +181,8 @@ def test_a_pocket_comes_off_whole_and_the_front_under_it_stays(tmp_path: Path) -
 def test_doubled_faces_with_vertices_of_their_own_are_one_sheet(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for apart in (0.0, 1e-6, 2e-5):
-        points, quads = sleeve()
+    for apart in (0.0, 2e-5):
+        points, quads = sleeve(16, 11)
         vertices = np.vstack([points, points + apart])
         path = write(tmp_path / "double.obj", vertices, [*quads.tolist(), *(quads[:, ::-1] + len(points)).tolist()])
         for more in ([], ["--component", "all"], ["--seams", "auto"]):

@@ -208,10 +208,18 @@ def test_units_scale(tmp_path, unit, metres):
     assert np.ptp(read_surface(path, units=unit).vertices[:, 0]) == pytest.approx(5 * metres, rel=1e-15)
 
 
-@pytest.mark.parametrize("way", [["--component", "all"], ["--seams", "auto"], []])
 @pytest.mark.parametrize(
-    ("drawn", "read", "right"),
-    [("mm", "m", "mm"), ("cm", "ft", "cm"), ("m", "mm", "m"), ("dm", "m", "dm"), ("m", "cm", "m")],
+    ("drawn", "read", "right", "way"),
+    [
+        ("mm", "m", "mm", ["--component", "all"]),
+        ("mm", "m", "mm", ["--seams", "auto"]),
+        ("m", "mm", "m", ["--component", "0"]),
+        ("cm", "ft", "cm", ["--seams", "auto"]),
+        ("m", "cm", "m", ["--component", "all"]),
+        ("dm", "m", "dm", ["--component", "0"]),
+        ("dm", "m", "dm", ["--component", "all"]),
+        ("dm", "m", "dm", ["--seams", "auto"]),
+    ],
 )
 def test_wrong_units_are_named_whatever_is_read(tmp_path, capsys, drawn, read, right, way):
     """A skirt of two panels, .6 m tall."""
@@ -224,7 +232,6 @@ def test_wrong_units_are_named_whatever_is_read(tmp_path, capsys, drawn, read, r
         rows.append(f"o panel_{first}")
         rows += [f"f {a} {a + 1} {a + 5} {a + 4}" for k in range(16) if k % 4 < 3 for a in [first + k]]
     path = write(tmp_path / "skirt.obj", "\n".join(rows))
-    way = way or ["--component", "0"]
     code = main(
         ["flatten", str(path), "--units", read, *way, "--frames", "0", "--no-picture", "--out", str(tmp_path / "out")]
     )

@@ -160,16 +160,11 @@ def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator
             raise InputError(f"{file}: {at}{message}; give a smaller file, or more memory") from error
         if isinstance(error, OSError):
             raise InputError(f"{file}: {at}cannot be read: {system_reason(error)}") from error
-        raise InputError(f"{file}: {at}cannot be read as {form.name} ({_reason(error)}); {form.right}") from error
-
-
-def _reason(error: Exception) -> str:
-    """Return why a library could not read a file, in its words where it has some."""
-    if isinstance(error, RecursionError):
-        return "nested too deeply"
-    words = one_line(str(error))[:_LONGEST_REASON]
-    # A missing key's only word is the key.
-    return f"{type(error).__name__} {words}".strip() if isinstance(error, LookupError) or not words else words
+        reason = "nested too deeply" if isinstance(error, RecursionError) else one_line(str(error))[:_LONGEST_REASON]
+        if isinstance(error, LookupError) or not reason:
+            # A missing key's only word is the key.
+            reason = f"{type(error).__name__} {reason}".strip()
+        raise InputError(f"{file}: {at}cannot be read as {form.name} ({reason}); {form.right}") from error
 
 
 def check_regular(path: Path | int, most: int, *, links: bool = True) -> None:

@@ -103,7 +103,9 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
     if kind == "extra_forbidden":
         key = str(location[-1])
         path = ".".join([*parents, key])
-        return f"{path}: unknown key {quote_value(key)}; {nearest(key, _keys(parent))}"
+        models = [one for one in _members(parent) if isinstance(one, type) and issubclass(one, BaseModel)]
+        valid = [name for model in models for name in _fields(model)]
+        return f"{path}: unknown key {quote_value(key)}; {nearest(key, valid)}"
     if kind == "missing":
         return f"{'.'.join([*parents, str(location[-1])])}: is missing"
     path = ".".join(parents)
@@ -128,15 +130,6 @@ def _members(annotation: Any) -> Iterator[Any]:
         yield from _members(get_args(annotation)[0])
     else:
         yield annotation
-
-
-def _keys(annotation: Any) -> list[str]:
-    return [
-        key
-        for member in _members(annotation)
-        if isinstance(member, type) and issubclass(member, BaseModel)
-        for key in _fields(member)
-    ]
 
 
 def _fields(model: type[BaseModel]) -> dict[str, Any]:

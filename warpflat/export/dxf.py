@@ -78,7 +78,7 @@ def write_dxf(
     taken: set[str] = set()
     seams = seam_words(garment.garment.seams)
     names = {piece.name: piece.piece.title or piece.name for piece in next(iter(garment.pieces.values()))}
-    written = titles(list(dict.fromkeys(names.values())), _is_written)
+    written = titles(list(dict.fromkeys(names.values())), lambda name: any(map(str.isalnum, _ascii(name))))
     for placed in lay_out(groups, width=1.5).placed:
         for piece in placed.pieces:
             title = written[names[piece.name]]
@@ -211,11 +211,6 @@ def _ascii(text: str) -> str:
     # Control characters too: a line of the file is a value.
     plain = plain_letters(text).encode("ascii", "replace").decode("ascii")
     return "".join("?" if control_in(letter) else letter for letter in plain) if control_in(plain) else plain
-
-
-def _is_written(name: str) -> bool:
-    """Return whether 7 bits leave anything of a name."""
-    return any(letter.isalnum() for letter in _ascii(name))
 
 
 def _polyline(block: list[str], points: FloatArray, scale: float, layer: str, *, closed: bool = False) -> None:

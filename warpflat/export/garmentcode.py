@@ -267,7 +267,8 @@ class _Strand:
         inside = arc[(arc > a + 1e-9) & (arc < b - 1e-9)]
         steps = np.unique(np.concatenate([inside, np.linspace(a, b, _FEWEST)]))
         control, off = _cubic(points_at_lengths(line, steps))
-        curved = bool(np.abs(_from_chord(control)).max() > _STRAIGHT)
+        chord = control[0] + np.linspace(0.0, 1.0, 4)[:, None] * (control[3] - control[0])
+        curved = bool(np.abs(control - chord).max() > _STRAIGHT)
         if side.reversed:
             control, a = control[::-1], float(arc[-1]) - b
         found = _Split(
@@ -339,11 +340,6 @@ def _cubic(points: FloatArray) -> tuple[FloatArray, float]:
     # A closed line has no chord to which its control points could be relative.
     closed = float(np.linalg.norm(chord)) < 0.1 * arc[-1]
     return control, np.inf if closed else max(off / _FIT, abs(length - float(arc[-1])) / _LENGTH)
-
-
-def _from_chord(control: FloatArray) -> FloatArray:
-    """Return how far the control points of a cubic lie from those of a straight line."""
-    return control - (control[0] + np.linspace(0.0, 1.0, 4)[:, None] * (control[3] - control[0]))
 
 
 def _places(

@@ -112,7 +112,15 @@ def draw_figure(
     scale = energy_scale(density, areas) if scale is None else scale
     figure = new_figure(PAGE_WIDTH, 4.0)
     pen = Pen(figure)
-    shared = _take_shared(pen, cells)
+    # The first caption that is the same in all cells stands left of the colour bar, if there is room for it.
+    shared = ""
+    for key, value in cells[0].captions.items() if len(cells) > 1 else ():
+        caption = f"{key} {value}"
+        if all(cell.captions.get(key) == value for cell in cells) and pen.measure(caption, 7.5)[0] < SCALE_BAR - 0.1:
+            for cell in cells:
+                cell.captions = {other: text for other, text in cell.captions.items() if other != key}
+            shared = caption
+            break
     worn = None
     if body is not None:
         worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
@@ -135,17 +143,6 @@ def draw_figure(
     for cell in cells:
         draw_cell(pen, cell, top, scale, page_scale)
     return figure
-
-
-def _take_shared(pen: Pen, cells: Sequence[Cell]) -> str:
-    """Take out of the captions of several cells the first one that is the same in all, if there is room for it left of the colour bar."""
-    for key, value in cells[0].captions.items() if len(cells) > 1 else ():
-        words = f"{key} {value}"
-        if all(cell.captions.get(key) == value for cell in cells) and pen.measure(words, 7.5)[0] < SCALE_BAR - 0.1:
-            for cell in cells:
-                cell.captions = {other: text for other, text in cell.captions.items() if other != key}
-            return words
-    return ""
 
 
 def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool) -> Cell:

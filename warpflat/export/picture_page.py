@@ -342,7 +342,15 @@ def draw_cell(pen: Pen, cell: Cell, top: float, scale: float, page_scale: float)
     datum = cell.pattern.lines.get(cell.datum, [None])[0] if cell.datum is not None else None
     has_grain = datum is None or _grain(pen, room, shown[-1], datum, cell.grain_angle)
     unnamed: dict[str, None] = {}
-    pages = _pages(cell, shown, top)
+    # Left, bottom, right and upper edge of the room for the names of each view [in].
+    outside = _BESIDE - _BESIDE_ALONE if cell.alone else 0.0
+    left, right = cell.left - outside, cell.left + cell.width + outside
+    boxes = [view.box for view in shown]
+    if cell.stacked:
+        pages = [(left, max(box[1] - _FOOT, floor), right, box[3] + 0.2) for box in boxes]
+    else:
+        sides = pairwise([left, *(0.5 * (a[2] + b[0]) for a, b in pairwise(boxes)), right])
+        pages = [(start_, floor, end_, box[3] + 0.2) for (start_, end_), box in zip(sides, boxes, strict=True)]
     for drawn, page in zip(shown, pages, strict=True):
         others = [other for other in shown if other is not drawn]
         unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, cell.datum, page, others))
@@ -386,19 +394,6 @@ def _write_unnamed(pen: Pen, room: LabelRoom, names: Sequence[str], left: float,
         if spot := room.place(spots, width, height, page):
             pen.write(spot.x, spot.y, text, 7, color=GREY, ha="center")
             return
-
-
-def _pages(cell: Cell, shown: Sequence[DrawnView], top: float) -> list[tuple[float, float, float, float]]:
-    """Return left, bottom, right and upper edge of the room for the names of each view of a cell whose upper edge is at `top` [in]."""
-    outside = _BESIDE - _BESIDE_ALONE if cell.alone else 0.0
-    left, right = cell.left - outside, cell.left + cell.width + outside
-    floor = top - cell.height + 0.02
-    edges = [view.box for view in shown]
-    if cell.stacked:
-        return [(left, max(box[1] - _FOOT, floor), right, box[3] + 0.2) for box in edges]
-    between = [0.5 * (a[2] + b[0]) for a, b in pairwise(edges)]
-    sides = pairwise([left, *between, right])
-    return [(start, floor, end, box[3] + 0.2) for (start, end), box in zip(sides, edges, strict=True)]
 
 
 def _grain(

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
 from warpflat.core.output import atomic_path
 from warpflat.core.text import plain_letters
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.drawing import draw_nest
-from warpflat.pattern.label import Words
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.words import printed_in
 
@@ -58,27 +56,21 @@ def write_plt(
             for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
                 line = stroke.points if stroke.curve is None else stroke.curve.sample(0.5 / UNITS_IN_METRE)
                 line = np.vstack([line, line[:1]]) if stroke.closed else line
-                written[PENS.get(stroke.role, _MARKS)].append(_line(placed.on_sheet(line)))
-            written[_MARKS] += [_text(words, placed.on_sheet(words.at[None])) for words in drawing.words]
+                # Pen up to its first point, down along the others.
+                units = np.rint(UNITS_IN_METRE * placed.on_sheet(line)).astype(np.int64)
+                moved = np.concatenate([[True], (np.diff(units, axis=0) != 0).any(axis=1)])
+                first, *others = [f"{x},{y}" for x, y in units[moved].tolist()]
+                down = f"PD{','.join(others)};" if others else "PD;"
+                written[PENS.get(stroke.role, _MARKS)].append(f"PU{first};{down}PU;")
+            for words in drawing.words:
+                # In the device's own letters, around its centre; those that ASCII lacks are written without their marks.
+                x, y = np.rint(UNITS_IN_METRE * placed.on_sheet(words.at[None])[0]).astype(np.int64).tolist()
+                letters = "".join(each if 32 <= ord(each) < 127 else "?" for each in plain_letters(words.text))
+                high, turn = 100.0 * words.height, f"DI{np.cos(words.angle):.4f},{np.sin(words.angle):.4f};"
+                size = f"SI{_WIDE * high:.3f},{high:.3f};"
+                written[_MARKS].append(f"PU{x},{y};LO5;{turn}{size}LB{letters}{_ETX};")
     rows = ["IN;"]
     for pen, lines in written.items():
         rows += [f"SP{pen};", *lines] if lines else []
     with atomic_path(path) as temporary:
         temporary.write_bytes("\n".join([*rows, "PU;SP0;", ""]).encode("ascii"))
-
-
-def _line(points: FloatArray) -> str:
-    """Return a line (#P by 2 [m]): pen up to its first point, down along the others."""
-    units = np.rint(UNITS_IN_METRE * points).astype(np.int64)
-    moved = np.concatenate([[True], (np.diff(units, axis=0) != 0).any(axis=1)])
-    first, *others = [f"{x},{y}" for x, y in units[moved].tolist()]
-    return f"PU{first};" + (f"PD{','.join(others)};" if others else "PD;") + "PU;"
-
-
-def _text(words: Words, at: FloatArray) -> str:
-    """Return one line of text around its centre, in the device's own letters; those that ASCII lacks are written without their marks."""
-    x, y = np.rint(UNITS_IN_METRE * at[0]).astype(np.int64).tolist()
-    letters = "".join(each if 32 <= ord(each) < 127 else "?" for each in plain_letters(words.text))
-    high = 100.0 * words.height
-    size = f"SI{_WIDE * high:.3f},{high:.3f};"
-    return f"PU{x},{y};LO5;DI{np.cos(words.angle):.4f},{np.sin(words.angle):.4f};{size}LB{letters}{_ETX};"

@@ -280,7 +280,12 @@ def fabric_from_table(
         origins.update((key, origin) for key, (_, origin) in given.items())
         for key in ("stiffness_warp", "stiffness_weft", "shear_stiffness", "areal_density"):
             if key not in values:
-                raise InputError(f"fabric {name!r}: {key} is missing; {_how_to_give(key)}")
+                given_as = f"{key} = 2000.0 (N/m), a [kes] or [fast] table with readings,"
+                if not key.startswith("stiffness"):
+                    example = {"shear_stiffness": "26.0 (N/m per rad)", "areal_density": "0.168 (kg/m2)"}[key]
+                    reading = {"shear_stiffness": "kes.g or fast.eb5", "areal_density": "kes.w or fast.w"}[key]
+                    given_as = f"{key} = {example}, the reading {reading},"
+                raise InputError(f"fabric {name!r}: {key} is missing; write {given_as} or base = another fabric")
         values["description"] = table.description or values.get("description", "")
         return Fabric(name=name, aliases=tuple(table.aliases), provenance=origins, **values)
     except InputError as error:
@@ -314,11 +319,3 @@ def _curve(curve: CurveTable, factor: float) -> Curve:
             strain = e0 + part * (e1 - e0)
             points.append((strain, (k0 + part * (k1 - k0)) * factor * strain))
     return tuple(points)
-
-
-def _how_to_give(key: str) -> str:
-    if key.startswith("stiffness"):
-        return f"write {key} = 2000.0 (N/m), a [kes] or [fast] table with readings, or base = another fabric"
-    example = {"shear_stiffness": "26.0 (N/m per rad)", "areal_density": "0.168 (kg/m2)"}[key]
-    reading = {"shear_stiffness": "kes.g or fast.eb5", "areal_density": "kes.w or fast.w"}[key]
-    return f"write {key} = {example}, the reading {reading}, or base = another fabric"

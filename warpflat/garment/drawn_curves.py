@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import turning_angles
 from warpflat.garment.constraints import Constraint, DrawnLine, FixedLength, Straight
 from warpflat.garment.edge_rules import HEMMED_LEVELS
@@ -139,7 +139,18 @@ def plan_curves(
                 continue
             points, grid = positions[name][vertices], piece.grid_vertices[vertices]
             mirrored = vertices[0] in on_fold, vertices[-1] in on_fold
-            book, wanted = _book_line(layout, form, grid, part, free=(name, edge) not in sewn)
+            # Where a book draws the edge straight, and which of its vertices that are.
+            heights = form.vertices[grid, 1]
+            hip = float(form.vertices[layout.rings[layout.level_row["hip"]], 1].mean())
+            free = (name, edge) not in sewn
+            if free and part.split(" ")[0] in HEMMED_LEVELS:
+                book, wanted = "all", np.ones(len(grid), dtype=bool)
+            elif part.startswith("side") and heights.min() < hip - 0.05:
+                book, wanted = "below hip", heights < hip + 1e-3
+            elif part.startswith(STRAIGHT_EDGES):
+                book, wanted = "all", np.ones(len(grid), dtype=bool)
+            else:
+                book, wanted = "", np.zeros(len(grid), dtype=bool)
             away = fair_line(points, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
             straight = bool(wanted.any()) and away <= bound
             kept = wanted if straight else None
@@ -213,16 +224,3 @@ def _open_edges(form: FormResult, name: str, flat: FloatArray) -> Iterator[tuple
         corners = np.flatnonzero(sharp) + 1
         for first, last in zip([0, *corners], [*corners, len(vertices) - 1], strict=True):
             yield edge, vertices[first : last + 1]
-
-
-def _book_line(layout: Layout, form: FormResult, grid: IntArray, edge: str, *, free: bool) -> tuple[str, BoolArray]:
-    """Return where a book draws an edge straight, and which of its vertices that are."""
-    heights = form.vertices[grid, 1]
-    hip = float(form.vertices[layout.rings[layout.level_row["hip"]], 1].mean())
-    if free and edge.split(" ")[0] in HEMMED_LEVELS:
-        return "all", np.ones(len(grid), dtype=bool)
-    if edge.startswith("side") and heights.min() < hip - 0.05:
-        return "below hip", heights < hip + 1e-3
-    if edge.startswith(STRAIGHT_EDGES):
-        return "all", np.ones(len(grid), dtype=bool)
-    return "", np.zeros(len(grid), dtype=bool)

@@ -26,7 +26,7 @@ from warpflat.solver.equations import relax_under_equations
 from warpflat.solver.grain import GrainAlignment
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.steps import Relaxation
-from warpflat.surface.cells import CellArrays, first_of_faces
+from warpflat.surface.cells import first_of_faces
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.falloff import falloff_weights
 from warpflat.surface.half_edges import half_edges_of
@@ -71,7 +71,17 @@ def give_fullness(
     warp, weft = axes = grain_axes(piece.grain_angle)
     # The network at rest where the layout is wider by its fullness.
     springs = _wider_springs(piece.network, piece.positions, axes, full)
-    cells = _wider_cells(piece.network.cell_arrays, piece.positions, axes, full)
+    # Cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S.
+    cells = piece.network.cell_arrays
+    here = full[cells.corner].mean(axis=1)
+    widen = sum(here[:, k, None, None] * np.outer(axis, axis) for k, axis in enumerate(axes))
+    p = piece.positions[cells.corner]
+    flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
+    a, b = np.moveaxis(cells.edges @ np.linalg.solve(flat, widen @ flat), -1, 0)
+    # The first side lies along x again: F matters only up to a rotation.
+    length = np.maximum(np.linalg.norm(a, axis=1), np.finfo(np.float64).tiny)
+    across = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / length
+    cells = replace(cells, laid=np.column_stack([length, np.einsum("ij,ij->i", a, b) / length, across]))
     network = replace(piece.network, spring_arrays=springs, cell_arrays=cells)
     if network.model == "membrane":
         stretch = network.stretch
@@ -209,18 +219,3 @@ def _stretch_factor(vector: FloatArray, full: FloatArray) -> FloatArray:
     """Return by what factor a vector (along warp and weft) becomes longer once each component has its own factor."""
     length = np.maximum(np.linalg.norm(vector, axis=1), np.finfo(np.float64).tiny)
     return np.asarray(np.linalg.norm(vector * full, axis=1) / length)
-
-
-def _wider_cells(
-    cells: CellArrays, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
-) -> CellArrays:
-    """Return cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S."""
-    here = full[cells.corner].mean(axis=1)
-    widen = sum(here[:, k, None, None] * np.outer(axis, axis) for k, axis in enumerate(axes))
-    p = positions[cells.corner]
-    flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
-    a, b = np.moveaxis(cells.edges @ np.linalg.solve(flat, widen @ flat), -1, 0)
-    # The first side lies along x again: F matters only up to a rotation.
-    length = np.maximum(np.linalg.norm(a, axis=1), np.finfo(np.float64).tiny)
-    across = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / length
-    return replace(cells, laid=np.column_stack([length, np.einsum("ij,ij->i", a, b) / length, across]))

@@ -132,7 +132,21 @@ def find_rings(
     An edge of the mannequin is free where just one piece has it on its border, and once: seams and legs of darts have
     it twice. The mirror images of half pieces count, and the fold does not.
     """
-    free = {ends: own[0] for ends, own in _border(mannequin, form, positions).items() if len(own) == 1}
+    # The lengths [m] of the mannequin's edges on the borders of pieces, one per piece and side, folds left out.
+    image, used = mannequin.layout.mirror, np.concatenate([piece.grid_vertices for piece in form.pieces.values()])
+    # A half garment has the body's left alone; the middle is its own mirror image.
+    half = not np.isin(image[used], used).all()
+    border: dict[tuple[int, int], list[float]] = {}
+    for name, piece in form.pieces.items():
+        for edge, ids in piece.edges.items():
+            if edge == piece.fold:
+                continue
+            lengths = np.linalg.norm(np.diff(positions[name][ids], axis=0), axis=1).tolist()
+            grid = piece.grid_vertices[ids]
+            for row in (grid, image[grid]) if half else (grid,):
+                for (a, b), length in zip(itertools.pairwise(row.tolist()), lengths, strict=True):
+                    border.setdefault((min(a, b), max(a, b)), []).append(length)
+    free = {ends: lengths[0] for ends, lengths in border.items() if len(lengths) == 1}
     neighbours: dict[int, list[int]] = {}
     for a, b in free:
         neighbours.setdefault(a, []).append(b)
@@ -181,26 +195,6 @@ def _line_of(name: str) -> str:
     """Return the line of a ring's name: a second ring at "hip" is "hip 2"."""
     head, _, tail = name.rpartition(" ")
     return head if tail.isdigit() else name
-
-
-def _border(
-    mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
-) -> dict[tuple[int, int], list[float]]:
-    """Return the lengths [m] of the mannequin's edges on the borders of pieces, one per piece and side, folds left out."""
-    image, used = mannequin.layout.mirror, np.concatenate([piece.grid_vertices for piece in form.pieces.values()])
-    # A half garment has the body's left alone; the middle is its own mirror image.
-    half = not np.isin(image[used], used).all()
-    found: dict[tuple[int, int], list[float]] = {}
-    for name, piece in form.pieces.items():
-        for edge, ids in piece.edges.items():
-            if edge == piece.fold:
-                continue
-            lengths = np.linalg.norm(np.diff(positions[name][ids], axis=0), axis=1).tolist()
-            grid = piece.grid_vertices[ids]
-            for row in (grid, image[grid]) if half else (grid,):
-                for (a, b), length in zip(itertools.pairwise(row.tolist()), lengths, strict=True):
-                    found.setdefault((min(a, b), max(a, b)), []).append(length)
-    return found
 
 
 def _passes_over(

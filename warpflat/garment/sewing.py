@@ -211,6 +211,19 @@ def sew(
     if state.network.seams is not None:
         offset = state.network.seams.offset.numpy()
         offsets = {key: offset[numbers] for key, numbers in _held(equations, kinds)}
+    of_folds = []
+    if folds:
+        # Folds with their costs, by the forces of the lines that hold them.
+        position, freedom = state.positions(), state.network.bonds.freedom
+        saved = freedom.numpy().copy()
+        freedom.fill_(wp.vec2d(1.0, 1.0))
+        force = state.forces()
+        freedom.assign(saved)
+        for name, ids in folds.items():
+            line = joined.numbers(name, ids)
+            moved = position[line, 0] - unsewn[line, 0]
+            cost, bend = -0.5 * float(force[line, 0] @ (moved - moved.mean())), float(np.ptp(position[line, 0]))
+            of_folds.append(ConstraintResult(name=f"{name} fold", kind="fold", cost=cost, violation=bend))
     return Sewn(
         pieces=sewn,
         converged=converged,
@@ -218,10 +231,7 @@ def sew(
         steps=state.steps,
         energy_before=sum(_potential(piece.network, piece.positions) for piece in pieces.values()),
         energy_after=sum(_potential(piece.network, piece.positions) for piece in sewn.values()),
-        results=(
-            *_constraint_results(state, equations, kinds, ended.residuals, unsewn),
-            *_fold_results(state, joined, folds, unsewn),
-        ),
+        results=(*_constraint_results(state, equations, kinds, ended.residuals, unsewn), *of_folds),
         seconds=seconds,
         offsets=offsets,
     )
@@ -343,29 +353,6 @@ def _constraint_results(
         ConstraintResult(name=name, kind=kind, cost=float(cost[number]), violation=float(violation[number]))
         for number, (name, kind) in enumerate(kinds)
     ]
-
-
-def _fold_results(
-    state: Relaxation, joined: SewingNetwork, folds: Mapping[str, IntArray], unsewn: FloatArray
-) -> list[ConstraintResult]:
-    """Return folds with their costs, by the forces of the lines that hold them."""
-    if not folds:
-        return []
-    position = state.positions()
-    freedom = state.network.bonds.freedom
-    saved = freedom.numpy().copy()
-    freedom.fill_(wp.vec2d(1.0, 1.0))
-    force = state.forces()
-    freedom.assign(saved)
-    results = []
-    for name, ids in folds.items():
-        line = joined.numbers(name, ids)
-        moved = position[line, 0] - unsewn[line, 0]
-        cost = -0.5 * float(force[line, 0] @ (moved - moved.mean()))
-        results.append(
-            ConstraintResult(name=f"{name} fold", kind="fold", cost=cost, violation=float(np.ptp(position[line, 0])))
-        )
-    return results
 
 
 def _straighten_fold(piece: Flattening, vertices: IntArray | None) -> FloatArray:

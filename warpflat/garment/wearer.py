@@ -23,7 +23,6 @@ from warpflat.mannequin.layout import QUARTERS
 if TYPE_CHECKING:
     from warpflat.fabric.fabric import Fabric
     from warpflat.mannequin.forms import FormResult
-    from warpflat.mannequin.layout import Layout
     from warpflat.mannequin.mannequin import Mannequin
 
 __all__ = ["BodyFit", "WearerFit", "assess_wearer", "tension_around"]
@@ -168,7 +167,19 @@ def assess_wearer(
         )  # fmt: skip
     if not rows:
         return None
-    pieces = _by_face(mannequin.layout, form, rows)
+    # Strain and pressure on the faces of every piece: means of those at their corners that lie on a row.
+    count = mannequin.layout.vertex_count
+    taut, pressed = np.full(count, np.nan), np.full(count, np.nan)
+    for row in rows:
+        taut[row.vertices] = row.strain if row.strain > 0.0 else -row.looseness
+        pressed[row.vertices] = row.pressure
+    pieces = {}
+    for key, piece in form.pieces.items():
+        corners = piece.grid_vertices[piece.surface.faces]
+        known = np.isfinite(taut[corners])
+        having = np.where(known.any(axis=1), known.sum(axis=1), np.nan)
+        of_faces = [np.where(known, values[corners], 0.0).sum(axis=1) / having for values in (taut, pressed)]
+        pieces[key] = BodyFit(strain=of_faces[0], pressure=of_faces[1])
     areas = {name: face_areas(positions[name], np.asarray(piece.surface.faces)) for name, piece in form.pieces.items()}
     return WearerFit(rows=tuple(rows), limit=fabric.strain_limit, pieces=pieces, areas=areas)
 
@@ -231,19 +242,3 @@ def _row_name(levels: Mapping[str, int], row: int, heights: FloatArray) -> tuple
         nearest if abs(away) < _AT_LEVEL else f"{1e3 * abs(away):.0f} mm {'above' if away > 0.0 else 'below'} {nearest}"
     )
     return nearest if levels[nearest] == row else "", place
-
-
-def _by_face(layout: Layout, form: FormResult, rows: list[_Row]) -> dict[str, BodyFit]:
-    """Return strain and pressure on the faces of every piece, means of those at their corners that lie on a row."""
-    strain, pressure = np.full(layout.vertex_count, np.nan), np.full(layout.vertex_count, np.nan)
-    for row in rows:
-        strain[row.vertices] = row.strain if row.strain > 0.0 else -row.looseness
-        pressure[row.vertices] = row.pressure
-    found = {}
-    for name, piece in form.pieces.items():
-        corners = piece.grid_vertices[piece.surface.faces]
-        known = np.isfinite(strain[corners])
-        count = np.where(known.any(axis=1), known.sum(axis=1), np.nan)
-        of_faces = [np.where(known, values[corners], 0.0).sum(axis=1) / count for values in (strain, pressure)]
-        found[name] = BodyFit(strain=of_faces[0], pressure=of_faces[1])
-    return found

@@ -268,37 +268,24 @@ def smooth_equations(line: IntArray, positions: FloatArray, fold: IntArray | Non
     springs, reach = [], 1
     while reach == 1 or (2 * reach * step <= WAVE and 2 * reach < len(line)):
         soft = SMOOTH * WAVE / (2 * step) / reach**2
-        springs.append(_from_chords(line, positions, reach, soft))
+        # Each vertex keeps its distance from the chord of those `reach` edges before and after.
+        here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
+        chord, away = positions[after] - positions[before], positions[here] - positions[before]
+        cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
+        distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
+        held = _equations(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
+        springs.append(replace(held, soft=np.full(len(here), soft)))
         if fold is not None:
-            springs.append(_from_mirror_image(line, positions, fold, reach, soft))
+            # Ends on a fold keep their distance from the chord between the vertex `reach` edges before and its mirror image.
+            rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
+            ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
+            coefficient = np.zeros((len(rows), 4, 2))
+            coefficient[:, 0, 1], coefficient[:, 1, 1] = -1.0, 1.0
+            target = np.einsum("pjk,pjk->p", coefficient, positions[ends])
+            held = _equations(ends, LINEAR, target=target, coefficient=coefficient, tolerance=np.inf)
+            springs.append(replace(held, soft=np.full(len(rows), soft / 2)))
         reach *= 2
     return one_group(*springs)
-
-
-def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float) -> ConstraintEquations:
-    """Return springs that hold each vertex's distance from the chord of those `reach` edges before and after."""
-    here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
-    chord, away = positions[after] - positions[before], positions[here] - positions[before]
-    cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
-    distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
-    springs = _equations(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
-    return replace(springs, soft=np.full(len(here), soft))
-
-
-def _from_mirror_image(
-    line: IntArray, positions: FloatArray, fold: IntArray, reach: int, soft: float
-) -> ConstraintEquations:
-    """Return springs that hold the ends on a fold at their distance from the chord to the vertex `reach` edges before.
-
-    The chord runs between that vertex and its mirror image.
-    """
-    rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
-    ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
-    coefficient = np.zeros((len(rows), 4, 2))
-    coefficient[:, 0, 1], coefficient[:, 1, 1] = -1.0, 1.0
-    target = np.einsum("pjk,pjk->p", coefficient, positions[ends])
-    springs = _equations(ends, LINEAR, target=target, coefficient=coefficient, tolerance=np.inf)
-    return replace(springs, soft=np.full(len(rows), soft / 2))
 
 
 def level_equations(line: IntArray, across: FloatArray) -> ConstraintEquations:

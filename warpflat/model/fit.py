@@ -113,22 +113,21 @@ class WornFit:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entries for `metrics.json`: fractions, N/m and Pa, with percentiles by area, extremes and mean."""
+        distributions = {}
+        for name in MAPS:
+            values, percents = getattr(self, name), (5, 50, 95)
+            at = weighted_percentiles(values, self.area, [percent / 100 for percent in percents])
+            percentiles = {f"p{percent:02d}": value for percent, value in zip(percents, at, strict=True)}
+            mean = float(values @ self.area) / max(float(self.area.sum()), 1e-300)
+            distributions[name] = {"min": float(values.min()), **percentiles, "max": float(values.max()), "mean": mean}
         return {
             "fits": self.fits,
             "strain_limit": self.limit,
             "outside": self.outside,
             "hollow": self.hollow,
             "where_not": [misfit.words for misfit in self.misfits[:3]],
-            **{name: _distribution(getattr(self, name), self.area) for name in MAPS},
+            **distributions,
         }
-
-
-def _distribution(values: FloatArray, area: FloatArray) -> dict[str, float]:
-    percents = (5, 50, 95)
-    at = weighted_percentiles(values, area, [percent / 100 for percent in percents])
-    percentiles = {f"p{percent:02d}": value for percent, value in zip(percents, at, strict=True)}
-    mean = float(values @ area) / max(float(area.sum()), 1e-300)
-    return {"min": float(values.min()), **percentiles, "max": float(values.max()), "mean": mean}
 
 
 def assess_pattern(surface: Surface, fabric: Fabric, pattern: ArrayLike, *, grain_angle: float = 0.0) -> WornFit:

@@ -48,12 +48,46 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
     stretches = [net.stretch for net in networks if net.stretch is not None]
     held = [net.held_stiffness for net in networks if net.held_stiffness is not None]
     buckling = np.concatenate([np.broadcast_to(net.buckling_stiffness, net.face_count) for net in networks])
+    # Springs are numbered mesh edges first, then diagonals, as in each network.
+    springs = [net.spring_arrays for net in networks]
+    edge = range_offsets([s.edge_count for s in springs])
+    diagonal = edge[-1] + range_offsets([s.count - s.edge_count for s in springs])
+    around = [s.around for s in springs]
+    numbers = [
+        of.entry + np.where(of.entry < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
+        for k, (s, of) in enumerate(zip(springs, around, strict=True))
+    ]
+    spring_arrays = SpringArrays(
+        around=SpringsAround(
+            offset=_join_offsets([a.offset for a in around]),
+            neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
+            entry=np.concatenate(numbers),
+        ),
+        listed_length=np.concatenate([s.listed_length for s in springs]),
+        listed_stiffness=np.concatenate([s.listed_stiffness for s in springs]),
+        edge_count=int(edge[-1]),
+        shear_deficit=_join_face_values(networks, "shear_deficit", 2),
+        hourglass=_join_face_values(networks, "hourglass", 4),
+    )
+    cells = [net.cell_arrays for net in networks]
+    face, of_cells = range_offsets([len(c.faces) for c in cells]), range_offsets([len(c.laid) for c in cells])
+    cell_arrays = CellArrays(
+        faces=np.concatenate(
+            [np.where(c.faces >= 0, c.faces + at, np.int32(-1)) for c, at in zip(cells, vertex, strict=False)]
+        ),
+        first=np.concatenate([c.first + at for c, at in zip(cells, of_cells, strict=False)]),
+        laid=np.concatenate([c.laid for c in cells]),
+        around=VertexLists(
+            offset=_join_offsets([c.around.offset for c in cells]),
+            entry=np.concatenate([a.entry + 4 * at for a, at in zip([c.around for c in cells], face, strict=False)]),
+        ),
+    )
     return SpringNetwork(
         surface=join_surfaces([net.surface for net in networks]),
         fabric=first.fabric,
         grain_angle=first.grain_angle,
-        spring_arrays=_join_springs(networks, vertex),
-        cell_arrays=_join_cells(networks, vertex),
+        spring_arrays=spring_arrays,
+        cell_arrays=cell_arrays,
         device=first.device,
         model=first.model,
         stretch=np.concatenate(stretches) if stretches else None,
@@ -69,52 +103,6 @@ def _join_face_values(networks: Sequence[SpringNetwork], name: str, depth: int) 
         return None
     return np.concatenate(
         [np.zeros((net.face_count, depth)) if of is None else of for net, of in zip(networks, arrays, strict=True)]
-    )
-
-
-def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> SpringArrays:
-    """Join springs, numbered mesh edges first, then diagonals, as in each network.
-
-    Args:
-        networks: the parts.
-        vertex: #parts, the first vertex of each in the joined numbering.
-    """
-    springs = [net.spring_arrays for net in networks]
-    edge = range_offsets([s.edge_count for s in springs])
-    diagonal = edge[-1] + range_offsets([s.count - s.edge_count for s in springs])
-    around = [s.around for s in springs]
-    numbers = [
-        of.entry + np.where(of.entry < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
-        for k, (s, of) in enumerate(zip(springs, around, strict=True))
-    ]
-    return SpringArrays(
-        around=SpringsAround(
-            offset=_join_offsets([a.offset for a in around]),
-            neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
-            entry=np.concatenate(numbers),
-        ),
-        listed_length=np.concatenate([s.listed_length for s in springs]),
-        listed_stiffness=np.concatenate([s.listed_stiffness for s in springs]),
-        edge_count=int(edge[-1]),
-        shear_deficit=_join_face_values(networks, "shear_deficit", 2),
-        hourglass=_join_face_values(networks, "hourglass", 4),
-    )
-
-
-def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArrays:
-    cells = [net.cell_arrays for net in networks]
-    face, cell = range_offsets([len(c.faces) for c in cells]), range_offsets([len(c.laid) for c in cells])
-    around = [c.around for c in cells]
-    return CellArrays(
-        faces=np.concatenate(
-            [np.where(c.faces >= 0, c.faces + at, np.int32(-1)) for c, at in zip(cells, vertex, strict=False)]
-        ),
-        first=np.concatenate([c.first + at for c, at in zip(cells, cell, strict=False)]),
-        laid=np.concatenate([c.laid for c in cells]),
-        around=VertexLists(
-            offset=_join_offsets([a.offset for a in around]),
-            entry=np.concatenate([a.entry + 4 * at for a, at in zip(around, face, strict=False)]),
-        ),
     )
 
 

@@ -185,7 +185,11 @@ def springs_of(
     quads: dict[str, Any] = {}
     if not is_quad.all():
         triangles, first = selected_rows(faces, ~is_quad), selected_rows(first_of_faces(surface, 4, 3), ~is_quad)
-        given = [surface.vertices, position, triangles, first, wp.vec2d(*warp), _compliance(fabric)]
+        # 1/K(theta) of a strip cut at the angle theta from the warp and pulled along itself [m/N] has these coefficients of
+        # cos^4, sin^4 and sin^2 cos^2: 1/K_warp, 1/K_weft and 1/G - 2 nu/K_warp.
+        cross = 1.0 / fabric.shear_stiffness - 2.0 * fabric.poisson_ratio / fabric.stiffness_warp
+        compliance = wp.vec3d(1.0 / fabric.stiffness_warp, 1.0 / fabric.stiffness_weft, cross)
+        given = [surface.vertices, position, triangles, first, wp.vec2d(*warp), compliance]
         launch_each(weigh_triangles, len(triangles), given, [of_side])
     if is_quad.any():
         lattice, angle = _lattice(fabric, selected_rows(faces, is_quad), position, warp)
@@ -290,17 +294,6 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
 def _off_threads(angle: float) -> float:
     """Return the angle between a direction at `angle` [rad] from the warp and the nearer of warp and weft [rad]."""
     return float(abs(angle - np.round(angle / _QUARTER) * _QUARTER))
-
-
-def _compliance(fabric: Fabric) -> wp.vec3d:
-    """Return the coefficients of cos^4, sin^4 and sin^2 cos^2 in 1/K(theta) [m/N].
-
-    They are 1/K_warp, 1/K_weft and 1/G - 2 nu/K_warp.
-
-    K(theta) is the stiffness of a strip cut at the angle theta from the warp and pulled along itself.
-    """
-    cross = 1.0 / fabric.shear_stiffness - 2.0 * fabric.poisson_ratio / fabric.stiffness_warp
-    return wp.vec3d(1.0 / fabric.stiffness_warp, 1.0 / fabric.stiffness_weft, cross)
 
 
 def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: FloatArray) -> tuple[Lattice, float]:

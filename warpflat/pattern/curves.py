@@ -135,46 +135,33 @@ def fit_curve(
     from_end = bool(np.abs(turning_angles(clean)) @ (arc[1:-1] / arc[-1] - 0.5) > 1e-9)
     if from_end:
         clean, wanted = clean[::-1], None if wanted is None else wanted[-1] - wanted[::-1]
-    breaks = [0, *_corners(clean, tolerance), len(clean) - 1]
+    # Corners; along a zigzag only those that are so over a longer stretch, too.
+    sharp, arc = CORNER if tolerance <= TOLERANCE else CORNER_SMOOTHED, arc_lengths(clean)
+    corners: list[int] = (np.flatnonzero(np.abs(turning_angles(clean)) > sharp) + 1).tolist()
+    if tolerance > TOLERANCE:
+        reach = np.array([-1, 1]) * CORNER_REACH * tolerance
+        around = ((i, *points_at_lengths(clean, arc[i] + reach)) for i in corners)
+        corners = [i for i, a, b in around if abs(float(turning_angles(np.stack([a, clean[i], b]))[0])) > sharp]
+    breaks = [0, *corners, len(clean) - 1]
     runs = []
     for a, b in pairwise(breaks):
         run = clean[a : b + 1]
         curve = _fit_run(run, tolerance, None if wanted is None else wanted[a : b + 1] - wanted[a])
-        runs.append(_within_tolerance(curve, run, tolerance) if near else curve)
+        for share in INSIDE if near else ():
+            if farthest(curve.sample(), run) <= tolerance:
+                break
+            # The lengths [m] (#P) of a curve that runs inside the points, no more than a share of the tolerance.
+            step, turn = segment_lengths(run), np.abs(turning_angles(run))
+            both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
+            longer = np.maximum(0.0, step * both**2 / 24 - share * tolerance * both)
+            inside = np.concatenate([[0.0], np.cumsum(step + longer)])
+            # Measured on the chords by which the curve is drawn.
+            curve = _fit_run(run, tolerance, inside, room=tolerance - CHORD / 2)
+        runs.append(curve)
     whole = Curve(
         bezier=np.concatenate([run.bezier for run in runs]), straight=np.concatenate([run.straight for run in runs])
     )
     return whole.reversed() if from_end else whole
-
-
-def _corners(points: FloatArray, tolerance: float) -> list[int]:
-    """Return the inner points that are corners; along a zigzag, those that are so over a longer stretch too."""
-    sharp = CORNER if tolerance <= TOLERANCE else CORNER_SMOOTHED
-    found: list[int] = (np.flatnonzero(np.abs(turning_angles(points)) > sharp) + 1).tolist()
-    if tolerance <= TOLERANCE:
-        return found
-    arc = arc_lengths(points)
-    corners = []
-    for i in found:
-        near, far = points_at_lengths(points, arc[i] + np.array([-1, 1]) * CORNER_REACH * tolerance)
-        if abs(float(turning_angles(np.stack([near, points[i], far]))[0])) > sharp:
-            corners.append(i)
-    return corners
-
-
-def _within_tolerance(curve: Curve, points: FloatArray, tolerance: float) -> Curve:
-    """Return the curve, or one that is as much longer as it takes to keep within the tolerance of the points."""
-    # Measured on the chords by which the curve is drawn.
-    room = tolerance - CHORD / 2
-    for share in INSIDE:
-        if farthest(curve.sample(), points) <= tolerance:
-            break
-        # The lengths [m] (#P) of a curve that runs inside the points, no more than a share of the tolerance.
-        step, turn = segment_lengths(points), np.abs(turning_angles(points))
-        both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
-        longer = np.maximum(0.0, step * both**2 / 24 - share * tolerance * both)
-        curve = _fit_run(points, tolerance, np.concatenate([[0.0], np.cumsum(step + longer)]), room=room)
-    return curve
 
 
 def _fit_run(
@@ -449,36 +436,24 @@ class _LengthSystem:
         for axis in range(2):
             along = self._value * fit.place_error[:, axis, None] / self._tolerance
             gradient[:, axis] += np.bincount(self._at_points.ravel(), along.ravel(), minlength=len(gradient))
-        move = np.zeros_like(fit.control)
-        move[1:-1] = (self._move_few if self._few else self._move_many)(fit, gradient[1:-1])
-        return move
-
-    def _summed(self, row: NDArray[np.int64], number: NDArray[np.int64], value: FloatArray) -> FloatArray:
-        """Return a matrix with a column for each control point: the sum of values (#N by 4) by row (#N) and number (#N by 4)."""
-        shape = int(row[-1]) + 1, len(self._start)
-        flat = (row[:, None] * shape[1] + number).ravel()
-        return np.asarray(np.bincount(flat, value.ravel(), shape[0] * shape[1]).reshape(shape), dtype=np.float64)
-
-    def _move_few(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
-        """Solve the normal equations for the moves of the inner control points, #control - 2 by 2."""
-        span = np.repeat(np.arange(len(self._steps)), GAUSS)
-        rate = [self._summed(span, self._at_quadrature, self._slope * fit.rate[:, axis, None]) for axis in range(2)]
-        by_span = np.stack(rate, axis=2)[:, 1:-1].reshape(len(self._steps), -1)
-        length_rate = np.cumsum(by_span, axis=0) / self._length_weight
-        off = np.cumsum(fit.length_error) / self._length_weight
-        matrix = length_rate.T @ length_rate
-        matrix[::2, ::2] += self._fixed
-        matrix[1::2, 1::2] += self._fixed
-        solved = np.linalg.solve(matrix, -gradient.ravel() - length_rate.T @ off)
-        return np.asarray(solved, dtype=np.float64).reshape(-1, 2)
-
-    def _move_many(self, fit: _Fit, gradient: FloatArray) -> FloatArray:
-        """Solve the banded equations for the moves of the inner control points, #control - 2 by 2."""
-        # Thousands of small systems: `scipy.linalg.solve_banded` takes longer to check its arguments than to solve one.
+        move, gradient = np.zeros_like(fit.control), gradient[1:-1]
+        if self._few:
+            # The normal equations.
+            span = np.repeat(np.arange(len(self._steps)), GAUSS)
+            rate = [self._summed(span, self._at_quadrature, self._slope * fit.rate[:, axis, None]) for axis in range(2)]
+            by_span = np.stack(rate, axis=2)[:, 1:-1].reshape(len(self._steps), -1)
+            length_rate = np.cumsum(by_span, axis=0) / self._length_weight
+            off = np.cumsum(fit.length_error) / self._length_weight
+            matrix = length_rate.T @ length_rate
+            matrix[::2, ::2] += self._fixed
+            matrix[1::2, 1::2] += self._fixed
+            move[1:-1] = np.linalg.solve(matrix, -gradient.ravel() - length_rate.T @ off).reshape(-1, 2)
+            return move
+        # Thousands of small banded systems: `scipy.linalg.solve_banded` takes longer to check its arguments than to solve one.
         from scipy.linalg.lapack import dgbsv
 
-        rate = (self._slope[:, :, None] * fit.rate[:, None, :])[self._free] / -self._length_weight
-        band = self._fixed + np.bincount(self._to, np.concatenate([rate, rate]), minlength=len(self._fixed))
+        rates = (self._slope[:, :, None] * fit.rate[:, None, :])[self._free] / -self._length_weight
+        band = self._fixed + np.bincount(self._to, np.concatenate([rates, rates]), minlength=len(self._fixed))
         right = np.empty(self._size)
         right[self._of_control[1:-1]] = -gradient
         right[self._of_span] = fit.length_error / self._length_weight
@@ -487,8 +462,14 @@ class _LengthSystem:
         )
         if failed:
             raise np.linalg.LinAlgError("the spline's equations are singular")
-        moved: FloatArray = solved[self._of_control[1:-1]]
-        return moved
+        move[1:-1] = solved[self._of_control[1:-1]]
+        return move
+
+    def _summed(self, row: NDArray[np.int64], number: NDArray[np.int64], value: FloatArray) -> FloatArray:
+        """Return a matrix with a column for each control point: the sum of values (#N by 4) by row (#N) and number (#N by 4)."""
+        shape = int(row[-1]) + 1, len(self._start)
+        flat = (row[:, None] * shape[1] + number).ravel()
+        return np.asarray(np.bincount(flat, value.ravel(), shape[0] * shape[1]).reshape(shape), dtype=np.float64)
 
 
 def _cubic_basis(knots: FloatArray, at: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:

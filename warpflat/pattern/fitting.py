@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -70,7 +70,15 @@ def fit_edges(
                     break
             fitted[piece.name, edge.name] = curve, tried
     if tolerance is None:
-        for first, second, against, ease in _paired_edges(pieces, seams):
+        # Edges that are sewn to one other edge, whether they run against each other, and the second's ease.
+        pairs = list[tuple[EdgeKey, EdgeKey, bool, float]]()
+        for seam in seams:
+            (one, *more), (other, *others) = seam.sides
+            ends = (one.piece, one.edge), (other.piece, other.edge)
+            if not more and not others and ends[0] != ends[1]:
+                pairs.append((*ends, one.reversed != other.reversed, seam.ease))
+        pairs += [((p.name, dart.left), (p.name, dart.right), True, 0.0) for p in pieces for dart in p.darts]
+        for first, second, against, ease in pairs:
             wide = max(fitted[first][1], fitted[second][1])
             if wide > TOLERANCE and len(lines[first]) == len(lines[second]):
                 # Both sides of a ragged seam are smoothed, and get the lengths of the one that is then shorter.
@@ -210,21 +218,6 @@ def _difference(first: FloatArray, second: FloatArray, ease: Eased) -> float:
     near = worst_difference(first, second, *ease)
     whole = abs(second[-1] - first[-1] * (1 + ease[0])) / SEAM_TOLERANCE
     return float(whole if near is None else max(whole, near / LOCAL_TOLERANCE))
-
-
-def _paired_edges(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[EdgeKey, EdgeKey, bool, float]]:
-    """Yield edges that are sewn to one other edge, whether these run against each other, and the second's ease."""
-
-    def key(side: SeamSide) -> EdgeKey:
-        return side.piece, side.edge
-
-    for seam in seams:
-        (first, *more), (second, *others) = seam.sides
-        if not more and not others and key(first) != key(second):
-            yield key(first), key(second), first.reversed != second.reversed, seam.ease
-    for piece in pieces:
-        for dart in piece.darts:
-            yield (piece.name, dart.left), (piece.name, dart.right), True, 0.0
 
 
 def _lengths_along(curve: Curve, points: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import without_side
 from warpflat.pattern.curves import Curve, split_bezier
 from warpflat.pattern.draft import draft_half
-from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
+from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.piece_parts import Edge, Hole
 from warpflat.pattern.pieces import Piece, Seam
 
@@ -214,22 +214,18 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
             on_side.append(replace(notch, at=notch.at * flip + moved_by, base=bases, direction=notch.direction * flip))
     drawn = [shapely.LineString(line) for _, line in lines]
     nearest = [lines[int(np.argmin(shapely.distance(drawn, shapely.Point(notch.at))))][0] for notch in on_side]
-    notches = tuple(
-        _along_fold(replace(n, edge=edge, at=n.at + shift, base=tuple(base + shift for base in n.base)))
-        for n, edge in zip(on_side, nearest, strict=True)
-    )
-    return replace(draft_half(half, garment.name, tuple(edges), notches, piece.notes), enlarged=piece.enlarged)
-
-
-def _along_fold(notch: Notch) -> Notch:
-    """Return a notch with its slit along the fold, x = 0, if it lies there."""
-    if abs(notch.at[0]) > SYMMETRIC or len(notch.base) > 1:
-        return notch
-    upright = np.array([0.0, 1.0])
-    return replace(
-        notch, at=notch.at * upright, base=(notch.base[0] * upright,),
-        direction=np.sign(notch.direction[1]) * upright,
-    )  # fmt: skip
+    notches = []
+    for notch, name in zip(on_side, nearest, strict=True):
+        placed = replace(notch, edge=name, at=notch.at + shift, base=tuple(base + shift for base in notch.base))
+        if abs(placed.at[0]) <= SYMMETRIC and len(placed.base) == 1:
+            # Its slit runs along the fold, x = 0.
+            upright = np.array([0.0, 1.0])
+            placed = replace(
+                placed, at=placed.at * upright, base=(placed.base[0] * upright,),
+                direction=np.sign(placed.direction[1]) * upright,
+            )  # fmt: skip
+        notches.append(placed)
+    return replace(draft_half(half, garment.name, tuple(edges), tuple(notches), piece.notes), enlarged=piece.enlarged)
 
 
 def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None:

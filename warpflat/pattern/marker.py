@@ -227,6 +227,7 @@ def _length(placements: list[Copy]) -> float:
 
 def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seconds: int, seed: int) -> list[Copy]:
     """Nest the copies with sparrow, and return them in the order in which the cutter meets them."""
+    import shapely
     import spyrrow
 
     items, matrices, usable = [], [], cloth.width - 2 * cloth.gap
@@ -242,7 +243,12 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
             )
         matrices.append(matrix)
         angles = [0.0] if cloth.one_way else [0.0, 180.0]
-        items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in _simpler(cut).tolist()], 1, angles))
+        # A polygon with few corners that contains the cut line.
+        exact = shapely.Polygon(cut)
+        simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
+        simple = simple if simple.contains(exact) else exact
+        corners = np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
+        items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in corners.tolist()], 1, angles))
     instance = spyrrow.StripPackingInstance(name, usable * 1000, items)
     config = spyrrow.StripPackingConfig(
         total_computation_time=seconds, num_workers=1, seed=seed, min_items_separation=cloth.gap * 1000 or None
@@ -296,13 +302,6 @@ def _mirror(edge: DraftedEdge) -> Callable[[FloatArray], FloatArray]:
     return lambda points: (points - start) @ turn.T + start
 
 
-def _of_both_halves(piece: DraftedPiece, lines: list[FloatArray]) -> list[FloatArray]:
-    """Return lines (#P by 2 [m]) of a piece, with their mirror images where it is a half on the fold."""
-    for edge in piece.fold_edges:
-        lines = lines + [_mirror(edge)(line) for line in lines]
-    return lines
-
-
 def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> list[tuple[DraftedPiece, bool]]:
     """Return the copies to be cut, each with whether it is mirrored."""
     copies = []
@@ -327,16 +326,6 @@ def _onto_cloth(mirrored: bool) -> FloatArray:
     return np.array([[0.0, 1.0], [1.0, 0.0]]) if mirrored else np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
-def _simpler(cut: FloatArray) -> FloatArray:
-    """Return a polygon with few corners that contains the cut line."""
-    import shapely
-
-    exact = shapely.Polygon(cut)
-    simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
-    simple = simple if simple.contains(exact) else exact
-    return np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
-
-
 def _placed(
     piece: DraftedPiece,
     mirrored: bool,
@@ -348,7 +337,6 @@ def _placed(
     half: bool = False,
 ) -> Copy:
     """Return a copy at the solver's place; a half one where it lies against the fold of the cloth."""
-    both = (lambda lines: lines) if half else (lambda lines: _of_both_halves(piece, lines))
     angle = np.radians(degrees)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     matrix = np.column_stack([turn @ linear, np.array(shift) / 1000 + margin])
@@ -356,20 +344,22 @@ def _placed(
     def moved(points: FloatArray) -> FloatArray:
         return points @ matrix[:, :2].T + matrix[:, 2]
 
+    cutouts = [cutout.cut_line for cutout in piece.cutouts.values()]
+    slits = [np.stack([b, b + notch.depth * notch.direction]) for notch in piece.notches for b in notch.base]
+    for edge in () if half else piece.fold_edges:
+        # A half on the fold is cut with its mirror image.
+        cutouts, slits = ([*lines, *map(_mirror(edge), lines)] for lines in (cutouts, slits))
     return Copy(
         piece=piece,
         mirrored=mirrored,
         turned=abs(np.cos(angle) + 1) < 1e-6,
         matrix=matrix,
         cut_line=moved(piece.cut_line if half else unfold_piece(piece)),
-        cutouts=tuple(moved(line) for line in both([c.cut_line for c in piece.cutouts.values()])),
+        cutouts=tuple(map(moved, cutouts)),
         fold_lines=tuple(moved(edge.line) for edge in piece.fold_edges),
         grain=moved(piece.grain),
         name=None,
-        notches=tuple(
-            moved(slit)
-            for slit in both([np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base])
-        ),
+        notches=tuple(map(moved, slits)),
     )
 
 

@@ -71,7 +71,17 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
         first, second = (SeamLine(side, pieces) for side in seam.sides)
         # A piece that is sewn to its own mirror image has one edge for both sides.
         lines = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
-        for fraction in _fractions(seam, first, second):
+        # The fractions of the seam's length at which it is notched.
+        if seam.notches is not None:
+            fractions = list(seam.notches)
+        elif first.length < SHORTEST:
+            fractions = []
+        else:
+            count = max(1, round(first.length / SPACING))
+            joints = np.concatenate([first.joints / first.length, second.joints / second.length])
+            evenly = ((np.arange(count) + 0.42) / count).tolist()
+            fractions = [f for f in evenly if np.abs(joints - f).min() * first.length > CLEAR]
+        for fraction in fractions:
             for piece, notch in _notch_pair(seam, lines, fraction):
                 notches.setdefault(piece, []).append(notch)
         for line, other in ((first, second), (second, first)):
@@ -103,18 +113,6 @@ def _notch_pair(seam: Seam, lines: Sequence[SeamLine], fraction: float) -> list[
         if len(matched) == len(found):
             return matched
     return []
-
-
-def _fractions(seam: Seam, first: SeamLine, second: SeamLine) -> list[float]:
-    """Return the fractions of a seam's length at which it is notched."""
-    if seam.notches is not None:
-        return list(seam.notches)
-    if first.length < SHORTEST:
-        return []
-    count = max(1, round(first.length / SPACING))
-    fractions = (np.arange(count) + 0.42) / count
-    joints = np.concatenate([first.joints / first.length, second.joints / second.length])
-    return [float(f) for f in fractions if np.abs(joints - f).min() * first.length > CLEAR]
 
 
 def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:

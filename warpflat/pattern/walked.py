@@ -57,10 +57,21 @@ def _walk(seam: Seam, pieces: dict[str, DraftedPiece], size: str) -> WalkedSeam:
     lines = [SeamLine(side, pieces) for side in seam.sides]
     shares = np.linspace(0.0, 1.0, PLACES)
     opposite = np.array([seam.reach(float(share), 1.0) for share in shares]) / (1.0 + seam.ease)
-    drawn = [_joined(line) for line in lines]
+    # The edges of each side as one line, each running on from the one before, piece to the left.
+    drawn = []
+    for line in lines:
+        joined = np.zeros((0, 2))
+        for points, side in zip(line.lines, line.side, strict=True):
+            part = points * [1.0, -1.0] if side.reversed else points
+            if len(joined):
+                (x, y), (u, v) = joined[-1] - joined[-2], part[1] - part[0]
+                cosine, sine = np.array([x * u + y * v, u * y - v * x]) / (np.hypot(x, y) * np.hypot(u, v))
+                part = (part - part[0]) @ np.array([[cosine, sine], [-sine, cosine]]) + joined[-1]
+            joined = np.concatenate([joined, part[1:] if len(joined) else part])
+        drawn.append(joined)
     first, second = (
-        points_at_lengths(line, part * side.length)
-        for line, part, side in zip(drawn, (shares, opposite), lines, strict=True)
+        points_at_lengths(joined, part * line.length)
+        for joined, part, line in zip(drawn, (shares, opposite), lines, strict=True)
     )
     # Kabsch: the turn that brings the places nearest to each other.
     middles = first.mean(axis=0), second.mean(axis=0)
@@ -97,16 +108,3 @@ def _walk(seam: Seam, pieces: dict[str, DraftedPiece], size: str) -> WalkedSeam:
         difference_mm=1000.0 * (lines[1].length - lines[0].length * (1.0 + seam.ease)),
         notch_mm=notch_mm,
     )
-
-
-def _joined(line: SeamLine) -> FloatArray:
-    """Return the edges of one side as one line (#P by 2 [m]), each running on from the one before, piece to the left."""
-    joined = np.zeros((0, 2))
-    for points, side in zip(line.lines, line.side, strict=True):
-        part = points * [1.0, -1.0] if side.reversed else points
-        if len(joined):
-            (x, y), (u, v) = joined[-1] - joined[-2], part[1] - part[0]
-            cosine, sine = np.array([x * u + y * v, u * y - v * x]) / (np.hypot(x, y) * np.hypot(u, v))
-            part = (part - part[0]) @ np.array([[cosine, sine], [-sine, cosine]]) + joined[-1]
-        joined = np.concatenate([joined, part[1:] if len(joined) else part])
-    return joined

@@ -45,7 +45,18 @@ def whole_pieces(
         name for name, p in given.items() if name not in halves and (name in asked or (p.quantity == 2 and p.paired))
     }
     whole = {name: _unfolded(piece) if name in halves else piece for name, piece in given.items() if name in sewn}
-    whole |= {name + MIRRORED: _turned(given[name]) for name in twice if name in sewn}
+    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
+    for piece in [given[name] for name in twice if name in sewn]:
+        # Cut turned over.
+        turned = [replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]]
+        title = piece.name + MIRRORED
+        whole[title] = replace(
+            piece, name=title, edges=turned, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
+            holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
+            internal_lines={name: line * across for name, line in piece.internal_lines.items()},
+            grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
+            placement=None if piece.placement is None else flip @ piece.placement @ flip,
+        )  # fmt: skip
     found: list[Seam] = []
     taken: set[tuple[str, str]] = set()
     # Seams on the other side of the body.
@@ -64,22 +75,15 @@ def whole_pieces(
                 raise InputError(f"seam {seam.name!r}: {side.piece!r} is not cut; its piece needs a quantity of 2")
         taken |= edges
         found.append(plain)
-    found += [seam for piece in whole.values() for seam in _dart_seams(piece)]
+    for piece in whole.values():
+        darts = [(dart.name, dart.left, dart.right) for dart in piece.darts]
+        darts += [(hole.name, f"{hole.name} left", f"{hole.name} right") for hole in piece.holes if hole.kind == "dart"]
+        for name, left, right in darts:
+            legs = SeamSide(piece=piece.name, edge=left), SeamSide(piece=piece.name, edge=right, reversed=True)
+            found.append(Seam(name=f"{piece.name}.{name}", sides=((legs[0],), (legs[1],))))
     left_out = sorted(set(given) - sewn)
     notes = [f"left out, as no seam joins them: {', '.join(left_out)}"] if left_out else []
     return whole, found, notes
-
-
-def _dart_seams(piece: Piece) -> list[Seam]:
-    darts = [(dart.name, dart.left, dart.right) for dart in piece.darts]
-    darts += [(hole.name, f"{hole.name} left", f"{hole.name} right") for hole in piece.holes if hole.kind == "dart"]
-    return [
-        Seam(
-            name=f"{piece.name}.{name}",
-            sides=((SeamSide(piece=piece.name, edge=left),), (SeamSide(piece=piece.name, edge=right, reversed=True),)),
-        )
-        for name, left, right in darts
-    ]
 
 
 def hole_edges(hole: Hole) -> list[Edge]:
@@ -126,19 +130,6 @@ def _unfolded(piece: Piece) -> Piece:
     return replace(
         piece, edges=[*edges, *others], darts=[*piece.darts, *darts], holes=[*piece.holes, *holes],
         internal_lines={**piece.internal_lines, **lines},
-    )  # fmt: skip
-
-
-def _turned(piece: Piece) -> Piece:
-    """Return a piece cut turned over."""
-    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
-    edges = [replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]]
-    return replace(
-        piece, name=piece.name + MIRRORED, edges=edges, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
-        holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
-        internal_lines={name: line * across for name, line in piece.internal_lines.items()},
-        grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
-        placement=None if piece.placement is None else flip @ piece.placement @ flip,
     )  # fmt: skip
 
 

@@ -5,12 +5,10 @@ On the piece itself the paper's steps, which are good at what interpolation leav
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import warp as wp
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.launch import launch_each
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.model.network import SpringNetwork
@@ -22,7 +20,6 @@ from warpflat.solver.steps import Relaxation
 from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.cells import make_cells
 from warpflat.surface.grid import rows_and_columns
-from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 
 __all__ = ["coarse_minimum"]
@@ -59,9 +56,35 @@ def coarse_minimum(state: Relaxation) -> FloatArray:
         layout, left = untangle(surface, layout, least_area=_LEAST_AREA)
         if left:
             return start
-    network = _coarse_network(fine, surface, layout, face_of)
-    _calibrate(network, layout, fine, start)
-    alignments = _coarse_alignments(state.alignments, into, layout)
+    network = SpringNetwork.build(
+        surface,
+        fine.fabric,
+        layout,
+        grain_angle=fine.grain_angle,
+        device=fine.device,
+        model=fine.model,
+        stretch=None if fine.stretch is None else fine.stretch[face_of],
+        # Measured on the finest mesh only.
+        buckling_stiffness=float(fine.buckling_stiffness),
+    )
+    if network.model == "springs":
+        # Springs are weighed by direction, so that the network stores the fine one's energy under uniform strain. Edge springs on
+        # triangles store that energy only roughly, each mesh with an error of its own.
+        target, _ = _strain_fields(fine, start)
+        _, products = _strain_fields(network, layout, products=True)
+        factor = np.linalg.lstsq(products, target, rcond=1e-6)[0]
+        s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
+        given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_FACTOR_BOUNDS]
+        launch_each(weigh_by_direction, network.vertex_count, given, [stiffness])
+        network.replace_stiffness(stiffness)
+    # Chords run between the coarser mesh's vertices that are nearest to their ends.
+    alignments, every = [], np.arange(len(into))
+    for each in state.alignments:
+        lower, upper = int(into[each.lower]), int(into[each.upper])
+        chord = layout[upper] - layout[lower]
+        direction = tuple((chord / np.linalg.norm(chord)).tolist())
+        held = np.unique(into[every[each.vertices]]).astype(np.int32)
+        alignments.append(GrainAlignment(lower=lower, upper=upper, vertices=held, direction=direction))
     coarse = Relaxation(network, state.options, start=layout, alignments=alignments)
     coarse_minimum(coarse)
     relax(coarse)
@@ -76,51 +99,6 @@ def coarse_minimum(state: Relaxation) -> FloatArray:
     if not state.energies().potential < before:
         state.place(start)
     return state.positions()
-
-
-def _coarse_alignments(
-    alignments: Sequence[GrainAlignment], into: IntArray, layout: FloatArray
-) -> list[GrainAlignment]:
-    """Return the alignments by the vertices of the coarser mesh (`into`, #V) that are nearest to the ends of the chords."""
-    found, every = [], np.arange(len(into))
-    for each in alignments:
-        lower, upper = int(into[each.lower]), int(into[each.upper])
-        chord = layout[upper] - layout[lower]
-        direction = tuple((chord / np.linalg.norm(chord)).tolist())
-        own = np.unique(into[every[each.vertices]]).astype(np.int32)
-        found.append(GrainAlignment(lower=lower, upper=upper, vertices=own, direction=direction))
-    return found
-
-
-def _coarse_network(fine: SpringNetwork, surface: Surface, layout: FloatArray, face_of: IntArray) -> SpringNetwork:
-    """Return the network of a coarser surface, with directions measured in its layout; `face_of`: for each face a finer one."""
-    return SpringNetwork.build(
-        surface,
-        fine.fabric,
-        layout,
-        grain_angle=fine.grain_angle,
-        device=fine.device,
-        model=fine.model,
-        stretch=None if fine.stretch is None else fine.stretch[face_of],
-        # Measured on the finest mesh only.
-        buckling_stiffness=float(fine.buckling_stiffness),
-    )
-
-
-def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray) -> None:
-    """Weigh the springs of a coarse network by direction, so that it stores the fine one's energy under uniform strain.
-
-    Edge springs on triangles store that energy only roughly, each mesh with an error of its own.
-    """
-    if network.model != "springs":
-        return
-    target, _ = _strain_fields(fine, fine_layout)
-    _, products = _strain_fields(network, layout, products=True)
-    factor = np.linalg.lstsq(products, target, rcond=1e-6)[0]
-    s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
-    given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_FACTOR_BOUNDS]
-    launch_each(weigh_by_direction, network.vertex_count, given, [stiffness])
-    network.replace_stiffness(stiffness)
 
 
 def _strain_fields(network: SpringNetwork, layout: FloatArray, *, products: bool = False) -> tuple[FloatArray, ...]:

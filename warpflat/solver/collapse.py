@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 from scipy.sparse import csr_array, kron
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.core.compile import launch_quietly
 from warpflat.core.launch import record
 from warpflat.core.sums import range_offsets
@@ -87,7 +87,18 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
     place = np.empty(grid.size, dtype=np.int32)
     place[grid.ravel()] = np.arange(grid.size, dtype=np.int32)
     lines = [np.union1d(np.arange(0, count, 2), count - 1) for count in grid.shape]
-    between, nearest = zip(*(_linear(kept, count) for kept, count in zip(lines, grid.shape, strict=True)), strict=True)
+    # The weights by which the lines kept interpolate all of them, and the nearest of these to each.
+    between, nearest = list[csr_array](), list[IntArray]()
+    for line, count in zip(lines, grid.shape, strict=True):
+        every = np.arange(count)
+        before = np.minimum(np.searchsorted(line, every, side="right") - 1, len(line) - 2)
+        share = (every - line[before]) / (line[before + 1] - line[before])
+        entries = np.column_stack([1.0 - share, share]).ravel()
+        columns = np.column_stack([before, before + 1]).astype(np.int32).ravel()
+        weights = csr_array((entries, columns, 2 * np.arange(count + 1, dtype=np.int32)), shape=(count, len(line)))
+        weights.eliminate_zeros()
+        between.append(weights)
+        nearest.append(before + (share > 0.5))
     kept = grid[np.ix_(*lines)]
     number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
     faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
@@ -110,25 +121,25 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
     )
 
 
-def _linear(kept: IntArray, count: int) -> tuple[csr_array, IntArray]:
-    """Return the weights by which the lines kept interpolate all of them, `count` by #kept, and the nearest of these to each."""
-    every = np.arange(count)
-    before = np.minimum(np.searchsorted(kept, every, side="right") - 1, len(kept) - 2)
-    share = (every - kept[before]) / (kept[before + 1] - kept[before])
-    entries = np.column_stack([1.0 - share, share]).ravel()
-    columns = np.column_stack([before, before + 1]).astype(np.int32).ravel()
-    weights = csr_array((entries, columns, 2 * np.arange(count + 1, dtype=np.int32)), shape=(count, len(kept)))
-    weights.eliminate_zeros()
-    return weights, before + (share > 0.5)
-
-
 def coarsen(surface: Surface) -> Coarsening | None:
     """Make the next coarser mesh by edge collapses; None where none is worth having."""
     count = len(surface.vertices)
     triangles, face = surface.faces[:, :3], np.arange(len(surface.faces), dtype=np.int32)
     if surface.is_quad.any():
         triangles, face = triangulate(surface.faces)
-    ring = _make_ring(surface.vertices, triangles)
+    # The vertices around each vertex, in their order.
+    ring = Ring()
+    ring.vertices = _as_input(surface.vertices, wp.vec3d)
+    around = np.bincount(triangles.ravel(), minlength=count)
+    slots, sides = (range_offsets(places) for places in (np.maximum(around + 2, _RING_CAPACITY), around))
+    ring.offset = _as_input(slots, wp.int32)
+    ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
+    ring.neighbor = wp.empty(int(slots[-1]), dtype=wp.int32, device="cpu")
+    side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
+    begin, corners = _as_input(sides, wp.int32), _as_input(triangles, wp.vec3i)
+    launch_quietly(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
+    ordered = [ring.degree, ring.neighbor]
+    record(order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=ordered, device="cpu").launch()
     if ring.degree.numpy().min() < 0:
         return None
     target, beside, gone = (wp.zeros(count, dtype=wp.int32, device="cpu") for _ in range(3))
@@ -147,7 +158,11 @@ def coarsen(surface: Surface) -> Coarsening | None:
     weight = wp.empty(count, dtype=wp.vec3d, device="cpu")
     record(locate, dim=count, inputs=[ring, gone, target], outputs=[parent, weight], device="cpu").launch()
     kept = np.flatnonzero(gone.numpy() == 0).astype(np.int32)
-    into = _final_vertices(gone.numpy(), parent.numpy()[:, 0])
+    # The kept vertex into which each vertex has finally collapsed: pointers are doubled until they end there.
+    last = np.where(gone.numpy() == 0, np.arange(count, dtype=np.int32), parent.numpy()[:, 0])
+    for _ in range(int(gone.numpy().max()).bit_length()):
+        last = last[last]
+    into = (np.cumsum(gone.numpy() == 0, dtype=np.int32) - 1)[last]
     corners = into[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     corners = corners[whole]
@@ -163,19 +178,6 @@ def coarsen(surface: Surface) -> Coarsening | None:
     return Coarsening(surface=coarse, kept=kept, into=into, prolongation=prolongation, face_of=face[whole])
 
 
-def _final_vertices(gone: IntArray, into: IntArray) -> IntArray:
-    """Return the kept vertex into which each vertex has finally collapsed, #V, by its number among those kept.
-
-    Args:
-        gone: #V, the pass in which a vertex collapsed; 0 if it is kept.
-        into: #V, the vertex into which it collapsed then.
-    """
-    end = np.where(gone == 0, np.arange(len(gone), dtype=np.int32), into)
-    for _ in range(int(gone.max()).bit_length()):
-        end = end[end]
-    return (np.cumsum(gone == 0, dtype=np.int32) - 1)[end]
-
-
 def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: int) -> csr_array:
     """Return the weights of interpolation, #V by #C: a collapsed vertex has the weighted sum of its parents' rows."""
     count, capacity = len(gone), _ENTRIES * len(gone)
@@ -187,25 +189,6 @@ def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: in
         capacity *= 2
     kept, end = count - np.count_nonzero(gone.numpy()), offset[-1]
     return csr_array(csr_array((value[:end], column[:end], offset), shape=(count, kept))[row])
-
-
-def _make_ring(vertices: FloatArray, triangles: IntArray) -> Ring:
-    count = len(vertices)
-    ring = Ring()
-    ring.vertices = _as_input(vertices, wp.vec3d)
-    around = np.bincount(triangles.ravel(), minlength=count)
-    slots, sides = (range_offsets(places) for places in (np.maximum(around + 2, _RING_CAPACITY), around))
-    ring.offset = _as_input(slots, wp.int32)
-    ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
-    ring.neighbor = wp.empty(int(slots[-1]), dtype=wp.int32, device="cpu")
-    side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
-    begin, corners = _as_input(sides, wp.int32), _as_input(triangles, wp.vec3i)
-    launch_quietly(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
-    order = record(
-        order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=[ring.degree, ring.neighbor], device="cpu"
-    )
-    order.launch()
-    return ring
 
 
 def _as_input(values: np.ndarray[Any, Any], dtype: type) -> wp.array:

@@ -18,7 +18,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IndexArray
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.energy import NO_CONTACTS, Contacts, Energy, Point
+from warpflat.solver.energy import NO_CONTACTS, Contacts, Energy
 from warpflat.solver.grain import align_grain, remove_rotation
 from warpflat.solver.metric import LaplacianFactor, Metric
 from warpflat.solver.minimise import Cloth, Descent
@@ -98,35 +98,35 @@ class Barrier:
         self._border = np.full((len(length), 2), np.inf)
         self._near: tuple[IndexArray, IndexArray]
 
-    def _gaps(self, v: IndexArray, e: IndexArray) -> FloatArray:
-        """Return the gap between vertices (rows of the border) and edges, #N [m]."""
-        around, edges = self._around[v], self._edges
-        to_tail = np.abs(self._station[v] - self._station[e])
-        to_head = np.abs(self._station[v] - self._station[e] - self._length[e])
-        way = np.minimum(np.minimum(to_tail, around - to_tail), np.minimum(to_head, np.abs(around - to_head)))
-        way = np.where(edges.first[v] == edges.first[e], way, np.inf)
-        most = np.where(self._crack[v] & self._crack[e], _CRACK_GAP * self._gap, self._gap)
-        return np.minimum(most, self._slope * way)
-
-    def _near_edges(self, positions: FloatArray) -> tuple[IndexArray, IndexArray]:
-        """Return pairs of border edges within the gap and some more, looked for anew once the border has moved by that (Verlet)."""
-        border, margin = positions[self._edges.tail], _MARGIN * self._gap
-        if np.abs(border - self._border).max() > margin:
-            self._border, self._near = border, near_edges(self._edges, positions, self._gap + 2.0 * margin)
-        return self._near
-
     def __call__(self, positions: FloatArray) -> Contacts:
         """Return the contacts of a layout (#V by 2 [m])."""
-        edges = self._edges
-        i, j = self._near_edges(positions)
+        # Pairs of border edges within the gap and some more are looked for anew once the border has moved by that (Verlet).
+        edges, margin = self._edges, _MARGIN * self._gap
+        border = positions[edges.tail]
+        if np.abs(border - self._border).max() > margin:
+            self._border, self._near = border, near_edges(edges, positions, self._gap + 2.0 * margin)
+        i, j = self._near
         if len(crossings(edges, positions, (i, j))[0]):
             return _CROSSED
         v, e = np.concatenate([i, j]), np.concatenate([j, i])
         apart = (edges.tail[v] != edges.tail[e]) & (edges.tail[v] != edges.head[e])
         v, e = v[apart], e[apart]
-        gap = self._gaps(v, e)
+        # The gap between vertices and edges grows with the distance between them along the border.
+        around, tail = self._around[v], np.abs(self._station[v] - self._station[e])
+        head = np.abs(self._station[v] - self._station[e] - self._length[e])
+        along = np.minimum(np.minimum(tail, around - tail), np.minimum(head, np.abs(around - head)))
+        along = np.where(edges.first[v] == edges.first[e], along, np.inf)
+        most = np.where(self._crack[v] & self._crack[e], _CRACK_GAP * self._gap, self._gap)
+        gap = np.minimum(most, self._slope * along)
+        # Distances of vertices from edges, shares along the edges, and unit vectors away from them.
         vertices = np.stack([edges.tail[v], edges.tail[e], edges.head[e]], axis=1)
-        distance, along, away = _closest(*(positions[vertices[:, k]] for k in range(3)))
+        place, start, end = (positions[vertices[:, k]] for k in range(3))
+        edge, spoke = end - start, place - start
+        squared = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
+        along = np.clip(np.einsum("ij,ij->i", spoke, edge) / squared, 0.0, 1.0)
+        away = spoke - along[:, None] * edge
+        distance = np.linalg.norm(away, axis=1)
+        away = away / np.maximum(distance, 1e-300)[:, None]
         near = distance < gap
         vertices, r, t, away, g = vertices[near], distance[near], along[near], away[near], gap[near]
         if len(r) and not r.min() > 0.0:
@@ -140,24 +140,6 @@ class Barrier:
             slope=-k * (2 * short * log + short**2 / r),
             bend=-k * (2 * log + 4 * short / r - (short / r) ** 2),
         )
-
-
-def _closest(v: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return distances [m] of points from edges (#N), the shares along the edges, and unit vectors away from them (#N by 2)."""
-    edge, spoke = b - a, v - a
-    t = np.clip(np.einsum("ij,ij->i", spoke, edge) / np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300), 0.0, 1.0)
-    away = spoke - t[:, None] * edge
-    distance = np.linalg.norm(away, axis=1)
-    return distance, t, away / np.maximum(distance, 1e-300)[:, None]
-
-
-def _residual(state: Relaxation, point: Point) -> float:
-    """Return the largest force on a vertex, that of contact included, over the mean force of the springs."""
-    springs, force = state.network.spring_arrays, -point.gradient
-    a, b = (point.positions[springs.ends[:, k]] for k in range(2))
-    tension = springs.stiffness * np.abs(np.linalg.norm(b - a, axis=1) - springs.rest_length)
-    remove_rotation(state.alignments, point.positions, force, state.network.spring_stiffness.numpy())
-    return float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
 
 
 def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
@@ -183,7 +165,12 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     while not at_rest and descent.iterations < most and descent.step():
         left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         at_rest = left.is_small(state.options) or descent.is_at_rest(state.options)
-    residual = _residual(state, descent.point)
+    # The largest force on a vertex, that of contact included, over the mean force of the springs.
+    springs, force = state.network.spring_arrays, -descent.point.gradient
+    a, b = (descent.point.positions[springs.ends[:, k]] for k in range(2))
+    tension = springs.stiffness * np.abs(np.linalg.norm(b - a, axis=1) - springs.rest_length)
+    remove_rotation(state.alignments, descent.point.positions, force, state.network.spring_stiffness.numpy())
+    residual = float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
     end = descent.point.positions.copy()
     align_grain(state.alignments, end)
     state.place(end)

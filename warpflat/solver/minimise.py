@@ -237,12 +237,6 @@ class Descent(Generic[P]):
         self.is_stuck = False
 
 
-def _continued(new: Relaxation, state: Relaxation) -> Relaxation:
-    """Return a state whose directions have been measured anew, with the counts and the last check of the one before."""
-    new.steps, new.restarts, new.work_units, new.status = state.steps, state.restarts, state.work_units, state.status
-    return new
-
-
 class _Directions:
     """The layout in which the directions of springs are measured.
 
@@ -262,7 +256,10 @@ class _Directions:
         """Return the state to go on with from a point, reached after so many iterations."""
         self._measured = iterations
         self._layout = self._layout + self._share * (point.positions - self._layout)
-        new = _continued(self._measure(point.positions, self._layout), state)
+        new = self._measure(point.positions, self._layout)
+        new.steps, new.restarts, new.work_units, new.status = (
+            state.steps, state.restarts, state.work_units, state.status
+        )  # fmt: skip
         energy = new.energies().potential
         if energy > (1.0 + _RISE) * self._energy:
             self._share *= 0.5
@@ -348,21 +345,17 @@ def _check(state: Relaxation, descent: Descent[Point], near: bool, left: Remaind
     state.place(descent.point.positions)
     state.evaluate_at_rest()
     energies, options = state.energies(), state.options
-    residual = state.residual() * _without_reaction(state)
-    small = left.is_small(options) or residual <= options.residual_tolerance or descent.is_at_rest(options, _SMALLER)
-    free = descent.point.energy <= state.negligible_energy
-    gain = state.status.energies.potential - energies.potential
-    state.status = Status(
-        energies=energies, residual=residual, gain=gain, change=descent.change, at_rest=(near and small) or free
-    )
-
-
-def _without_reaction(state: Relaxation) -> float:
-    """Return the largest force without that which keeps the chord upright, over the largest one without that which turns the piece."""
+    # Of the force on the ends of a chord, what keeps it upright is no force of the cloth.
     force, largest = state.cloth_force(), state.largest_force()
     for each in state.alignments:
         across = np.array([each.direction[1], -each.direction[0]])
         reaction = 0.5 * across * (across @ (force[each.upper] - force[each.lower]))
         force[each.upper] -= reaction
         force[each.lower] += reaction
-    return float(np.linalg.norm(force, axis=1).max() / max(largest, 1e-300))
+    residual = state.residual() * float(np.linalg.norm(force, axis=1).max() / max(largest, 1e-300))
+    small = left.is_small(options) or residual <= options.residual_tolerance or descent.is_at_rest(options, _SMALLER)
+    free = descent.point.energy <= state.negligible_energy
+    gain = state.status.energies.potential - energies.potential
+    state.status = Status(
+        energies=energies, residual=residual, gain=gain, change=descent.change, at_rest=(near and small) or free
+    )

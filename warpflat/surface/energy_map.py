@@ -343,7 +343,17 @@ def _place(
     if upwards.shape != (3,) or not np.isfinite(norm) or norm <= 0:
         raise InputError(f"up is a direction, three finite numbers, not all zero, got {up!r}")
     offsets = {name: nearest_on_polyline(here, surface.vertices[line]) - here for name, line in surface.lines.items()}
-    marks = {name: _landmark(surface, name, place) for name, place in landmarks.items()}
+    marks = {}
+    for name, place in landmarks.items():
+        if isinstance(place, (int, np.integer)):
+            count = len(surface.vertices)
+            if not 0 <= place < count:
+                raise InputError(f"landmark {name!r}: vertex {place} does not exist; valid: 0 to {count - 1}")
+            marks[name] = surface.vertices[place]
+            continue
+        marks[name] = np.asarray(place, dtype=float)
+        if marks[name].shape != (3,) or not np.isfinite(marks[name]).all():
+            raise InputError(f"landmark {name!r} is a vertex index or three finite numbers [m], got {place!r}")
     to_lines = _by_distance({name: float(np.linalg.norm(offset)) for name, offset in offsets.items()})
     to_marks = _by_distance({name: float(np.linalg.norm(mark - here)) for name, mark in marks.items()})
     # For example "4 mm above bust line, 12 mm from princess front; 13 mm from bust point".
@@ -375,18 +385,6 @@ def _place(
 
 def _by_distance(distances: Mapping[str, float]) -> dict[str, float]:
     return dict(sorted(distances.items(), key=lambda item: item[1]))
-
-
-def _landmark(surface: Surface, name: str, place: ArrayLike | int) -> FloatArray:
-    if isinstance(place, (int, np.integer)):
-        count = len(surface.vertices)
-        if not 0 <= place < count:
-            raise InputError(f"landmark {name!r}: vertex {place} does not exist; valid: 0 to {count - 1}")
-        return surface.vertices[place]
-    position = np.asarray(place, dtype=float)
-    if position.shape != (3,) or not np.isfinite(position).all():
-        raise InputError(f"landmark {name!r} is a vertex index or three finite numbers [m], got {place!r}")
-    return position
 
 
 @once_per_surface

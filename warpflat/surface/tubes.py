@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.surface.connectivity import border_loops, components
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
@@ -25,21 +25,16 @@ def tube_borders(surface: Surface) -> list[IntArray]:
     longest: dict[int, int] = {}
     for number, loop in enumerate(loops):
         longest.setdefault(int(part[loop[0]]), number)
-    angle = _corner_angles(surface)
+    # The sum of the triangles' angles at each vertex [rad].
+    triangles, _ = triangulate(surface.faces)
+    angle = np.zeros(len(surface.vertices))
+    for k in range(3):
+        i, j, o = triangles[:, k], triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3]
+        u, v = surface.vertices[j] - surface.vertices[i], surface.vertices[o] - surface.vertices[i]
+        sine = np.linalg.norm(np.cross(u, v), axis=1)
+        angle += np.bincount(i, np.arctan2(sine, np.einsum("ij,ij->i", u, v)), minlength=len(angle))
     return [
         loop
         for number, loop in enumerate(loops)
         if number not in longest.values() and float((np.pi - angle[loop]).sum()) > -np.pi
     ]
-
-
-def _corner_angles(surface: Surface) -> FloatArray:
-    """Return the sum of the triangles' angles at each vertex (#V) [rad]."""
-    triangles, _ = triangulate(surface.faces)
-    total = np.zeros(len(surface.vertices))
-    for k in range(3):
-        i, j, o = triangles[:, k], triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3]
-        u, v = surface.vertices[j] - surface.vertices[i], surface.vertices[o] - surface.vertices[i]
-        sine = np.linalg.norm(np.cross(u, v), axis=1)
-        total += np.bincount(i, np.arctan2(sine, np.einsum("ij,ij->i", u, v)), minlength=len(total))
-    return total

@@ -89,7 +89,8 @@ def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1)
         # A path that comes back to a place must have stayed within an edge's length of it.
         first = points[back]
         detour = path.points[first : index + 1]
-        longest = max(_edge_length(surface, path.support[i]) for i in range(first, index + 1))
+        crossed = [surface.vertices[support[support >= 0]] for support in path.support[first : index + 1]]
+        longest = max(float(np.linalg.norm(corners - corners[0], axis=1).max()) for corners in crossed)
         if np.linalg.norm(detour - detour[0], axis=1).max() > longest:
             raise InputError(f"the path crosses itself at {describe_place(place)}; draw it so that it does not")
         del places[back + 1 :], points[back + 1 :]
@@ -149,11 +150,6 @@ def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1)
     return SplitSurface(
         surface=new, path=chain, vertex_support=support, vertex_weights=weights, face_origin=face_origin[order]
     )
-
-
-def _edge_length(surface: Surface, support: IntArray) -> float:
-    corners = surface.vertices[support[support >= 0]]
-    return float(np.linalg.norm(corners - corners[0], axis=1).max())
 
 
 def _without_small(place: Place, snap: float, border: set[tuple[int, ...]]) -> Place:
@@ -353,7 +349,10 @@ class Refinement:
             else:
                 ends = self.place(here).keys() | self.place(goal).keys()
                 if len(ends) <= 2:
-                    step = self._along_edge(here, goal, *sorted(ends))
+                    low, high = sorted(ends)
+                    row = [low, *self.vertices_between(low, high), high]
+                    i, j = row.index(here), row.index(goal)
+                    step = row[i + 1 : j + 1] if i < j else row[j:i][::-1]
                 else:
                     step = [self._towards(here, goal, ends)]
             for vertex in step:
@@ -361,11 +360,6 @@ class Refinement:
                 chain.append(vertex)
             if len(chain) - seen > len(self._corner):
                 raise _crosses(self.place(here))
-
-    def _along_edge(self, here: int, goal: int, low: int, high: int) -> list[int]:
-        row = [low, *self.vertices_between(low, high), high]
-        i, j = row.index(here), row.index(goal)
-        return row[i + 1 : j + 1] if i < j else row[j:i][::-1]
 
     def _towards(self, here: int, goal: int, ends: Iterable[int]) -> int:
         """Return the next vertex on the straight path inside one base triangle, splitting the edge that it crosses."""

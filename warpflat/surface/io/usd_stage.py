@@ -95,7 +95,7 @@ def _warned(warnings: Any) -> str:
 
 
 def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
-    from pxr import Usd, UsdGeom
+    from pxr import Usd, UsdGeom, UsdShade
 
     stage = Usd.Stage.Open(str(path))
     if not stage:
@@ -168,7 +168,11 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
             notes.append(f"texture coordinates of mesh {at} are broken and were left out")
             texture = np.full((len(all_corners), 2), np.nan)
         texture = texture[np.repeat(kept, all_sizes)]
-        for names, found in ((materials, _materials(one, len(all_sizes))), (groups, _subsets(one, len(all_sizes)))):
+        # Faces without a subset that binds a material have that of the mesh.
+        bound = UsdShade.MaterialBindingAPI(one).GetDirectBinding().GetMaterialPath()
+        of_mesh = bound.name if bound else ""
+        of_faces = [name or of_mesh for name in _subsets(one, len(all_sizes), materials=True)]
+        for names, found in ((materials, of_faces), (groups, _subsets(one, len(all_sizes)))):
             names += [name for name, stays in zip(found, kept.tolist(), strict=True) if stays]
         left_handed = _value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
         if left_handed != mirrored:
@@ -269,14 +273,6 @@ def _subsets(mesh: Any, count: int, *, materials: bool = False) -> list[str]:
                 if 0 <= face < count:
                     names[face] = subset.GetPrim().GetName()
     return names if materials or any(names) else [mesh.GetName()] * count
-
-
-def _materials(mesh: Any, count: int) -> list[str]:
-    """Return for each face of a mesh the name of the subset that binds its material, else that of the mesh's own material."""
-    from pxr import UsdShade
-
-    own = UsdShade.MaterialBindingAPI(mesh).GetDirectBinding().GetMaterialPath()
-    return [name or (own.name if own else "") for name in _subsets(mesh, count, materials=True)]
 
 
 def _value(attribute: Any) -> Any:

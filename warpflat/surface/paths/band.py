@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
@@ -41,6 +41,8 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
         Vertex indices, in either direction; None where the given line is long enough, or the piece is no band: too wide, or a
         ring, which has no ends.
     """
+    from scipy.sparse.csgraph import dijkstra
+
     # No place is further from another than half of the border is long.
     length, graph = path_length(surface, [line]), EdgeGraph(surface)
     on_border = half_edges_of(surface).count == 1
@@ -62,8 +64,12 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
     if length >= _SHORT * reach or reach < _NARROW * width or mean < _EVEN * greatest or ring:
         return None
     weight = graph.length / (room[graph.edges].mean(axis=1) + _ROOM * width)
-    ends = (_end_at(surface, loops[0], tip, 2 * width) for tip in (one, other))
-    return _path_between(graph, weight, *ends)
+    starts, ends = (_end_at(surface, loops[0], tip, 2 * width) for tip in (one, other))
+    cost, before, _ = dijkstra(graph.matrix(weight), indices=starts, return_predecessors=True, min_only=True)
+    path = [int(ends[cost[ends].argmin()])]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return np.array(path, dtype=np.int32)
 
 
 def _furthest(surface: Surface, border: IntArray, place: int) -> tuple[int, float]:
@@ -86,14 +92,3 @@ def _end_at(surface: Surface, border: IntArray, tip: int, most: float) -> IntArr
         if len(near):
             end += loop[1 : near[0] + 2].tolist()
     return np.array(end, dtype=np.int32)
-
-
-def _path_between(graph: EdgeGraph, weight: FloatArray, starts: IntArray, ends: IntArray) -> IntArray:
-    """Return the path of least weight from any of some vertices to any of others."""
-    from scipy.sparse.csgraph import dijkstra
-
-    cost, before, _ = dijkstra(graph.matrix(weight), indices=starts, return_predecessors=True, min_only=True)
-    path = [int(ends[cost[ends].argmin()])]
-    while before[path[-1]] >= 0:
-        path.append(int(before[path[-1]]))
-    return np.array(path, dtype=np.int32)

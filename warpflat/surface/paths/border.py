@@ -182,7 +182,13 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
     border = sides.count[sides.edge] == 1
     length = np.linalg.norm(surface.vertices[sides.head[border]] - surface.vertices[sides.tail[border]], axis=1)
     if float(length[away[sides.face[border]]].sum() / length.sum()) > _AWAY_SHARE:
-        near = {key: _corner_near(surface, loop, turn, place) for key, place in at.items()}
+        # Where a side curls a little out of sight, the outermost point that is seen lies beside the corner: where it turns most.
+        station = arc_lengths(surface.vertices[loop], closed=True)
+        near = {}
+        for key, place in at.items():
+            distance = np.abs(station[:-1] - station[place])
+            is_near = np.minimum(distance, station[-1] - distance) < _NEAR * station[-1]
+            near[key] = int(np.argmax(np.where(is_near, turn, -np.inf)))
         if len(set(near.values())) == 4 and turn[list(near.values())].min() > _CORNER:
             return near
         raise InputError(
@@ -195,14 +201,3 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
             f"side {side!r}"
         )
     return at
-
-
-def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int) -> int:
-    """Return the position near `place` where the border turns most.
-
-    Where a side curls a little out of sight, the outermost point that is seen lies beside the corner.
-    """
-    station = arc_lengths(surface.vertices[loop], closed=True)
-    distance = np.abs(station[:-1] - station[place])
-    near = np.minimum(distance, station[-1] - distance) < _NEAR * station[-1]
-    return int(np.argmax(np.where(near, turn, -np.inf)))

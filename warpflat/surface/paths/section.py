@@ -178,7 +178,10 @@ def _curves(
     # rounding size must be exactly 0, or the curve would pass by a vertex instead of through it.
     height[np.abs(height) < 1e-10 * np.ptp(surface.vertices, axis=0).max()] = 0.0
     for chain, closed in _chains(triangles, height >= 0):
-        places = simplify_places([_crossing(edge, height) for edge in chain])
+        # The first end of each edge lies above the plane, or in it, and the second below.
+        shares = [float(height[a] / (height[a] - height[b])) for a, b in chain]
+        crossings = [{a: 1.0 - t, b: t} if t > 0.0 else {a: 1.0} for (a, b), t in zip(chain, shares, strict=True)]
+        places = simplify_places(crossings)
         if closed and len(places) > 1 and places[0] == places[-1]:
             places.pop()
         if len(places) >= 2:
@@ -190,15 +193,6 @@ def _direction(value: ArrayLike, what: str) -> FloatArray:
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise InputError(f"{what} is three finite numbers, not all zero, got {value!r}")
     return vector / np.linalg.norm(vector)
-
-
-def _crossing(edge: tuple[int, int], height: FloatArray) -> Place:
-    """Return the place at which the plane crosses an edge, whose first end lies above it (or in it) and whose second below."""
-    a, b = edge
-    share = float(height[a] / (height[a] - height[b]))
-    if share <= 0.0:
-        return {a: 1.0}
-    return {a: 1.0 - share, b: share}
 
 
 def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int, int]], bool]]:

@@ -227,7 +227,15 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
             f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there"
         )
     walked.append({stops[1]: 1.0})
-    return make_path(surface, simplify_places([_in_old_vertices(place, inserted) for place in walked]))
+    places = []
+    for place in walked:
+        # Inserted vertices are places between old ones.
+        old: Place = {}
+        for vertex, weight in place.items():
+            for v, w in inserted.get(vertex, {vertex: 1.0}).items():
+                old[v] = old.get(v, 0.0) + weight * w
+        places.append(_tidy(list(old), list(old.values())))
+    return make_path(surface, simplify_places(places))
 
 
 def polyline_path(surface: Surface, points: Sequence[ArrayLike | int], *, closed: bool = False) -> SurfacePath:
@@ -297,14 +305,6 @@ class VertexStar:
         for vertex in rest:
             found = found[(self.triangles[found] == vertex).any(axis=1)]
         return [int(t) for t in found]
-
-
-def _in_old_vertices(place: Place, inserted: dict[int, Place]) -> Place:
-    old: Place = {}
-    for vertex, weight in place.items():
-        for v, w in inserted.get(vertex, {vertex: 1.0}).items():
-            old[v] = old.get(v, 0.0) + weight * w
-    return _tidy(list(old), list(old.values()))
 
 
 def describe_place(place: Place) -> str:

@@ -71,9 +71,13 @@ def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:
         for other in np.flatnonzero(inside.all(axis=1)).tolist():
             if other == number or other in doubled:
                 continue
-            fewer = len(layer.faces) < len(layers[other].faces)
-            if ((other < number or fewer) and _has_faces(layers[other], layer)) or (
-                other < number and _cover_each_other(layers[other], layer)
+            whole = layers[other]
+            fewer = len(layer.faces) < len(whole.faces)
+            if ((other < number or fewer) and _has_faces(whole, layer)) or (
+                other < number
+                and abs(whole.area - layer.area) <= _SAME_AREA * max(whole.area, layer.area)
+                and lies_within(whole, layer, SAME_LAYER)
+                and lies_within(layer, whole, SAME_LAYER)
             ):
                 doubled[number] = other
                 break
@@ -106,12 +110,3 @@ def _has_faces(whole: Layer, part: Layer) -> bool:
         return False
     known = {tuple(sorted(face)) for face in whole.faces.tolist()}
     return all(tuple(sorted(face)) in known for face in np.where(part.faces >= 0, place[part.faces], -1).tolist())
-
-
-def _cover_each_other(one: Layer, other: Layer) -> bool:
-    areas = one.area, other.area
-    return (
-        abs(areas[0] - areas[1]) <= _SAME_AREA * max(areas)
-        and lies_within(one, other, SAME_LAYER)
-        and lies_within(other, one, SAME_LAYER)
-    )

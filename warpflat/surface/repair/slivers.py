@@ -251,21 +251,17 @@ class _Patch:
             through = [row for row in self.lines.values() if gone in row] if line else []
             if not all(any({x, y} == {gone, kept} for x, y in pairwise(row)) for row in through):
                 continue
-            if self._collapse(gone, kept):
-                return True
+            new = self._faces_after_collapse(gone, kept) if self._may_collapse(gone, kept) else None
+            if new is None:
+                # That would spoil the surface.
+                continue
+            for face, ring in new.items():
+                self.replace_face(face, ring)
+            for name, row in self.lines.items():
+                moved = [kept if v == gone else v for v in row]
+                self.lines[name] = [v for i, v in enumerate(moved) if i == 0 or v != moved[i - 1]]
+            return True
         return False
-
-    def _collapse(self, gone: int, kept: int) -> bool:
-        """Merge the vertex `gone` into `kept`; false, and nothing is changed, where that would spoil the surface."""
-        new = self._faces_after_collapse(gone, kept) if self._may_collapse(gone, kept) else None
-        if new is None:
-            return False
-        for face, ring in new.items():
-            self.replace_face(face, ring)
-        for name, line in self.lines.items():
-            moved = [kept if v == gone else v for v in line]
-            self.lines[name] = [v for i, v in enumerate(moved) if i == 0 or v != moved[i - 1]]
-        return True
 
     def _may_collapse(self, gone: int, kept: int) -> bool:
         """Return whether the surface stays manifold, with the same border, when the edge between two vertices is collapsed."""
@@ -292,18 +288,18 @@ class _Patch:
                 new[face] = tuple(v for v in ring if v != gone) if len(ring) == 4 else None
             else:
                 new[face] = tuple(kept if v == gone else v for v in ring)
-            if new[face] is not None and not self._acceptable(ring, new[face] or ()):
+            corners = new[face]
+            if corners is None:
+                continue
+            if self.is_narrow(ring):
+                # It may stay narrow, but become no narrower.
+                old_width, width = (_width(points_at(self.vertices, np.array(each))) for each in (ring, corners))
+                if len(corners) != len(ring) or width < old_width:
+                    return None
+            elif self.is_narrow(corners) or float(self.normal(ring) @ self.normal(corners)) <= 0:
                 return None
         nothing_left = all(ring is None for ring in new.values()) and len(self.around(kept)) == len(both)
         return None if nothing_left else new
-
-    def _acceptable(self, old: tuple[int, ...], new: tuple[int, ...]) -> bool:
-        """Return whether a face may get new corners: it is not degenerate then (or less than before) and not turned over."""
-        if self.is_narrow(old):
-            return len(new) == len(old) and bool(
-                _width(points_at(self.vertices, np.array(new))) >= _width(points_at(self.vertices, np.array(old)))
-            )
-        return not self.is_narrow(new) and float(self.normal(old) @ self.normal(new)) > 0
 
     def remove_cap(self, face: int, side: int, *, check: bool = True) -> bool:
         """Remove a cap: the neighbour across its longest edge (the one from corner `side`) becomes a fan around its far corner."""

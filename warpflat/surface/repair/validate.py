@@ -139,9 +139,20 @@ def make_surface(
         if turned:
             mesh.faces = faces
             mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
-        _take_outer_sheet(mesh)
+        if (mesh.half_edges.count == 2).all() and (sheet := outer_sheet(mesh.vertices, mesh.half_edges)) is not None:
+            # A closed surface that is cloth drawn with its thickness.
+            mesh.keep(sheet.faces)
+            mesh.notes.append(
+                f"cloth drawn {1e3 * sheet.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
+                f"({1e4 * sheet.left_out:.0f} cm2) left out"
+            )
         _separate_touching_fans(mesh)
-        _drop_unused(mesh)
+        kept = _used_vertices(mesh.faces)
+        if len(kept) < len(mesh.vertices):
+            new = np.full(len(mesh.vertices) + 1, -1, dtype=np.int32)
+            new[kept] = np.arange(len(kept), dtype=np.int32)
+            mesh.faces = new[mesh.faces]
+            mesh.vertices, mesh.index = mesh.vertices[kept], mesh.index[kept]
         kept_lines, off = renumber_lines(
             mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
         )
@@ -436,19 +447,6 @@ def _part_sheets(mesh: _Mesh) -> None:
     )
 
 
-def _take_outer_sheet(mesh: _Mesh) -> None:
-    """Take the outer sheet of a closed surface that is cloth drawn with its thickness."""
-    if (mesh.half_edges.count != 2).any():
-        return
-    sheet = outer_sheet(mesh.vertices, mesh.half_edges)
-    if sheet is not None:
-        mesh.keep(sheet.faces)
-        mesh.notes.append(
-            f"cloth drawn {1e3 * sheet.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
-            f"({1e4 * sheet.left_out:.0f} cm2) left out"
-        )
-
-
 def _separate_touching_fans(mesh: _Mesh) -> None:
     """Give each fan of faces its own vertex where several touch in one point only."""
     he = mesh.half_edges
@@ -477,17 +475,6 @@ def _separate_touching_fans(mesh: _Mesh) -> None:
     mesh.faces = faces
     names = list_some(np.unique(vertex[extra]))
     mesh.notes.append(f"parts that touched only in a point were separated at vertices {names}")
-
-
-def _drop_unused(mesh: _Mesh) -> None:
-    used = _used_vertices(mesh.faces)
-    unused = len(mesh.vertices) - len(used)
-    if unused == 0:
-        return
-    new = np.full(len(mesh.vertices) + 1, -1, dtype=np.int32)
-    new[used] = np.arange(len(used), dtype=np.int32)
-    mesh.faces = new[mesh.faces]
-    mesh.vertices, mesh.index = mesh.vertices[used], mesh.index[used]
 
 
 def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
