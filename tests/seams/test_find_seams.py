@@ -106,6 +106,23 @@ def test_a_sleeves_end_that_turns_inwards_to_the_wrist_is_no_cloth() -> None:
     assert sum(map(_area, found.pieces)) == pytest.approx(_area(surface), rel=3e-3)
 
 
+def test_one_sleeve_is_found_where_front_and_back_mirror_each_other() -> None:
+    rods = [
+        solids.rod((0, 1.0, 0), (0, 1.42, 0), 0.17, 0.7),
+        solids.rod((0, 1.42, 0), (0, 1.75, 0), 0.065),
+        solids.rod((0.16, 1.45, 0), (0.75, 1.45, 0), 0.062),
+    ]
+    openings = [((0, 0.95, 0), (0, -1, 0)), ((0, 1.62, 0), (0, 1, 0)), ((0.62, 1.45, 0), (1, 0, 0))]
+    found = warpflat.find_seams(
+        solids.skin(solids.joined(rods, 0.03), (-0.4, 0.7, -0.3), (0.9, 1.9, 0.3), 0.045, openings)
+    )
+    assert found.what == "top, 1 sleeve"
+    assert sorted(piece.name for piece in found.pieces) == ["back", "front", "left_sleeve"]
+    assert {"armhole left", "underarm left", "shoulder left", "side left", "side right"} == {
+        s.name for s in found.seams
+    }
+
+
 def test_left_and_right_are_mirror_images() -> None:
     found = {seam.name: seam for seam in warpflat.find_seams(shirt("T-pose")).seams}
     for name in ("armhole", "side", "shoulder", "underarm"):
