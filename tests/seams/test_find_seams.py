@@ -14,6 +14,7 @@ from warpflat.garment.sew_pieces import meeting_borders, unsewn_borders
 from warpflat.seams.anatomy import find_anatomy
 from warpflat.seams.fields import Operators
 from warpflat.seams.find import FoundSeams, cloth_of
+from warpflat.seams.thickness import even_line
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 
@@ -106,6 +107,23 @@ def test_a_sleeves_end_that_turns_inwards_to_the_wrist_is_no_cloth() -> None:
     assert sum(map(_area, found.pieces)) == pytest.approx(_area(surface), rel=3e-3)
 
 
+def test_one_sleeve_is_found_where_front_and_back_mirror_each_other() -> None:
+    rods = [
+        solids.rod((0, 1.0, 0), (0, 1.42, 0), 0.17, 0.7),
+        solids.rod((0, 1.42, 0), (0, 1.75, 0), 0.065),
+        solids.rod((0.16, 1.45, 0), (0.75, 1.45, 0), 0.062),
+    ]
+    openings = [((0, 0.95, 0), (0, -1, 0)), ((0, 1.62, 0), (0, 1, 0)), ((0.62, 1.45, 0), (1, 0, 0))]
+    found = warpflat.find_seams(
+        solids.skin(solids.joined(rods, 0.03), (-0.4, 0.7, -0.3), (0.9, 1.9, 0.3), 0.045, openings)
+    )
+    assert found.what == "top, 1 sleeve"
+    assert sorted(piece.name for piece in found.pieces) == ["back", "front", "left_sleeve"]
+    assert {"armhole left", "underarm left", "shoulder left", "side left", "side right"} == {
+        s.name for s in found.seams
+    }
+
+
 def test_left_and_right_are_mirror_images() -> None:
     found = {seam.name: seam for seam in warpflat.find_seams(shirt("T-pose")).seams}
     for name in ("armhole", "side", "shoulder", "underarm"):
@@ -175,6 +193,22 @@ def test_thickness_drawn_at_a_hem_is_no_cloth() -> None:
     assert any("drawn thickness" in note for note in found.notes)
     area = sum(_area(piece) for piece in found.pieces)
     assert area == pytest.approx(_area(surface), rel=1e-6)
+
+
+def test_what_is_taken_off_at_an_opening_ends_in_an_even_line() -> None:
+    cloth = cloth_of(solids.skirt(rows=40, around=80))
+    middles = cloth.vertices[cloth.faces].mean(axis=1)
+    column = (np.arctan2(middles[:, 0], middles[:, 2]) * 40 / np.pi).astype(int) % 80
+    ragged = middles[:, 1] > 0.55 + 0.02 * np.random.default_rng(1).uniform(-1.0, 1.0, 80)[column]
+    made, taken = even_line(cloth, ragged, float(np.sqrt(cloth.face_areas.sum())))
+    kept = made.faces[~taken]
+    loop = max(border_loops(kept.astype(np.int32)), key=lambda ids: made.vertices[ids, 1].mean())
+    heights = made.vertices[loop, 1]
+    # Teeth of up to 40 mm become a line that rises by little from one point to the next.
+    assert np.abs(np.diff(heights)).max() < 0.004
+    assert np.ptp(heights) < 0.016
+    assert heights.mean() == pytest.approx(0.55, abs=0.005)
+    assert made.face_areas.sum() == pytest.approx(cloth.face_areas.sum(), rel=1e-3)
 
 
 def _area(surface: Surface) -> float:

@@ -147,12 +147,27 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
         notes.append(f"up is taken as {axis_name(upward)}, as its openings lie; --up says otherwise")
     normal, offset, asymmetry = _plane_of_symmetry(cloth.vertices, operators.mass, upward, size)
     holds = asymmetry <= _SYMMETRIC * size
+    side = np.cross(upward, normal)
+    side /= max(float(np.linalg.norm(side)), 1e-300)
+    one_sleeve = (
+        holds
+        and sum(one[1] >= HOLE * size for one in raw) > 2
+        and not any(border.role == "limb" for border in _roles(raw, upward, normal, offset, size))
+        and any(
+            border.role == "limb" for border in _roles(raw, upward, side, float(np.median(cloth.vertices @ side)), size)
+        )
+    )
+    if one_sleeve:
+        # The plane lies between front and back.
+        holds = False
     if front:
         forward = AXES[front] - (AXES[front] @ upward) * upward
         if np.linalg.norm(forward) < 0.5:
             forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
     else:
         forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
+        if one_sleeve:
+            forward = np.cross(side, upward) * (1.0 if np.cross(side, upward) @ forward >= 0.0 else -1.0)
     if holds:
         level = normal - (normal @ upward) * upward
         level /= np.linalg.norm(level)
@@ -182,6 +197,8 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
     if holds:
         limbs = _averaged_limbs(limbs, normal, offset, size)
         mirror = mirror_map(cloth.vertices, cloth.faces, normal, offset, reach=0.05 * size)
+    elif one_sleeve:
+        notes.append("it has a sleeve on one side alone: each side has its own lines")
     else:
         notes.append(
             f"it has no plane of symmetry (mirrored, it is {1e3 * asymmetry:.0f} mm off): each side has its own lines"

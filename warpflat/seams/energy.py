@@ -209,7 +209,7 @@ def cut_by_energy(
 
         def on_trial(
             candidate: _Candidate, worst: _Measured = worst, twin: _Measured | None = twin, number: int = number,
-            cloth: Cloth = cloth, pieces: Sequence[_Measured] = pieces,
+            cloth: Cloth = cloth, pieces: Sequence[_Measured] = pieces, most: int = most,
         ) -> tuple[Cloth, list[_Measured]] | None:  # fmt: skip
             report_activity(f"seams: trying {candidate.name}")
             made = _cut(cloth, worst.mesh, candidate, _TRIAL)

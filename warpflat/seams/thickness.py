@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import BoolArray
 from warpflat.core.text import format_count
 from warpflat.seams.cloth import Cloth
+from warpflat.seams.fields import Operators
+from warpflat.surface.connectivity import join_labels
 
-__all__ = ["without_thickness"]
+__all__ = ["even_line", "without_thickness"]
 
 # A layer of faces around an opening is turned inside if it faces its middle by this (mean cosine), and outside from the second on.
 _INSIDE, _OUTSIDE = -0.25, 0.35
@@ -22,6 +25,9 @@ _WIDEST = 0.15
 _PIECE = 0.5
 # An opening is level from this on (its area over that of a circle as long).
 _LEVEL = 0.4
+# The line where it ends is evened over this share of the garment's size, and lies within so much of where it was; a line that strays
+# from it by no more than the third is even.
+_EVEN, _REACH, _RAGGED = 0.03, 0.05, 0.004
 
 
 def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
@@ -43,6 +49,7 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
             openings += 1
     if not openings or drop.mean() > 0.5:
         return cloth, []
+    cloth, drop = even_line(cloth, drop, size)
     kept = replace(cloth, faces=cloth.faces[~drop])
     part = replace(kept, seams={}).parts()
     kept = replace(kept, faces=kept.faces[part == np.bincount(part).argmax()])
@@ -59,6 +66,36 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
     return made, [
         f"cloth turned inside at {format_count(openings, 'opening')} ({area_out:.0f} cm2) left out: it is drawn thickness"
     ]
+
+
+def even_line(cloth: Cloth, drop: BoolArray, size: float) -> tuple[Cloth, BoolArray]:
+    """Return the cloth split along an even line where some of its faces end, and #F, those beyond it.
+
+    They are found layer by layer, and the mesh's own edges between them and the others are ragged. The line is where the distance from
+    these edges, negative beyond them, is zero when it is smoothed.
+    """
+    among, others = (np.isin(np.arange(len(cloth.vertices)), cloth.faces[chosen]) for chosen in (drop, ~drop))
+    rim = np.flatnonzero(among & others)
+    away, nearest = cKDTree(cloth.vertices[rim]).query(cloth.vertices)
+    away *= np.where(others, 1.0, -1.0)
+    level = Operators(vertices=cloth.vertices, faces=cloth.faces).smooth(away, _EVEN * size)
+    # A strip is narrower than what smoothing reaches: each line is shifted back to where it was in the mean.
+    ring = cloth.faces[drop]
+    own = join_labels(len(cloth.vertices), ring[:, [0, 1]].ravel(), ring[:, [1, 2]].ravel())[rim]
+    shift = np.bincount(own, level[rim]) / np.maximum(np.bincount(own), 1)
+    level -= shift[own[nearest]]
+    stray = np.zeros(len(shift))
+    np.maximum.at(stray, own, np.abs(level[rim]))
+    ragged = stray > _RAGGED * size
+    if not ragged.any():
+        return cloth, drop
+    near = ((np.abs(away) < _REACH * size) & ragged[own[nearest]])[cloth.faces].any(axis=1)
+    marked = replace(
+        cloth, values={"turned": level}, labels={"turned": drop.astype(np.int64), "near": near.astype(np.int64)}
+    )
+    made, outside = marked.split("turned", near)
+    dropped = np.where(made.labels["near"] > 0, ~outside, made.labels["turned"] > 0)
+    return replace(made, values={}, labels={}), dropped
 
 
 def _turned(cloth: Cloth, loop: np.ndarray, axis: np.ndarray, size: float) -> BoolArray | None:
