@@ -37,8 +37,10 @@ def test_a_drawing_is_draped(tube: Path, tmp_path: Path, capsys: pytest.CaptureF
     table = tmp_path / "worn.toml"
     table.write_text('spacing_mm = 40\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\nmax_steps = 100\n')
     out = tmp_path / "out"
-    assert main(["drape", str(tube), "--seams", str(table), "--out", str(out), "--usd"]) == 1
+    assert main(["drape", str(tube), "--seams", str(table), "--out", str(out), "--usd", "--correct"]) == 1
     printed = capsys.readouterr()
+    # The drape is kept; the correction needs one at rest.
+    assert "the pattern was not corrected, as the drape is not at rest" in printed.err
     assert "the drape is not at rest after 100 steps" in printed.err
     assert "woven is taken" in printed.err
     assert "worn: fits: no" in printed.out

@@ -294,7 +294,9 @@ def drape_outside(
                 pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
             )
         files, entry = write_drape_files(draped, folder, frames=True, usd=usd), draped.measures()
-        if correct:
+        if correct and not draped.converged:
+            more = [*more, "the pattern was not corrected, as the drape is not at rest; raise max_steps in [drape]"]
+        elif correct:
             report_activity("correcting the pattern")
             with errors_named(job.name):
                 found = relieve_pattern(draped, hold=table.hold)
