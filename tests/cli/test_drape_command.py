@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from warpflat.cli.main import main
+from warpflat.export.pattern_json import write_pattern_json
+from warpflat.export.read_svg import read_svg
 from warpflat.export.svg import write_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
@@ -35,8 +37,10 @@ def test_a_drawing_is_draped(tube: Path, tmp_path: Path, capsys: pytest.CaptureF
     table = tmp_path / "worn.toml"
     table.write_text('spacing_mm = 40\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\nmax_steps = 100\n')
     out = tmp_path / "out"
-    assert main(["drape", str(tube), "--seams", str(table), "--out", str(out), "--usd"]) == 1
+    assert main(["drape", str(tube), "--seams", str(table), "--out", str(out), "--usd", "--correct"]) == 1
     printed = capsys.readouterr()
+    # The drape is kept; the correction needs one at rest.
+    assert "the pattern was not corrected, as the drape is not at rest" in printed.err
     assert "the drape is not at rest after 100 steps" in printed.err
     assert "woven is taken" in printed.err
     assert "worn: fits: no" in printed.out
@@ -85,3 +89,31 @@ def test_json_of_a_form_is_all_that_is_printed(tmp_path: Path):
     ended = subprocess.run([sys.executable, "-c", words], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert json.loads(ended.stdout)["schema"] == 1
     assert ended.stderr == ""
+
+
+def test_a_pattern_from_a_file_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """A tube of 88 cm around a hip of 96 cm, in a cloth that gives 5 %."""
+    ring = np.array([(0.0, 0.0), (0.44, 0.0), (0.44, 0.2), (0.0, 0.2), (0.0, 0.0)])
+    edges = [Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(4)]
+    seams = [
+        Seam(name=f"side {a}", sides=((SeamSide(piece=a, edge="e2"),), (SeamSide(piece=b, edge="e4", reversed=True),)))
+        for a, b in (("front", "back"), ("back", "front"))
+    ]
+    pieces = [Piece(name=name, edges=edges) for name in ("front", "back")]
+    pattern = draft_garment(Pattern(name="narrow", pieces={"": pieces}, seams=seams))
+    write_pattern_json(pattern, tmp_path / "narrow.json")
+    table, out = tmp_path / "worn.toml", tmp_path / "out"
+    table.write_text(
+        'spacing_mm = 40\ntop = "hip"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\ntolerance = 0.05\n'
+        "max_steps = 3000\n"
+    )
+    main(["drape", str(tmp_path / "narrow.json"), "--seams", str(table), "--out", str(out), "--correct"])
+    assert "of the cloth was stretched beyond its limit, now" in capsys.readouterr().err
+    assert {"narrow.corrected.dxf", "narrow.corrected.svg", "corrected.png"} <= {path.name for path in out.iterdir()}
+    rounds = json.loads((out / "metrics.json").read_text())["drape"]["correction"]["rounds"]
+    assert rounds[0]["beyond_limit"] > 0.1
+    assert rounds[-1]["beyond_limit"] < 0.02
+    corrected = read_svg(out / "narrow.corrected.svg")
+    for piece in corrected.pieces[corrected.sample]:
+        # Its outline was 1.28 m.
+        assert 1.29 < sum(edge.length for edge in piece.edges) < 1.4

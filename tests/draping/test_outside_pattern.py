@@ -14,9 +14,11 @@ from devices import DEVICE
 
 import warpflat
 from warpflat.core.errors import InputError
+from warpflat.draping.correct_pattern import relieve_pattern
 from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.lift import read_lift, whole_lifts
 from warpflat.draping.mesh_pieces import mesh_pieces
+from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.wrap_pieces import wrap_pieces
 from warpflat.export.dxf import write_dxf
@@ -354,3 +356,28 @@ def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):
         [radius * np.sin(points[:, 0] / radius), points[:, 1], radius * np.cos(points[:, 0] / radius)]
     )
     np.testing.assert_allclose(found, asked, atol=5e-5)
+
+
+def test_a_pattern_from_outside_is_let_out_where_it_is_stretched_too_far():
+    """A tube of 88 cm on a hip of 96 cm, in a cloth that gives 5 %."""
+    narrow = tube(0.44, 0.2)
+    draped, _ = drape_pattern(
+        narrow, body_of_size(40.0), fabric=warpflat.find_fabric("woven"), device=DEVICE,
+        placement=Placement(top="hip", spacing=0.04), options=DrapeOptions(max_steps=3000, tolerance=0.05),
+    )  # fmt: skip
+    assert draped.converged
+    found = relieve_pattern(draped)
+    assert found.rounds[0].strained > 0.1
+    assert found.rounds[-1].strained < 0.02
+    assert found.seam_difference() < 1e-3
+    moved = moved_outlines(narrow, "", found.before.cloth, found.after.cloth)
+    for name in ("front", "back"):
+        before, after = (pattern.piece(name, "") for pattern in (narrow, moved))
+        # It is wider where it was too narrow, by what its cloth does not give.
+        assert 0.01 < max(after.edge(e).length - before.edge(e).length for e in ("e1", "e3")) < 0.06
+    # Both halves of a piece on the fold, and both of a pair, move alike.
+    left, right = (
+        moved.piece("front", "").edge(e).points[:, 1].mean() - narrow.piece("front", "").edge(e).points[:, 1].mean()
+        for e in ("e2", "e4")
+    )
+    assert left == pytest.approx(right, abs=0.01)

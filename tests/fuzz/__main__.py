@@ -67,6 +67,7 @@ def _save(case: Case, number: int) -> Path:
         "pattern": "pattern.json",
         "metrics": "metrics.json",
         "scan": "scan.obj",
+        "fit": "fit.obj",
         "arguments": "arguments.json",
         "studio": "studio.json",
         **{kind: ending[1:] for ending, kind in FOREIGN_ENDINGS.items()},

@@ -6,6 +6,7 @@ NAME.fabric.toml                                                     listed, and
 NAME.pattern.json                                                    exported in all formats
 NAME.metrics.json                                                    in the folder of results before a run
 NAME.scan.obj                                                        made a mannequin
+NAME.fit.obj                                                         fitted to a size, and taken for a body
 NAME.dxf, .svg, .garmentcode.json                                    its edges listed by `drape --edges`; .rul too
 NAME.sewing.toml                                                     beside a DXF
 NAME.frames.usdc, .lift.obj, .runmetrics.json, .runpattern.json      in the folder of a run: reviewed, exported, draped
@@ -38,6 +39,7 @@ _TWO_ENDINGS = {
     ".pattern.json": "pattern",
     ".metrics.json": "metrics",
     ".scan.obj": "scan",
+    ".fit.obj": "fit",
     ".arguments.json": "arguments",
     ".studio.json": "studio",
     **FOREIGN_ENDINGS,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import math
 import os
 import subprocess
 import sys
@@ -20,6 +21,23 @@ __all__ = ["COMMANDS", "FABRIC", "KINDS", "SCENES", "case_of_file", "meshes", "p
 
 BARE = ("--frames", "0", "--no-picture", "--quiet")
 CLOTH = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
+# A tube of 7 by 12 faces around the hip of a body that stands at the origin.
+SKIRT = b"".join(
+    [
+        *(
+            b"v %.4f %.4f %.4f\n"
+            % (0.22 * math.sin(k * math.pi / 6), 0.6 + 0.06 * row, 0.16 * math.cos(k * math.pi / 6))
+            for row in range(8)
+            for k in range(12)
+        ),
+        *(
+            b"f %d %d %d %d\n"
+            % (12 * row + k + 1, 12 * row + (k + 1) % 12 + 1, 12 * row + (k + 1) % 12 + 13, 12 * row + k + 13)
+            for row in range(7)
+            for k in range(12)
+        ),
+    ]
+)
 QUIET = "[output]\nframes = 0\npicture = false\n"
 SHORT = "[relax]\nmax_steps = 30\n" + QUIET
 SCENES = {
@@ -66,7 +84,7 @@ METRICS = {
     "files": {"cloth": {"cloth.obj": "0" * 64, "old.svg": "1" * 64}},
 }
 MESHES = ("obj", "ply", "stl", "off", "glb", "gltf", "usda", "usdc", "usdz")
-KINDS = (*MESHES, "scene", "fabric", "pattern", "metrics", "scan")
+KINDS = (*MESHES, "scene", "fabric", "pattern", "metrics", "scan", "fit")
 COMMANDS = (
     ("flatten", "cloth.obj", "--units", "cm", "--fabric", "denim", "--out", "out", *BARE),
     ("flatten", "cloth.obj", "--units", "m", "--name", "front", "--datum", "0,3", "--model", "membrane", *BARE),
@@ -95,6 +113,21 @@ COMMANDS = (
         "plane:0.5,0,0 1,0,0",
         "--keep",
         "waist",
+        *BARE,
+    ),
+    (
+        "fit",
+        "skirt.obj",
+        "--units",
+        "m",
+        "--from",
+        "EU 38",
+        "--to",
+        "EU 40",
+        "--ease",
+        "hip=4cm",
+        "--out",
+        "out",
         *BARE,
     ),
     ("run", "cap.scene.toml", "--out", "out", "--quiet"),
@@ -165,6 +198,15 @@ def case_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool 
         # A standing body is searched for limbs: it takes long.
         scan = ("mannequin", "--scan", f"{name}.obj", "--units", "m", "--resolution", "40", "--out", "out", "--quiet")
         return [case(scan, {f"{name}.obj": content}, subject=f"{name}.obj", seconds=90.0)]
+    if kind == "fit":
+        # A garment, and the body on which it lies: a body is fitted, which takes seconds.
+        fit = ("--units", "m", "--to", "EU 38", "--out", "out", *BARE)
+        worn = case(("fit", f"{name}.obj", *fit), {f"{name}.obj": content}, leaves="out/fit.json", seconds=90.0)
+        body = {"skirt.obj": SKIRT, f"{name}.obj": content}
+        return [
+            worn,
+            case(("fit", "skirt.obj", *fit, "--from", f"{name}.obj"), body, leaves="out/fit.json", seconds=90.0),
+        ]
     if kind == "arguments":
         arguments = tuple(json.loads(content))
         replaces = "done/pattern.json" if "export" in arguments else ""
@@ -183,6 +225,7 @@ def beside_commands() -> dict[str, bytes]:
     """What COMMANDS need."""
     return {
         "cloth.obj": CLOTH,
+        "skirt.obj": SKIRT,
         "own.toml": FABRIC.encode(),
         "cap.scene.toml": SCENES["shape"].encode(),
         "done/pattern.json": json.dumps(pattern()).encode(),

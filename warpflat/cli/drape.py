@@ -24,7 +24,9 @@ Of a pattern the last two and metrics.json come out alone."""
 @click.option("--seams", type=click.Path(path_type=Path), metavar="FILE", help="Of a pattern: TOML with its [[seams]].")
 @click.option("--size", metavar="SIZE", help="Of a graded pattern.  [default: its sample size]")
 @click.option(
-    "--correct", is_flag=True, help="Of a scene: change the pattern until the worn garment lies where it was designed."
+    "--correct",
+    is_flag=True,
+    help="Change the pattern until the worn garment lies where a scene designed it; let one of a file out where it is stretched too far.",
 )
 @click.option(
     "--edges", is_flag=True, help="Print the edges of a pattern's pieces, to name them in [[seams]]; drape nothing."
@@ -69,15 +71,13 @@ def drape(
     from warpflat.scene.schema import DrapeTable
 
     if is_pattern_file(scene):
-        if correct:
-            raise InputError(f"--correct: {scene} has no designed surface; it is for a scene")
         if edges:
             click.echo(edge_table(scene, sewing=seams))
             return DONE
         start_warp_silently()
         job = OutsideJob.read(scene, sewing=seams, body=body)
         folder = out if out is not None else Path("out") / f"{job.name}-draped"
-        result = drape_outside(job, folder, fabric=fabric, size=size, device=device, usd=usd)
+        result = drape_outside(job, folder, fabric=fabric, size=size, device=device, usd=usd, correct=correct)
         warnings = warnings_of(result.metrics)
         # What was left out has a line of its own at the end.
         notes = [note for note in result.notes if note not in result.metrics.get("notes", ())]

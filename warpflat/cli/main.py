@@ -80,6 +80,7 @@ def cli(context: click.Context) -> None:
       warpflat run dome.toml                              a scene file, into out/dome
       warpflat new shirt --size "EU 38" --collar stand    a scene of a garment, for a size
       warpflat flatten front.obj --units cm --fabric denim
+      warpflat fit shirt.obj --units m --to "EU 44"       a garment for another body
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
       warpflat cuts scenes/bodice.toml                    which cut would release how much energy

@@ -36,7 +36,7 @@ from warpflat.flattening.result import Flattening
 from warpflat.garment.garment import Garment
 from warpflat.surface.triangles import corner_triangles
 
-__all__ = ["Correction", "Round", "correct_pattern"]
+__all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
 
 # Shear counts at least as this share of the threads' stiffness: a pattern that shears freely gets a ragged outline.
 _LEAST_SHEAR = 0.05
@@ -44,6 +44,8 @@ _LEAST_SHEAR = 0.05
 _SEAM, _HOLD = 1e3, 1e-8
 # A round that lowers the misfit by less than this share is the last; a step that does not lower it is halved so often.
 _LEAST_GAIN, _HALVINGS = 0.02, 2
+# Cloth that is stretched too far is let out to this share of its limit.
+_EASED = 0.7
 # So much more of the area may be strained beyond the cloth's limit.
 _MORE_STRAINED = 0.01
 
@@ -227,6 +229,54 @@ def _round(drape: Drape, share: float, bridging: bool) -> Round:
     )
 
 
+def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) -> Correction:
+    """Let the flat pieces out where the worn cloth is stretched beyond its limit, until it is not, or no less of it.
+
+    That is what can be asked of a pattern without a designed surface: a garment may hang as far off the body as its maker wants, but
+    not be stretched more than its cloth allows. The rounds tell the share of the cloth that is stretched beyond the limit as `strained`.
+
+    Args:
+        drape: of the pattern as it is, on a body.
+        hold: as :func:`correct_pattern` takes it.
+        rounds: the most.
+
+    Raises:
+        InputError: the drape is not at rest.
+    """
+    if not drape.converged:
+        raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
+    held, limit = held_vertices(drape.cloth, hold), drape.cloth.fabric.strain_limit
+    seams = seam_edges(drape.cloth)
+    difference = edge_lengths(drape.cloth.flat, seams[:, 0]) - edge_lengths(drape.cloth.flat, seams[:, 1])
+
+    def told(worn: Drape, share: float) -> Round:
+        beyond = [worn.face_areas @ (worn.strains[name] > limit) for name in ("warp", "weft")]
+        return replace(_round(worn, share, True), strained=float(max(beyond) / worn.face_areas.sum()))
+
+    before, history, reason = drape, [told(drape, 0.0)], f"{rounds} rounds"
+    for _ in range(rounds):
+        if history[-1].strained == 0.0:
+            reason = "no cloth is stretched beyond its limit"
+            break
+        corner, _, gradient, _ = drape.cloth.cells()
+        # Half the squared length of a thread over that of one at its limit.
+        over = _lengths(drape.positions[corner], gradient)
+        over -= 0.5 * (1.0 + _EASED * limit) ** 2
+        step = _follow(drape.cloth, np.maximum(over, 0.0) * [1.0, 1.0, 0.0], seams, difference)
+        share = largest_share(drape.cloth, step)
+        cloth = replace(drape.cloth, flat=drape.cloth.flat + share * step, designed=drape.positions)
+        worn = relax_drape(cloth, drape.body, options=drape.options, held=held)
+        cloth = replace(cloth, designed=drape.body.nearest(worn.positions)[0])
+        trial = replace(drape, cloth=cloth, worn=worn)
+        now = told(trial, share)
+        if not trial.converged or now.strained >= (1.0 - _LEAST_GAIN) * history[-1].strained:
+            reason = "no step leaves less of it stretched"
+            break
+        drape = trial
+        history.append(now)
+    return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
+
+
 def _gauss_newton_step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool) -> FloatArray:
     """Return the displacement of the flat vertices (#P by 2 [m]) that follows best what the cells ask for.
 
@@ -237,12 +287,24 @@ def _gauss_newton_step(drape: Drape, seams: IntArray, difference: FloatArray, br
         bridging: whether what bridges a hollow is as it should be.
     """
     cloth = drape.cloth
-    corner, face, gradient, area = cloth.cells()
-    corner_flat, _, _ = corner_triangles(cloth.flat_faces)
+    corner, _, gradient, _ = cloth.cells()
     wanted = _lengths(cloth.designed[corner], gradient) - _lengths(drape.positions[corner], gradient)
     if bridging:
         share = drape.misfit / np.maximum(drape.distance, 1e-9)
         wanted *= share[corner].mean(axis=1)[:, None]
+    return _follow(cloth, wanted, seams, difference)
+
+
+def _follow(cloth: SewnCloth, wanted: FloatArray, seams: IntArray, difference: FloatArray) -> FloatArray:
+    """Return the displacement of the flat vertices (#P by 2 [m]) nearest to what cells want to be longer along warp and weft, and sheared.
+
+    Args:
+        cloth: with the present pattern.
+        wanted: #C by 3, strains.
+        seams, difference: as :func:`_gauss_newton_step` takes them.
+    """
+    corner, face, gradient, area = cloth.cells()
+    corner_flat, _, _ = corner_triangles(cloth.flat_faces)
     fabric = cloth.fabric
     threads = 0.5 * (fabric.stiffness_warp + fabric.stiffness_weft)
     shear = max(fabric.shear_stiffness, _LEAST_SHEAR * threads)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +13,11 @@ from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.export.geometry import outline_edges
 from warpflat.flattening.result import Flattening
 from warpflat.garment.garment import Garment
+from warpflat.pattern.pieces import Pattern, Piece
+from warpflat.pattern.whole_pieces import MIRRORED
 from warpflat.surface.triangles import corner_triangles
 
-__all__ = ["edge_lengths", "largest_share", "pieces_of", "seam_edges", "seam_rows", "with_pattern"]
+__all__ = ["edge_lengths", "largest_share", "moved_outlines", "pieces_of", "seam_edges", "seam_rows", "with_pattern"]
 
 # No cell shrinks below this share of its area in a step.
 _LEAST_AREA = 0.5
@@ -64,6 +67,54 @@ def largest_share(cloth: SewnCloth, step: FloatArray) -> float:
     while share > 1e-3 and (areas(cloth.flat + share * step) < _LEAST_AREA * before).any():
         share *= 0.5
     return share
+
+
+def moved_outlines(pattern: Pattern, size: str, before: SewnCloth, after: SewnCloth) -> Pattern:
+    """Return a pattern of one size whose pieces have moved as the flat cloth that was meshed from them.
+
+    Halves on the fold move evenly on both sides of it, and pieces that are cut in pairs alike.
+
+    Args:
+        pattern: of outlines.
+        size: that was meshed.
+        before, after: the cloth, whose pieces are those of :func:`warpflat.pattern.whole_pieces.whole_pieces`.
+    """
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+    def mover(name: str) -> Callable[[FloatArray], FloatArray]:
+        rows = before.piece_vertices[name]
+        places, move = before.flat[rows], after.flat[rows] - before.flat[rows]
+        inside, beside = LinearNDInterpolator(places, move), NearestNDInterpolator(places, move)
+
+        def moves(points: FloatArray) -> FloatArray:
+            found = inside(points)
+            return np.where(np.isfinite(found), found, beside(points))
+
+        return moves
+
+    def moved(piece: Piece) -> Piece:
+        if piece.name not in before.piece_vertices:
+            return piece
+        own, fold = mover(piece.name), next((edge.points for edge in piece.edges if edge.kind == "fold"), None)
+        other, mirror, origin = own, np.eye(2), np.zeros(2)
+        if fold is not None:
+            along = (fold[-1] - fold[0]) / np.linalg.norm(fold[-1] - fold[0])
+            mirror, origin = 2.0 * np.outer(along, along) - np.eye(2), fold[0]
+        elif piece.name + MIRRORED in before.piece_vertices:
+            other, mirror = mover(piece.name + MIRRORED), np.diag([-1.0, 1.0])
+
+        def go(points: FloatArray) -> FloatArray:
+            image = (points - origin) @ mirror + origin
+            return np.asarray(points + 0.5 * (own(points) + other(image) @ mirror))
+
+        return replace(
+            piece, edges=[replace(edge, points=go(edge.points), vertices=None) for edge in piece.edges],
+            holes=[replace(hole, points=go(hole.points)) for hole in piece.holes],
+            internal_lines={name: go(line) for name, line in piece.internal_lines.items()},
+            marks={name: go(point[None])[0] for name, point in piece.marks.items()},
+        )  # fmt: skip
+
+    return replace(pattern, pieces={size: [moved(piece) for piece in pattern.pieces[size]]}, sample_size=size)
 
 
 def pieces_of(garment: Garment | Flattening) -> dict[str, Flattening]:

@@ -31,6 +31,7 @@ __all__ = [
     "check_names",
     "export_patterns",
     "garment_files",
+    "outline_files",
     "pattern_names",
     "surface_files",
 ]
@@ -162,6 +163,15 @@ def surface_files(
     return _write_pattern(
         lambda: pattern_of_surface(results, name=name, rules=options.rules, seams=seams), folder, name, options
     )
+
+
+def outline_files(pattern: Pattern, folder: str | Path, *, name: str, options: PatternOptions) -> WrittenPattern:
+    """Write a pattern of outlines; what cannot be drawn becomes a note, as in :func:`garment_files`.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    return _write_pattern(lambda: (pattern, ()), folder, name, options)
 
 
 def export_patterns(

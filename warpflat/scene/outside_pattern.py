@@ -19,6 +19,7 @@ from warpflat.scene.run import SceneResult
 from warpflat.scene.schema import DrapeTable
 
 if TYPE_CHECKING:
+    from warpflat.draping.correct_pattern import Correction
     from warpflat.draping.lift import Lift
     from warpflat.mannequin.mannequin import Mannequin
     from warpflat.pattern.pieces import Pattern, Piece, Seam
@@ -243,8 +244,12 @@ def drape_outside(
     size: str | None = None,
     device: str | None = None,
     usd: bool = False,
+    correct: bool = False,
 ) -> SceneResult:
     """Drape a pattern from outside; write `metrics.json`, `NAME.draped.obj` per piece, `frames.usdc` and pictures, all of them or none.
+
+    Corrected, it is let out where the worn cloth is stretched beyond its limit (see `relieve_pattern`), and `NAME.corrected.dxf`,
+    `NAME.corrected.svg` and `corrected.png` are written, too.
 
     Args:
         job: what is draped.
@@ -253,6 +258,7 @@ def drape_outside(
         size: of the pattern; its sample size if not given.
         device: Warp device.
         usd: whether `worn.usdc` is written, too.
+        correct: whether the pattern is corrected.
 
     Raises:
         InputError: an unknown fabric or size, a pattern that cannot be meshed, placed or written.
@@ -260,17 +266,22 @@ def drape_outside(
     import warp as wp
 
     from warpflat.core.activity import report_activity
-    from warpflat.core.output import output_folder, remove_stale, require_own_metrics
+    from warpflat.core.output import optional_file, output_folder, remove_stale, require_own_metrics
+    from warpflat.draping.correct_pattern import relieve_pattern
     from warpflat.draping.drape_pattern import Placement, drape_pattern
+    from warpflat.draping.moved_pattern import moved_outlines
     from warpflat.draping.options import DrapeOptions
     from warpflat.draping.write import write_drape_files
     from warpflat.flattening.result import run_metrics
+    from warpflat.garment.pattern_files import PatternOptions, outline_files
 
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
     options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
     usd = usd or table.usd
     names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc", *(["worn.usdc"] if usd else [])]
+    if correct:
+        names += ["corrected.png", f"{job.name}.corrected.dxf", f"{job.name}.corrected.svg"]
     with output_folder(out, names, sources=job.sources, guard=True) as folder:
         require_own_metrics(folder)
         report_activity("draping")
@@ -282,11 +293,53 @@ def drape_outside(
             draped, more = drape_pattern(
                 pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
             )
-        files = [*write_drape_files(draped, folder, frames=True, usd=usd), "metrics.json"]
+        files, entry = write_drape_files(draped, folder, frames=True, usd=usd), draped.measures()
+        if correct and not draped.converged:
+            more = [*more, "the pattern was not corrected, as the drape is not at rest; raise max_steps in [drape]"]
+        elif correct:
+            report_activity("correcting the pattern")
+            with errors_named(job.name):
+                found = relieve_pattern(draped, hold=table.hold)
+            entry["correction"] = {
+                "reason": found.reason,
+                "fabric": cloth.name,
+                "rounds": [
+                    {
+                        "misfit_m": each.misfit,
+                        "misfit_p95_m": each.misfit_p95,
+                        "beyond_limit": each.strained,
+                        "share": each.share,
+                    }
+                    for each in found.rounds
+                ],
+                "seam_difference_m": found.seam_difference(),
+                "edges": {},
+            }
+            with optional_file(folder / "corrected.png", files) as path:
+                from warpflat.draping.correction_picture import write_correction_picture
+
+                write_correction_picture(path, found)
+            chosen = pattern.sample if size is None else size
+            moved = moved_outlines(pattern, chosen, found.before.cloth, found.after.cloth)
+            drawing = PatternOptions(formats=("dxf", "svg"))
+            written = outline_files(moved, folder, name=f"{job.name}.corrected", options=drawing)
+            files += written.files
+            more = [*more, *written.notes, _correction_words(found)]
+        files.append("metrics.json")
         body = {} if job.body is None else {"mannequin": job.body.metrics()}
-        measured = run_metrics({}, wp.get_device(device), {**body, "drape": draped.measures()})
+        measured = run_metrics({}, wp.get_device(device), {**body, "drape": entry})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)
     return SceneResult(metrics=metrics, files=tuple(files), notes=(*notes, *more, *stale))
+
+
+def _correction_words(found: Correction) -> str:
+    """Return in a sentence what a correction has come to."""
+    first, last = found.rounds[0].strained, found.rounds[-1].strained
+    rounds = len(found.rounds) - 1
+    return (
+        f"corrected in {rounds} rounds: {100 * first:.1f} % of the cloth was stretched beyond its limit, now {100 * last:.1f} % "
+        f"({found.reason})"
+    )
 
 
 def _fabric(job: OutsideJob, name: str | None) -> tuple[Any, Sequence[str]]:
