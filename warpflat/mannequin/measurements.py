@@ -166,7 +166,9 @@ def _found(size: str) -> tuple[str, str, str]:
     names = size_names()
     # EU 39 is nearer to EU 38 than to EU 98.
     digits = re.search(r"\d+", name)
-    alike = [other for other in names if digits and re.sub(r"\d+", "", _plain(other)) == re.sub(r"\d+", "", _plain(name))]
+    alike = [
+        other for other in names if digits and re.sub(r"\d+", "", _plain(other)) == re.sub(r"\d+", "", _plain(name))
+    ]
     if digits and alike:
         near = min(alike, key=lambda other: abs(int(re.sub(r"\D", "", other)) - int(digits[0][:9])))
         raise InputError(f"size {size!r} is in no table: did you mean {near!r}? {nearest('', names)}")
