@@ -9,7 +9,7 @@ from self_intersections import self_intersections
 from warpflat.core.errors import InputError
 from warpflat.mannequin.layout import make_layout
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.measurements import measurements_from_size, measurements_from_values, size_names
+from warpflat.mannequin.measurements import measurements_from_size, measurements_from_values, size_names, size_tables
 from warpflat.mannequin.normals import face_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth, superellipse_exponent
 
@@ -65,9 +65,10 @@ def test_left_and_right_are_mirror_images(bodies: dict[str, Mannequin]) -> None:
     assert np.abs(other - body.vertices).max() < 1e-5
 
 
-@pytest.mark.parametrize("table", ["EU", "US", "JIS", "men"])
+@pytest.mark.parametrize("table", list(size_tables()["tables"]))
 def test_area_and_girth_grow_with_size(bodies: dict[str, Mannequin], table: str) -> None:
-    row = [bodies[name] for name in SIZES if name.startswith(table + " ")]
+    own = size_tables()["tables"][table]
+    row = [bodies[f"{own['label']} {size}"] for size in own["sizes"]]
     areas = [_area(body) for body in row]
     assert np.all(np.diff(areas) > 0.005)
     for level in ("bust", "waist", "hip", "neck", "armhole left"):
@@ -113,6 +114,9 @@ def test_resolution_keeps_the_body(edge: float, bodies: dict[str, Mannequin]) ->
 
 def test_aliases_and_statures() -> None:
     assert measurements_from_size("UK 10").lengths == measurements_from_size("eu38").lengths
+    assert measurements_from_size("UK 32").lengths["bust"] == 1.46
+    assert measurements_from_size("EU 40 petite").lengths == measurements_from_size("EU 40/158").lengths
+    assert measurements_from_size("EU 40 tall").lengths["stature"] == 1.74
     tall = measurements_from_size("men 50/188")
     assert tall.lengths["hip"] == pytest.approx(0.964 + 2 * 0.012)
     assert tall.heights["nape"] == pytest.approx(1.522 + 2 * 0.054)
@@ -129,6 +133,31 @@ def test_missing_measurements_are_completed_and_said() -> None:
     assert body.notes == made.notes
 
 
+def test_centimetres_and_millimetres_are_read_as_they_must_be_meant() -> None:
+    made = measurements_from_values(bust=104, waist=880.0, hip=1.12)
+    assert [made.lengths[name] for name in ("bust", "waist", "hip")] == pytest.approx([1.04, 0.88, 1.12])
+    assert made.notes[:2] == (
+        "bust = 104 is read as cm: in metres it is 1.04", "waist = 880 is read as mm: in metres it is 0.88"
+    )  # fmt: skip
+    assert measurements_from_size("EU 38", waist=74).lengths["waist"] == pytest.approx(0.74)
+    # No length in one unit could be meant in another.
+    for low, high in size_tables()["valid"]["range"].values():
+        assert high < 10.0 * low
+
+
+def test_a_child_is_no_small_woman() -> None:
+    typed = measurements_from_values(bust=0.64, waist=0.58, hip=0.68, stature=1.28)
+    assert typed.body == "children"
+    assert any(note.startswith("completed as a child's") for note in typed.notes)
+    assert measurements_from_values(table="women", bust=0.64, stature=1.28).body == "women"
+    assert measurements_from_values(bust=0.84, stature=1.50).body == "women"
+    # Heads grow less than bodies.
+    heads = [measurements_from_size(f"EU {size}").lengths["head"] for size in (92, 128, 164)]
+    assert heads == pytest.approx([0.498, 0.525, 0.552])
+    with pytest.raises(InputError, match="leave out 'tall'"):
+        measurements_from_size("EU 104 tall")
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -140,6 +169,8 @@ def test_missing_measurements_are_completed_and_said() -> None:
         ({"neck": 0.37}, "at least one of bust, waist, hip"),
         ({"bust": 0.88, "wasit": 0.7}, "did you mean 'waist'"),
         ({"bust": True}, "a number of metres"),
+        ({"bust": 0.88, "height": 1.66}, "'height' is unknown: did you mean 'stature'"),
+        ({"bust": 41}, r"valid range 0\.5 to 1\.8 m; 41 inches are 1\.04 m"),
     ],
 )
 def test_nonsense_is_refused_with_the_valid_range(given: dict[str, float], words: str) -> None:

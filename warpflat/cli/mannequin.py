@@ -20,7 +20,9 @@ __all__ = ["mannequin", "read_lengths"]
 @click.option("--size", metavar="SIZE", help='Of a size table: "EU 38", "UK 10", "US 8", "JIS 9AR", "men 50".')
 @click.option("--measure", "measures", multiple=True, metavar="NAME=METRES", help="A measurement, such as bust=0.88.")
 @click.option(
-    "--table", type=click.Choice(["women", "men"]), help="Completes the measurements.  [default: the size's, or women]"
+    "--table",
+    type=click.Choice(["women", "men", "children"]),
+    help="Completes the measurements.  [default: the size's, or women]",
 )
 @click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, OFF, GLB.")
 @click.option("--units", metavar="UNIT", help="Of the scan: m, cm, mm ...  [default: told from its height]")

@@ -42,8 +42,9 @@ __all__ = [
     "straight_hems",
 ]
 
-# The arm's levels from the elbow on: an elbow that is bent makes the cloth below it as long as it is bent, by column.
-_BELOW_ELBOW = ("elbow", "forearm", "wrist")
+# The arm's levels at which sleeves end. An upper arm tapers, and an elbow that is bent makes the cloth below it as long as it is bent,
+# by column.
+_SLEEVE_HEMS = ("biceps", "elbow", "forearm", "wrist")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -262,7 +263,7 @@ def find_piece(constraint: PieceConstraint, pieces: Mapping[str, Flattening]) ->
 
 
 def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straight]:
-    """Return the hems of sleeves that end at or below the elbow as straight lines; fullness at the elbow takes up the bend.
+    """Return the hems of sleeves as straight lines; the cap, or fullness at the elbow, takes up what they would curve by.
 
     A hem lies along the weft, or square to the forearm where an elbow dart swings it.
 
@@ -278,5 +279,5 @@ def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straigh
         Straight(piece=name, line=edge, along="free" if piece.darts else "weft")
         for name, piece in form.pieces.items()
         for edge in piece.edges
-        if edge.split(" ")[0] in _BELOW_ELBOW and (name, edge) not in sewn and edge not in sum(piece.darts.values(), ())
+        if edge.split(" ")[0] in _SLEEVE_HEMS and (name, edge) not in sewn and edge not in sum(piece.darts.values(), ())
     ]

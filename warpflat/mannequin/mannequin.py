@@ -96,7 +96,7 @@ class Mannequin:
         return cls._from(measurements_from_size(size, **lengths), resolution_mm)
 
     @classmethod
-    def from_measurements(cls, *, table: str = "women", resolution_mm: float = 10.0, **lengths: float) -> Mannequin:
+    def from_measurements(cls, *, table: str | None = None, resolution_mm: float = 10.0, **lengths: float) -> Mannequin:
         """Return a mannequin to given measurements [m]; the missing ones are completed by `table`'s proportions (see `notes`).
 
         Raises:

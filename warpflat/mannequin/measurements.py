@@ -7,7 +7,7 @@ import importlib.resources
 import math
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,6 +30,18 @@ __all__ = [
 ]
 
 
+#: What measurements are called elsewhere.
+_OTHER_NAMES = {
+    "height": "stature", "body_height": "stature", "chest": "bust", "hips": "hip", "seat": "hip", "inseam": "inside_leg",
+    "inside_leg_length": "inside_leg", "biceps": "upper_arm", "bicep": "upper_arm", "sleeve": "arm_length",
+    "back_length": "nape_to_waist", "under_bust": "underbust",
+}  # fmt: skip
+#: A body of a lower stature [m] is completed as a child's: one woman in a hundred is not as tall.
+_GROWN = 1.46
+#: How far the stature [cm] of a size for short and for tall people lies from the table's, as in the sizes of the German trade.
+_STATURES = {"petite": -8.0, "tall": 8.0}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Measurements:
     """A complete set of measurements and level heights of one body.
@@ -37,7 +49,7 @@ class Measurements:
     Attributes:
         lengths: every measurement by name [m]; girths are those of the convex hull, as a tape takes them.
         heights: height of every level and of nape, side_neck, front_neck, underarm above the floor [m].
-        body: whose cross-sections are used, ``women`` or ``men``.
+        body: whose cross-sections are used, ``women``, ``men`` or ``children``.
         source: where the numbers come from, for metrics and messages.
         notes: one sentence for each measurement that was not given but completed, or given instead of a size's.
     """
@@ -66,7 +78,7 @@ def size_names() -> list[str]:
 
 
 def size_table(size: str) -> str:
-    """Return the table whose proportions complete a size: ``women`` or ``men``.
+    """Return the table whose proportions complete a size: ``women``, ``men`` or ``children``.
 
     Raises:
         InputError: if no table has the size.
@@ -79,7 +91,8 @@ def measurements_from_size(size: str, **given: float) -> Measurements:
     """Return the measurements of a size of the tables, some of them replaced.
 
     Args:
-        size: a name of :func:`size_names`, optionally with a stature in centimetres: ``men 50/182``.
+        size: a name of :func:`size_names`, optionally with a stature in centimetres, ``men 50/182``, or ``EU 38 petite``
+            or ``tall``: 8 cm shorter or taller than its table.
         given: lengths [m] by name, instead of the size's. What follows from them follows: the abdomen from waist and hip,
             lengths down the body from the stature, and all that the size does not give itself.
 
@@ -88,12 +101,12 @@ def measurements_from_size(size: str, **given: float) -> Measurements:
             range, or goes with no body of that size.
     """
     key, name, tall = _found(size)
-    _check_given(given)
+    given, read = _read_given(given)
     if tall and "stature" in given:
         raise InputError(f"size {size!r} and measurement stature = {given['stature']:g} m: give the stature once")
     table = size_tables()["tables"][key]
     title = f"size {table['label']} {name}" + (f"/{tall}" if tall else "")
-    replaced = {k: float(v) for k, v in given.items()}
+    replaced = dict(given)
     label = title + (f" with {_listed(replaced)}" if given else "") + f" ({table['source']}; grade {table['grade']})"
     if tall:
         low, high = size_tables()["valid"]["range"]["stature"]
@@ -105,55 +118,91 @@ def measurements_from_size(size: str, **given: float) -> Measurements:
             raise InputError(f"size {size!r}: stature after '/' must be {low:g} to {high:g} cm")
         replaced["stature"] = value / 100.0
     values = {k: v / 100.0 for k, v in table["sizes"][name].items()}
-    return _Completion(key, replaced, values, title=title).measurements(label)
+    return _Completion(key, replaced, values, title=title, notes=read).measurements(label)
 
 
-def measurements_from_values(*, table: str = "women", **given: float) -> Measurements:
+def measurements_from_values(*, table: str | None = None, **given: float) -> Measurements:
     """Return measurements that a user gives, the missing ones completed by a table's proportions.
 
     Args:
-        table: ``women`` or ``men``: whose proportions and cross-sections complete the rest.
+        table: ``women``, ``men`` or ``children``: whose proportions and cross-sections complete the rest; without it the women's,
+            and the children's below a stature of 1.46 m.
         given: lengths [m] by name: bust, waist, hip, neck, shoulder, stature, ... At least bust, waist or hip.
 
     Raises:
         InputError: for an unknown name, a value outside its valid range, or two values that no body has together.
     """
     tables = {k for k, t in size_tables()["tables"].items() if "complete_from" not in t}
-    if table not in tables:
+    if table is not None and table not in tables:
         raise InputError(f"measurements: table {table!r} is unknown: {nearest(table, tables)}")
-    _check_given(given)
+    values, read = _read_given(given)
     if not {"bust", "waist", "hip"} & set(given):
         raise InputError("measurements: give at least one of bust, waist, hip (in metres)")
-    values = {k: float(v) for k, v in given.items()}
-    return _Completion(table, values).measurements(f"measurements, {table}'s proportions")
+    if table is None:
+        child = values.get("stature", _GROWN) < _GROWN
+        table = "children" if child else "women"
+        if child:
+            read.append(
+                f'completed as a child\'s, below a stature of {_GROWN:g} m; table = "women" or "men" says otherwise'
+            )
+    return _Completion(table, values, notes=read).measurements(f"measurements, {table}'s proportions")
 
 
 def _found(size: str) -> tuple[str, str, str]:
     """Return a size's table, its name there, and the stature after its '/', if any."""
     expect(size, str, "size", 'text, such as "EU 38"')
     name, _, tall = size.partition("/")
+    word = next((word for word in _STATURES if name.lower().endswith(f" {word}")), "")
+    name = name[: len(name) - len(word)]
     for key, table in size_tables()["tables"].items():
         aliases = {_plain(a): s for a, s in table.get("aliases", {}).items()}
         known = {_plain(f"{table['label']} {s}"): s for s in table["sizes"]} | aliases
         if _plain(name) in known:
-            return key, known[_plain(name)], tall
-    raise InputError(f"size {size!r} is in no table: {nearest(name, size_names())}")
+            if word and (tall or table["body"] == "children"):
+                raise InputError(
+                    f"size {size!r}: a stature goes with it once, and a child's is its size: leave out {word!r}"
+                )
+            return key, known[_plain(name)], f"{table['stature'] + _STATURES[word]:g}" if word else tall
+    names = size_names()
+    # EU 39 is nearer to EU 38 than to EU 98.
+    digits = re.search(r"\d+", name)
+    alike = [
+        other for other in names if digits and re.sub(r"\d+", "", _plain(other)) == re.sub(r"\d+", "", _plain(name))
+    ]
+    if digits and alike:
+        near = min(alike, key=lambda other: abs(int(re.sub(r"\D", "", other)) - int(digits[0][:9])))
+        raise InputError(f"size {size!r} is in no table: did you mean {near!r}? {nearest('', names)}")
+    raise InputError(f"size {size!r} is in no table: {nearest(name, names)}")
 
 
 def _completing(table: str) -> str:
     return str(size_tables()["tables"][table].get("complete_from", table))
 
 
-def _check_given(given: Mapping[str, object]) -> None:
-    ranges = size_tables()["valid"]["range"]
+def _read_given(given: Mapping[str, object]) -> tuple[dict[str, float], list[str]]:
+    """Return the lengths [m] that a user gives, and a note for each that was in centimetres or millimetres.
+
+    A length in metres is none in centimetres: the valid ranges of the two lie apart.
+    """
+    ranges, lengths, notes = size_tables()["valid"]["range"], dict[str, float](), list[str]()
     for name, value in given.items():
         if name not in ranges:
-            raise InputError(f"measurement {name!r} is unknown: {nearest(name, ranges)}")
+            other = _OTHER_NAMES.get(name.lower())
+            words = nearest(name, ranges) if other is None else f"did you mean {other!r}?"
+            raise InputError(f"measurement {name!r} is unknown: {words}")
         if not is_number(value):
             raise InputError(f"measurement {name} = {value!r}: a number of metres is needed")
         low, high = (v / 100.0 for v in ranges[name])
-        if not math.isfinite(value) or not low <= value <= high:
-            raise InputError(f"measurement {name} = {value:g} m: valid range {low:g} to {high:g} m")
+        for unit, scale in (("m", 1.0), ("cm", 0.01), ("mm", 0.001)):
+            if low <= value * scale <= high:
+                lengths[name] = float(value) * scale if unit != "m" else float(value)
+                if unit != "m":
+                    notes.append(f"{name} = {value:g} is read as {unit}: in metres it is {lengths[name]:g}")
+                break
+        else:
+            inches = f"; {value:g} inches are {value * 0.0254:.3g} m" if low <= value * 0.0254 <= high else ""
+            raise InputError(f"measurement {name} = {value:g} m: valid range {low:g} to {high:g} m{inches}")
+    return lengths, notes
 
 
 def _plain(name: str) -> str:
@@ -172,20 +221,27 @@ class _Completion:
         given: lengths [m] by name.
         of_size: lengths [m] that the size gives, at its table's stature.
         title: of the size, for messages.
+        notes: that come first.
     """
 
     def __init__(
-        self, table: str, given: Mapping[str, float], of_size: Mapping[str, float] | None = None, *, title: str = ""
+        self,
+        table: str,
+        given: Mapping[str, float],
+        of_size: Mapping[str, float] | None = None,
+        *,
+        title: str = "",
+        notes: Iterable[str] = (),
     ) -> None:
         tables = size_tables()["tables"]
         self._own, self._name = tables[table], _completing(table)
         self._rows = tables[self._name]
         self._body = size_tables()["bodies"][self._own["body"]]
         self._given, self._title = given, title
-        self._notes: list[str] = []
+        self._notes = list(notes)
         self._lengths = dict(given)
         self._known = set(given)
-        if "stature" not in given:
+        if "stature" not in given and (of_size or "stature" not in next(iter(self._rows["sizes"].values()))):
             stature = self._own["stature"] / 100.0
             if of_size:
                 self._lengths["stature"] = stature
@@ -225,7 +281,8 @@ class _Completion:
         lengths, rows = self._lengths, self._rows["sizes"].values()
         for name in next(iter(rows)):
             if name not in lengths and name not in self._between:
-                key = next(k for k in ("bust", "waist", "hip") if k in lengths)
+                bones = ("stature",) if name in self._rows.get("by_stature", ()) else ()
+                key = next(k for k in (*bones, "bust", "waist", "hip") if k in lengths)
                 # Linear between the table's sizes and beyond its ends [cm].
                 x, y = (np.array([size[each] for size in rows], float) for each in (key, name))
                 at = lengths[key] * 100.0
@@ -239,7 +296,9 @@ class _Completion:
             if name in lengths:
                 continue
             if "of" in rule:
-                value, how = rule["share"] * lengths[rule["of"]], f"is {rule['share']:g} of {rule['of']}"
+                more = rule.get("plus", 0.0)
+                value = rule["share"] * lengths[rule["of"]] + more / 100.0
+                how = f"is {rule['share']:g} of {rule['of']}" + (f" and {more:g} cm" if more else "")
             else:
                 a, b = rule["between"]
                 value, how = lengths[a] + rule["at"] * (lengths[b] - lengths[a]), f"lies between {a} and {b}"
@@ -262,7 +321,8 @@ class _Completion:
             h["bust"] = min(h["bust"], h["underarm"] - 0.032)
             h["side_neck"] = h["nape"] - 0.008 * stature
             h["front_neck"] = h["nape"] - 0.0385 * stature
-        h["hip"] = min(h["hip"], h["waist"] - 0.11)
+        # A small child is short from waist to hip.
+        h["hip"] = min(h["hip"], h["waist"] - min(0.11, 0.095 * stature))
         # The crotch curve needs room below the hip, the rows above the thigh's girth below the crotch.
         h["crotch"] = min(lengths["inside_leg"], h["hip"] - 0.02 * stature)
         h["leg_thigh"] = h["crotch"] - 0.03 * stature

@@ -26,8 +26,8 @@ class MannequinTable(Table):
 
     size: str | None = None
     measurements: dict[str, float] | None = None
-    table: Literal["women", "men"] | None = None
-    """Whose proportions complete the measurements; a size's own, or the women's."""
+    table: Literal["women", "men", "children"] | None = None
+    """Whose proportions complete the measurements; a size's own, or the women's, and the children's below 1.46 m."""
     scan: str | None = None
     """A mesh file, from the scene's folder on; may name environment variables."""
     units: str | None = None
@@ -82,7 +82,7 @@ def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path
             )
         return Mannequin.from_size(table.size, resolution_mm=table.resolution_mm, **given)
     if table.measurements is not None:
-        return Mannequin.from_measurements(table=table.table or "women", resolution_mm=table.resolution_mm, **given)
+        return Mannequin.from_measurements(table=table.table, resolution_mm=table.resolution_mm, **given)
     options = ScanOptions(
         unit=table.units, up=table.up, facing=table.facing, landmarks=table.landmarks, symmetric=table.symmetric
     )

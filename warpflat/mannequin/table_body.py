@@ -24,12 +24,13 @@ PRINCESS = {
     "ankle": (0.62, 0.62), "knee": (0.80, 0.80), "thigh": (1.05, 1.05), "hip": (1.05, 1.08), "abdomen": (0.92, 0.90),
     "waist": (0.82, 0.80), "underbust": (0.94, 0.92), "bust": (1.00, 1.00),
 }  # fmt: skip
-_SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0)}
+_SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0), "children": np.radians(21.0)}
 # Where the side line passes the bust: this share of the way back from where it passes the underbust to the widest points.
 _SIDE_BACK = 0.25
 _ARM_ANGLE = np.radians(40.0)
-# How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew.
-_SHORTEST_SLEEVE = 0.092
+# How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew. On a small child it is this
+# share of the arm.
+_SHORTEST_SLEEVE, _SHORT_SHARE = 0.092, 0.2
 # How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
 _NOTCH = 0.22
 
@@ -275,7 +276,7 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
         scale = girth / polyline_length(shape, closed=True)
         return middle + at * axis + forward * ahead + scale * shape
 
-    biceps_at = float((under - middle) @ axis) + _SHORTEST_SLEEVE
+    biceps_at = float((under - middle) @ axis) + min(_SHORTEST_SLEEVE, _SHORT_SHARE * length)
     left = ArmCurves(
         biceps=ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
         elbow=ring(start + 0.575 * length, m.lengths["elbow"], 1.0, 0.004),
