@@ -333,6 +333,8 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
         ]
         guide, sheets = ("".join(page for page in pages if ("sheet A" in page) == wanted) for wanted in (False, True))
         drawn = [(tmp_path / "opened" / f"{path.stem}.{ending}").read_text() for ending in ("svg", "dxf")]
+        assert "Measures" in guide
+        assert "from the back" in guide
         for text in (guide, sheets, *drawn):
             named = set(re.findall(r"zip|button|vent|slit|keyhole", text.replace(path.stem, "").replace(own_name, "")))
             assert openings <= named

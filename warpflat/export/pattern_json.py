@@ -541,7 +541,10 @@ def _worn(worn: Worn) -> dict[str, Any]:
     """Return the entry of a garment as it is worn."""
     return {
         "views": {
-            side: [{"outlines": [x.tolist() for x in each.outlines], "lines": [x.tolist() for x in each.lines]} for each in row]
+            side: [
+                {"outlines": [x.tolist() for x in each.outlines], "lines": [x.tolist() for x in each.lines]}
+                for each in row
+            ]
             for side, row in worn.views.items()
         },
         "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},

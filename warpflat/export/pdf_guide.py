@@ -165,7 +165,9 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     )
     pictures = step_pictures(whole, size, steps)
     for number, (words, picture) in enumerate(zip(steps, pictures, strict=True), 1):
-        _step(page, number, words, [(piece, picture[piece.name]) for piece in whole.pieces[size] if piece.name in picture])
+        _step(
+            page, number, words, [(piece, picture[piece.name]) for piece in whole.pieces[size] if piece.name in picture]
+        )
     seams = sewn_seams(whole, size)
     if seams:
         page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)

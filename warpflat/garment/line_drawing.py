@@ -44,7 +44,8 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
         if each.form is not None and each.mannequin is not None:
             girths = pattern_girths(each.mannequin, each.form, each.positions)
             measures[size] = tuple(
-                Measure(name=level, body=girth["body_m"], finished=girth["pattern_m"]) for level, girth in girths.items()
+                Measure(name=level, body=girth["body_m"], finished=girth["pattern_m"])
+                for level, girth in girths.items()
             )
     needed = tuple(
         NeededOpening(

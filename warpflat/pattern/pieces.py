@@ -17,8 +17,8 @@ from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
 from warpflat.pattern.seam_difference import eased_length
-from warpflat.pattern.worn import Worn
 from warpflat.pattern.words import translate_name
+from warpflat.pattern.worn import Worn
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 if TYPE_CHECKING:

@@ -271,7 +271,15 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
 
 def tools(garment: DraftedGarment, size: str) -> str:
     """Return what the garment is made with, in words."""
-    steps = ["paper scissors and glue or tape", "cloth scissors", "tape measure", "chalk", "pins", "iron", "sewing machine"]
+    steps = [
+        "paper scissors and glue or tape",
+        "cloth scissors",
+        "tape measure",
+        "chalk",
+        "pins",
+        "iron",
+        "sewing machine",
+    ]
     steps += ["hand needle"]
     if any(_zips(seam) for seam in sewn_seams(garment, size)):
         steps.append("zip foot")
@@ -292,7 +300,9 @@ def step_pictures(garment: DraftedGarment, size: str, steps: Sequence[str]) -> l
     hems = translate("Turn up and sew the hems: {edges}.", edges="\n").split("\n")[0]
     found = []
     for step in steps:
-        named = set(re.findall(r"(?<!\w)([A-Z]{1,2})(?= \()", step)) | set(re.findall(r"(?<= )([A-Z]{1,2})(?= [a-z])", step))
+        named = set(re.findall(r"(?<!\w)([A-Z]{1,2})(?= \()", step)) | set(
+            re.findall(r"(?<= )([A-Z]{1,2})(?= [a-z])", step)
+        )
         sewn: dict[str, set[str]] = {}
         for seam in garment.garment.seams:
             if letters[seam.name] in named:
