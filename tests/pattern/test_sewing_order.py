@@ -91,7 +91,7 @@ def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
     assert "then close the seam below it" in steps[places["zip"]]
     # Nothing is finished twice, and no armhole is left raw.
     assert not any("Finish the raw edges" in step for step in steps)
-    assert notions(drafted, "") == ("1 invisible zip of 30 cm",)
+    assert notions(drafted, "") == ("sewing thread", "1 invisible zip of 30 cm")
     # The letters follow the steps.
     assert seam_letters(drafted)["centre back"] == "A"
     # A pattern that was written and read again is sewn alike.

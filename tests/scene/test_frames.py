@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -152,6 +153,13 @@ def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
     assert np.array_equal(np.array(shown.GetFaceVertexIndicesAttr().Get()), faces)
     moved = np.linalg.norm(np.array(shown.GetPointsAttr().Get()) - np.array(body.GetPointsAttr().Get()), axis=1)
     assert np.allclose(moved[np.unique(faces)], 0.002, atol=1e-6)
+    # The patterns lie beside the body, and each mesh says whose it is.
+    corners = UsdGeom.BBoxCache(Usd.TimeCode(1), [UsdGeom.Tokens.default_])
+    body_box = corners.ComputeWorldBound(shown.GetPrim()).ComputeAlignedRange()
+    for piece in json.loads((folder / "metrics.json").read_text())["pieces"]:
+        pattern = film.GetPrimAtPath(f"/World/{piece}/pattern")
+        assert corners.ComputeWorldBound(pattern).ComputeAlignedRange().GetMin()[0] > body_box.GetMax()[0]
+        assert pattern.GetDisplayName() == f"{piece} pattern"
     line = film.GetPrimAtPath("/World/mannequin/lines").GetChildren()[0]
     assert UsdGeom.Imageable(line).ComputePurpose() == UsdGeom.Tokens.guide
 
