@@ -315,8 +315,10 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
         width, height = sheet.size + 2 * paper.margin + paper.overlap
         paper = replace(paper, width=float(width), height=float(height))
         return sheet, make_tiling(sheet, paper)
-    sheet = _on_pages(groups, paper)
-    if sheet is None:  # a piece is larger than the paper
+    packed = _on_pages(groups, paper)
+    if packed is not None:
+        sheet = packed
+    else:  # a piece is larger than the paper
         width = paper.step[0] + paper.overlap
         sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
     return sheet, make_tiling(sheet, paper)

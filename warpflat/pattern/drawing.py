@@ -309,8 +309,8 @@ def _annotations(
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
             others = [*drawn[:index], *drawn[index + 1 :]]
             # Beside an edge, as a zip is, a name may have room on one side alone.
-            for beside in (side, "either") if side == "above" else (side,):
-                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=beside)
+            for which in (side, "either") if side == "above" else (side,):
+                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=which)
                 if write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
                     break
     # The first button and the first buttonhole of a row, which are too short for a name along them.
@@ -333,8 +333,8 @@ def _annotations(
             (1.6, 0),
             (-1.6, 0),
         ]
-        beside = [Spot(x=float(x), y=float(y)) for x, y in at + out * sides]
-        write(text, NAME, beside, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
+        around = [Spot(x=float(x), y=float(y)) for x, y in at + out * sides]
+        write(text, NAME, around, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
     letters = {} if paper is None else paper.letters
     for notch in piece.notches:
         letter = letters.get(notch.seam)
