@@ -68,7 +68,10 @@ def test_a_force_of_ones_own_is_balanced_by_the_cloth() -> None:
     assert alone.model_energy_j == pytest.approx(plain.model_energy_j, rel=1e-3)
     assert narrow < free - 1e-3
     # The work of the pull is what the cloth has stored: it is at a minimum of both energies.
-    both = [state.model_energy_j + 0.25 * ((state.positions[:, 0] - state.positions[:, 0].mean()) ** 2).sum() for state in (alone, pulled)]
+    both = [
+        state.model_energy_j + 0.25 * ((state.positions[:, 0] - state.positions[:, 0].mean()) ** 2).sum()
+        for state in (alone, pulled)
+    ]
     assert both[1] < both[0]
     with pytest.raises(InputError, match=r"force: gave an array of shape \(2,\); should be \(81, 2\)"):
         list(warpflat.relaxation(shape, force=lambda layout: [0.0, 1.0]))

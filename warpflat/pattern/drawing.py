@@ -301,10 +301,14 @@ def _annotations(
         elif borders and edge.kind != "fold" and edge.name not in second_legs:
             named.append((edge.name, edge.line, "left"))
     named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
-    called = {name for name, _, _ in named}
+    called, hems = {name for name, _, _ in named}, {edge.name for edge in piece.edges if edge.kind == "hem"}
     drawn = [shapely.LineString(line) for _, line, _ in named]
     for index, (name, line, side) in enumerate(named):
-        text = translate_name(name_without_number(name, called))
+        # What is turned up is a hem for a sewer, whatever level of the body it lies at; a vent keeps its name.
+        kind = (
+            "hem" if name in hems and not {"vent", "slit"} & set(name.split(" ")) else name_without_number(name, called)
+        )
+        text = translate_name(kind)
         width = text_width(text, NAME)
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
             others = [*drawn[:index], *drawn[index + 1 :]]
