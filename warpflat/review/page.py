@@ -159,12 +159,13 @@ def _page(
             speeds = "".join(
                 f'<option value="{x:g}"{" selected" if x == 1 else ""}>{x:g} x</option>' for x in (0.25, 0.5, 1, 2)
             )
+            body = '<label><input id="body" type="checkbox" checked> body</label>' if "body" in packed else ""
             film = (
                 f'<div class="stage"><canvas id="view" role="img" tabindex="0" aria-label="the cloth in space and its pattern, '
                 f'coloured by strain; the tables below have the numbers"></canvas><div class="bar"><button id="play">Play</button>'
                 f'<input id="slider" type="range" min="0" value="0" aria-label="frame">'
                 f'<label>speed <select id="speed">{speeds}</select></label><label><input id="loop" type="checkbox"> loop</label>'
-                f'<label>map <select id="map">{maps}</select></label>{buttons}</div>'
+                f'<label>map <select id="map">{maps}</select></label>{body}{buttons}</div>'
                 f'<div class="scale">{scale}<span id="value" aria-live="polite"></span></div>'
                 f'<div class="scale"><span id="label"></span>{hint}</div></div>'
                 f'<script id="film" type="application/json">{data}</script>'
