@@ -2,14 +2,15 @@
 
 python scenes/kernels.py
 
-First the energy and the forces of a dome's springs, each by one launch. Then a kernel that is written here: it adds a force that
-pulls the cloth towards a line, with the package's own device functions for the springs, and takes implicit steps until it is at rest.
+First the energy and the forces of a dome's springs, each by one launch. Then a kernel that is written here: a force that pulls the
+cloth towards a line. `warpflat.relaxation` takes the paper's steps under both until they balance.
 """
 
 from __future__ import annotations
 
+import numpy as np
 import warp as wp
-from warpflat.kernels.springs import Springs, compute_spring_energy, spring_force
+from warpflat.kernels.springs import compute_spring_energy
 
 import warpflat
 from warpflat.flattening.develop import develop
@@ -18,34 +19,11 @@ from warpflat.model.network import SpringNetwork
 wp.set_module_options({"enable_backward": False})
 
 
-@wp.func
-def pull_to_line(place: wp.vec2d, stiffness: wp.float64):
-    """Return a force of one's own [N]: a spring to the line x = 0."""
-    return wp.vec2d(-stiffness * place[0], wp.float64(0.0))
-
-
 @wp.kernel
-def step_with_own_force(
-    position: wp.array(dtype=wp.vec2d),
-    mass: wp.array(dtype=wp.float64),
-    springs: Springs,
-    own_stiffness: wp.float64,
-    time_step: wp.float64,
-    # outputs
-    moved: wp.array(dtype=wp.vec2d),
-    force: wp.array(dtype=wp.vec2d),
-):
-    """Step each vertex from rest by F h^2 / (m + h^2 K), the first term of the paper's eq. (9)."""
+def pull_to_line(place: wp.array(dtype=wp.vec2d), stiffness: wp.float64, force: wp.array(dtype=wp.vec2d)):
+    """Set a force of one's own on each vertex [N]: a spring of a stiffness [N/m] to the line x = 0."""
     i = wp.tid()
-    here = position[i]
-    total = pull_to_line(here, own_stiffness)
-    stiffness = own_stiffness
-    for s in range(springs.offset[i], springs.offset[i + 1]):
-        total += spring_force(position[springs.neighbor[s]] - here, springs.rest_length[s], springs.stiffness[s])
-        # Twice, so that neighbours that move towards each other do not pass.
-        stiffness += wp.float64(2.0) * springs.stiffness[s]
-    force[i] = total
-    moved[i] = here + total * (time_step * time_step / (mass[i] + time_step * time_step * stiffness))
+    force[i] = wp.vec2d(-stiffness * place[i][0], wp.float64(0.0))
 
 
 def main() -> None:
@@ -55,7 +33,7 @@ def main() -> None:
     network = SpringNetwork.build(surface, warpflat.find_fabric("woven"), development.positions, device="cpu")
     count = network.vertex_count
     position = wp.array(development.positions, dtype=wp.vec2d, device="cpu")
-    moved, force = wp.empty_like(position), wp.empty_like(position)
+    force = wp.empty_like(position)
     energy = wp.zeros(count, dtype=wp.float64, device="cpu")
 
     def describe() -> str:
@@ -66,12 +44,19 @@ def main() -> None:
 
     print(f"development: {describe()}")
     for own in (0.0, 0.5):  # [N/m]
-        position.assign(development.positions)
-        for _ in range(4000):
-            inputs = [position, network.mass, network.springs, wp.float64(own), wp.float64(1.0)]
-            wp.launch(step_with_own_force, dim=count, inputs=inputs, outputs=[moved, force], device="cpu")
-            position, moved = moved, position
-        print(f"own force of {own:.2f} N/m: {describe()}, residual {abs(force.numpy()).max():.1e} N")
+
+        def pull(layout: np.ndarray, stiffness: float = own) -> np.ndarray:
+            position.assign(layout)
+            inputs = [position, wp.float64(stiffness)]
+            wp.launch(pull_to_line, dim=count, inputs=inputs, outputs=[force], device="cpu")
+            return force.numpy()
+
+        relaxed = warpflat.relaxation(surface, fabric="woven", datum="centre", force=pull, energy_every=50)
+        *_, state = relaxed
+        position.assign(state.positions)
+        print(
+            f"own force of {own:.2f} N/m: {describe()}, after {state.step} steps {'at rest' if state.converged else 'NOT at rest'}"
+        )
 
 
 if __name__ == "__main__":

@@ -19,11 +19,11 @@ class Watch:
 
     def __call__(self, progress: Progress) -> None:
         """Called after every step; between two looks, steps apart, the energy is that of the last one."""
-        if progress.model_energy != self.seen:
+        if progress.model_energy_j != self.seen:
             print(
-                f"  {progress.stage:8} {progress.work_units:5.1f} units of work model energy {1e3 * progress.model_energy:9.4f} mJ"
+                f"  {progress.stage:8} {progress.work_units:5.1f} units of work model energy {1e3 * progress.model_energy_j:9.4f} mJ"
             )
-            self.seen = progress.model_energy
+            self.seen = progress.model_energy_j
 
 
 surface = make_shape("dome", resolution=65)

@@ -493,7 +493,7 @@ def test_progress_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch):
         def isatty(self) -> bool:
             return True
 
-    look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy=0.0021, residual=0.5)
+    look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy_j=0.0021, residual=0.5)
     for stream, hidden, shown in ((Terminal(), False, True), (Terminal(), True, False), (io.StringIO(), False, False)):
         monkeypatch.setattr("sys.stderr", stream)
         monkeypatch.setattr("warpflat.cli.progress_bar._REFRESH", 0.0)

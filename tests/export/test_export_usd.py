@@ -170,7 +170,10 @@ def test_a_viewer_finds_cameras_light_material_and_texture(tmp_path: Path) -> No
     stage = open_stage(tmp_path / "frames.usdc")
     last = stage.GetEndTimeCode()
     assert [prim.GetName() for prim in stage.Traverse() if prim.IsA(UsdGeom.Camera)] == ["all", "patterns"]
-    assert any(prim.HasAPI(UsdLux.LightAPI) for prim in stage.Traverse())
+    # A sun of 2 degrees gives a thousandth of its light where it is not normalised: a black picture.
+    (sun,) = [UsdLux.DistantLight(prim) for prim in stage.Traverse() if prim.IsA(UsdLux.DistantLight)]
+    assert sun.GetNormalizeAttr().Get() is True
+    assert sun.GetIntensityAttr().Get() * 2.0 ** sun.GetExposureAttr().Get() > 1.0
     pattern, surface = mesh_at(stage, "/World/front/pattern"), mesh_at(stage, "/World/front/surface")
     corners = np.asarray(pattern.GetPointsAttr().Get(last))[np.asarray(pattern.GetFaceVertexIndicesAttr().Get(last))]
     for mesh in (pattern, surface):

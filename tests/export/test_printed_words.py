@@ -7,12 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import ezdxf
+import numpy as np
 import pytest
+from pypdf import PdfReader
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.export.dxf import write_dxf
 from warpflat.export.pattern_json import pattern_from_json, pattern_json
+from warpflat.export.pdf import write_pdf
 from warpflat.export.svg import write_svg
 from warpflat.garment.pattern_files import check_names
 from warpflat.pattern.draft import draft_garment
@@ -20,6 +23,7 @@ from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.measures import length_words
 from warpflat.pattern.sewing_order import sewing_steps
+from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 
 
 @pytest.fixture(scope="module")
@@ -57,3 +61,41 @@ def test_lengths_in_three_units_and_a_name_for_no_piece():
     assert [length_words(0.0095, units) for units in ("mm", "cm", "in")] == ["9.5 mm", "0.95 cm", "3/8 in"]
     with pytest.raises(InputError, match=r"names: there is no piece 'frnt'; did you mean 'front'\?"):
         check_names({"frnt": "Vorderteil"}, ["front", "back"])
+
+
+def test_first_pages_tell_measures_needed_openings_and_what_is_needed(tmp_path: Path):
+    square = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.9], [0.0, 0.9]])
+    seen = (ViewedPiece(outlines=(square,), lines=(square[:2],)),)
+    worn = Worn(
+        views={"front": seen, "back": seen},
+        measures={
+            "38": (Measure(name="bust", body=0.88, finished=0.93), Measure(name="waist", body=0.72, finished=0.7))
+        },
+        needed=(NeededOpening(ring="neck", length=0.37, over="head", girth=0.569, depth=0.1),),
+    )
+    told = draft_garment(replace(sample_dress(), worn=worn))
+    read = pattern_from_json(pattern_json(told))
+    for paper in ("A4", "A0", "Projector"):
+        texts = []
+        for number, garment in enumerate((told, read)):
+            write_pdf(garment, tmp_path / f"{number}.pdf", paper=paper)
+            pages = PdfReader(tmp_path / f"{number}.pdf").pages
+            texts.append([page.extract_text() for page in pages])
+        assert texts[0] == texts[1], "and so are those of a file read back"
+        first = texts[0][0] if paper != "A4" else texts[0][1]
+        for words in (
+            "from the front",
+            "93 cm",
+            "+5 cm",
+            "-2 cm",
+            "sewing thread",
+            "Cloth needed",
+            "56.9 cm must pass (head)",
+        ):
+            assert words in first, (paper, words)
+        assert any("Sewing order" in text for text in texts[0])
+        if paper != "A4":
+            assert [round(float(pages[0].mediabox.width) / 72 * 25.4), len(pages[0].extract_text()) > 200] == [
+                210,
+                True,
+            ]

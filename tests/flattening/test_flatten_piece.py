@@ -256,7 +256,7 @@ def test_the_callback_sees_the_development_and_every_step():
     seen: list[tuple[str, int, float, int]] = []
 
     def look(progress: Progress) -> None:
-        seen.append((progress.stage, progress.step, progress.model_energy, progress.max_steps))
+        seen.append((progress.stage, progress.step, progress.model_energy_j, progress.max_steps))
         if progress.step in (0, 7):
             assert progress.positions().shape == (81, 2)
             assert progress.face_energy_density().shape == (64,)

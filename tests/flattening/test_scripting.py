@@ -48,6 +48,35 @@ def test_steps_by_hand_come_to_the_same_rest() -> None:
         warpflat.relaxation(shape, energy_every=0)
 
 
+def test_a_force_of_ones_own_is_balanced_by_the_cloth() -> None:
+    shape = warpflat.make_shape("dome", resolution=9)
+
+    def widest(pull: float) -> tuple[float, warpflat.RelaxationStep]:
+        def force(layout: np.ndarray) -> np.ndarray:
+            # To the line x = 0, and around the middle, which only turns the piece and is left out.
+            x, y = (layout - layout.mean(axis=0)).T
+            return np.column_stack([-pull * x - 0.01 * y, 0.01 * x])
+
+        *_, last = warpflat.relaxation(shape, fabric="woven", energy_every=25, force=force)
+        return float(np.ptp(last.positions[:, 0])), last
+
+    free, alone = widest(0.0)
+    narrow, pulled = widest(0.5)
+    *_, plain = warpflat.relaxation(shape, fabric="woven", energy_every=25)
+    assert alone.converged
+    assert pulled.converged
+    assert alone.model_energy_j == pytest.approx(plain.model_energy_j, rel=1e-3)
+    assert narrow < free - 1e-3
+    # The work of the pull is what the cloth has stored: it is at a minimum of both energies.
+    both = [
+        state.model_energy_j + 0.25 * ((state.positions[:, 0] - state.positions[:, 0].mean()) ** 2).sum()
+        for state in (alone, pulled)
+    ]
+    assert both[1] < both[0]
+    with pytest.raises(InputError, match=r"force: gave an array of shape \(2,\); should be \(81, 2\)"):
+        list(warpflat.relaxation(shape, force=lambda layout: [0.0, 1.0]))
+
+
 def test_a_result_shows_itself_in_a_few_lines_and_as_a_picture() -> None:
     result = warpflat.flatten(warpflat.make_shape("dome", resolution=9), fabric="woven")
     assert len(repr(result).splitlines()) <= 3

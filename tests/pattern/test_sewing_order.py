@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -91,7 +92,7 @@ def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
     assert "then close the seam below it" in steps[places["zip"]]
     # Nothing is finished twice, and no armhole is left raw.
     assert not any("Finish the raw edges" in step for step in steps)
-    assert notions(drafted, "") == ("1 invisible zip of 30 cm",)
+    assert notions(drafted, "") == ("sewing thread", "1 invisible zip of 30 cm")
     # The letters follow the steps.
     assert seam_letters(drafted)["centre back"] == "A"
     # A pattern that was written and read again is sewn alike.
@@ -101,6 +102,17 @@ def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
         german = " ".join(sewing_steps(drafted, ""))
     assert "Reißverschluss, 30 cm, an beide Kanten von A (hintere Mitte" in german
     assert "Säume umschlagen und nähen: 3 cm (Vorderteil" in german
+
+
+def test_a_zip_in_one_side_alone_is_one_zip():
+    pattern = top()
+    seams = [replace(seam, openings=(ZIP,)) if seam.name == "side left" else seam for seam in pattern.seams]
+    drafted = draft_garment(replace(pattern, seams=seams))
+    assert notions(drafted, "") == ("sewing thread", "1 invisible zip of 30 cm")
+    steps = sewing_steps(drafted, "")
+    (zip_in,) = [step for step in steps if "zip" in step]
+    assert "(side left: front to back left)" in zip_in
+    assert any("side right: front to back right" in step for step in steps)
 
 
 @pytest.mark.parametrize(

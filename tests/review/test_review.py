@@ -17,6 +17,7 @@ from PIL import Image
 
 from warpflat.cli.main import main
 from warpflat.review.film import open_film
+from warpflat.review.page import verdict_words
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 
@@ -48,6 +49,10 @@ def test_the_page_tells_the_numbers_and_asks_for_nothing(run: Path) -> None:
     piece = metrics["pieces"]["trial"]
     assert f"{100 * piece['length_error']:.3g} %" in page
     assert "cut:slit" in page
+    # The verdict comes before every picture, and every file that is listed is a link.
+    assert 0 < page.index('class="verdict') < page.index("<canvas")
+    assert {"pattern.json", "trial.svg", "trial.obj", "frames.usdc"} <= set(re.findall(r'<a href="([^"]+)"', page))
+    assert all(len(words) > 20 for words in re.findall(r'<img[^>]* alt="([^"]*)"', page))
     assert "default-src 'none'" in page
     assert not re.search(r"(src|href|url)\s*[=(]\s*[\"']?(?!data:)(https?:|//|file:)", page)
     assert page.count("<img") == 2
@@ -130,6 +135,20 @@ const wait = setInterval(() => {
   const first = at("0"), half = at("0.5"), second = at("1");
   document.body.dataset.first = JSON.stringify(first);
   document.body.dataset.blend = String(Math.max(...half.map((x, i) => Math.abs(x - 0.5 * (first[i] + second[i])))));
+  const view = document.getElementById("view"), [wide, high] = [view.clientWidth, view.clientHeight];
+  slider.value = slider.max; slider.dispatchEvent(new Event("input"));
+  const found = []; for (let x = 0; x < wide; x += 7) found.push([x, window.review.under(x, high / 2)]);
+  const cloth = found.filter(([x, words]) => words);
+  document.body.dataset.energy = cloth[0][1];
+  const box = view.getBoundingClientRect(), there = { clientX: box.left + cloth[0][0], clientY: box.top + high / 2, bubbles: true };
+  view.dispatchEvent(new PointerEvent("pointerdown", { ...there, pointerId: 1 }));
+  view.dispatchEvent(new MouseEvent("click", there));
+  document.body.dataset.picked = window.review.picked();
+  const map = document.getElementById("map"); map.value = "warp"; map.dispatchEvent(new Event("change"));
+  document.body.dataset.warp = window.review.under(cloth[0][0], high / 2);
+  const wheel = new WheelEvent("wheel", { deltaY: 100, cancelable: true }); view.dispatchEvent(wheel);
+  document.body.dataset.scrolls = String(!wheel.defaultPrevented);
+  slider.value = "1"; slider.dispatchEvent(new Event("input"));
   document.body.dataset.label = document.getElementById("label").textContent;
 }, 50);
 fetch("https://example.com/").catch(() => { document.body.dataset.fetch = "refused"; });
@@ -151,6 +170,11 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
     assert body
     assert 'data-fetch="refused"' in body[0]
     assert re.search(r'data-label="(steps|relax) · frame 2 of \d+ · (interpolated|computed)"', body[0])
+    # The value under the pointer in each map, a piece that is picked, and a page that scrolls over the film.
+    assert re.search(r'data-energy="trial: [0-9.e-]+ J/m²"', body[0])
+    assert re.search(r'data-warp="trial: -?[0-9.]+ % along the warp"', body[0])
+    assert 'data-picked="trial"' in body[0]
+    assert 'data-scrolls="true"' in body[0]
     blend = re.search(r'data-blend="([^"]+)"', body[0])
     first = re.search(r'data-first="\[([^\]]+)\]"', body[0])
     assert blend
@@ -160,3 +184,33 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
     points = np.array(first[1].split(","), dtype=float).reshape(-1, 3)[:, :2] - source.offset[:2]
     np.testing.assert_allclose(points, source.positions(1, len(points)), atol=2e-5)
     assert "example.com" not in log.read_text(errors="replace")
+
+
+def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error() -> None:
+    strain = {"p95": 0.10}
+    fit = {"fits": True, "strain_limit": 0.15, "where_not": [], "strain_warp": {"p95": 0.01}, "strain_weft": strain}
+    piece = {"flipped_faces": 0, "converged": True, "wear": fit}
+    ring = {
+        "name": "neck",
+        "passes": False,
+        "opening_needed_mm": 100,
+        "length_mm": 370,
+        "girth_mm": 569,
+        "over": "head",
+    }
+    words = verdict_words({"pieces": {"front": piece}, "rings": [ring]})
+    assert "It fits, by its strain" in words
+    assert "Needs an opening at the neck, 10 cm deep: 37.0 cm around, and 56.9 cm must pass (head)." in words
+    # Where it was draped, the drape alone says whether it fits.
+    drape = {"fits": False, "places": [{"words": "the front stands off by 20 mm"}]}
+    words = verdict_words({"pieces": {"front": piece}, "drape": drape})
+    assert "It does not fit, as it was draped" in words
+    assert "It fits" not in words
+    assert "stands off by 20 mm" in words
+    unfit = {**piece, "wear": {**fit, "fits": False, "where_not": ["stretched 9 %"]}, "converged": False}
+    words = verdict_words({"pieces": {"front": unfit, "back": piece}})
+    assert (
+        words.index("not at rest: front")
+        < words.index("It does not fit, by its strain")
+        < words.index("front: stretched 9 %")
+    )

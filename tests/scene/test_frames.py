@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import zlib
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -10,6 +13,7 @@ import numpy as np
 import pytest
 from usd_validation import validate_usd
 
+from warpflat.review.film import open_film, pack_film
 from warpflat.scene.frames import FilmStage, KeyFile, spread
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
@@ -152,6 +156,21 @@ def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
     assert np.array_equal(np.array(shown.GetFaceVertexIndicesAttr().Get()), faces)
     moved = np.linalg.norm(np.array(shown.GetPointsAttr().Get()) - np.array(body.GetPointsAttr().Get()), axis=1)
     assert np.allclose(moved[np.unique(faces)], 0.002, atol=1e-6)
+    # The page of the review shows the same body.
+    packed = pack_film(open_film(folder / "frames.usdc"))
+    assert packed is not None
+    told = packed["body"]
+    data = np.frombuffer(zlib.decompress(base64.b64decode(told["data"])), dtype=np.uint8)
+    planes = data[12 * told["triangles"] :].reshape(2, 3, -1).astype(np.uint16)
+    points = np.array(told["space"][:3]) + (planes[0] + 256 * planes[1]).T / 65535 * told["space"][3]
+    np.testing.assert_allclose(points, np.array(shown.GetPointsAttr().Get())[np.unique(faces)], atol=2e-5)
+    # The patterns lie beside the body, and each mesh says whose it is.
+    corners = UsdGeom.BBoxCache(Usd.TimeCode(1), [UsdGeom.Tokens.default_])
+    body_box = corners.ComputeWorldBound(shown.GetPrim()).ComputeAlignedRange()
+    for piece in json.loads((folder / "metrics.json").read_text())["pieces"]:
+        pattern = film.GetPrimAtPath(f"/World/{piece}/pattern")
+        assert corners.ComputeWorldBound(pattern).ComputeAlignedRange().GetMin()[0] > body_box.GetMax()[0]
+        assert pattern.GetDisplayName() == f"{piece} pattern"
     line = film.GetPrimAtPath("/World/mannequin/lines").GetChildren()[0]
     assert UsdGeom.Imageable(line).ComputePurpose() == UsdGeom.Tokens.guide
 

@@ -333,6 +333,8 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
         ]
         guide, sheets = ("".join(page for page in pages if ("sheet A" in page) == wanted) for wanted in (False, True))
         drawn = [(tmp_path / "opened" / f"{path.stem}.{ending}").read_text() for ending in ("svg", "dxf")]
+        assert "Measures" in guide
+        assert "from the back" in guide
         for text in (guide, sheets, *drawn):
             named = set(re.findall(r"zip|button|vent|slit|keyhole", text.replace(path.stem, "").replace(own_name, "")))
             assert openings <= named
@@ -354,13 +356,12 @@ def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 def test_the_kernels_driven_by_hand_come_to_rest(capsys: pytest.CaptureFixture[str]):
     runpy.run_path(str(SCENES / "kernels.py"), run_name="__main__")
-    energies, wide, residuals = (
-        [float(text) for text in re.findall(pattern, told)]
-        for told in [capsys.readouterr().out]
-        for pattern in (r"([0-9.]+) mJ", r"([0-9.]+) cm wide", r"residual ([0-9.e+-]+) N")
+    told = capsys.readouterr().out
+    energies, wide = (
+        [float(text) for text in re.findall(pattern, told)] for pattern in (r"([0-9.]+) mJ", r"([0-9.]+) cm wide")
     )
     developed, free, pulled = energies
     assert free < pulled
     assert free < developed
     assert wide[2] < wide[1], "one's own force makes it narrower"
-    assert max(residuals) < 1e-3
+    assert "NOT at rest" not in told

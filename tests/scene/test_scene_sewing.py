@@ -83,7 +83,17 @@ def test_the_console_is_a_line_each_and_none_is_wide(skirt):
     result, _ = skirt
     lines = summary_lines(result.metrics, result.files, "out", width=100)
     heads = [line.split(":")[0] for line in lines if not line.startswith(" ")]
-    assert heads == ["pieces", "relaxed", "girths [cm] (ease)", "wearer", "lies on the form", "seams", "rings", "files"]
+    assert heads == [
+        "pieces",
+        "relaxed",
+        "girths [cm] (ease)",
+        "wearer",
+        "lies on the form",
+        "seams",
+        "rings",
+        "files",
+        "result",
+    ]
     assert max(map(len, lines)) <= 100
     assert "side left -0.99 %" in next(line for line in lines if line.startswith("seams"))
     assert "-0.0" not in " ".join(lines)

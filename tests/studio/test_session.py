@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpflat.cli.studio import scene_of_mesh
 from warpflat.core.errors import InputError
 from warpflat.core.toml_file import document_as_toml
 from warpflat.scene.load import load_scene, make_scene
@@ -224,6 +225,28 @@ def test_saving_writes_a_new_scene_and_runs_it_from_scratch(tmp_path: Path) -> N
     session.save("../elsewhere")
     assert "name:" in session.error
     assert free_name(session.scene) == "trial_2"
+
+
+def test_a_mesh_is_opened_as_a_scene_that_can_be_saved(tmp_path: Path) -> None:
+    flat = "".join(f"v {10 * x} {10 * y} {x * y / 4}\n" for y in range(5) for x in range(5))
+    quads = "".join(f"f {a} {a + 1} {a + 6} {a + 5}\n" for y in range(4) for a in range(5 * y + 1, 5 * y + 5))
+    (tmp_path / "my front.obj").write_text(flat + quads)
+    scene = scene_of_mesh(tmp_path / "my front.obj", units="cm", fabric="denim")
+    session = Session(scene, AtOnce(), out=tmp_path / "out")
+    session.begin()
+    assert session.error == ""
+    assert session.solution is not None
+    session.change("cloth", fabric="silk")
+    session.save(free_name(session.scene))
+    assert session.error == ""
+    assert session.saved is not None
+    again = load_scene(session.saved.path)
+    assert session.saved.path.parent == tmp_path
+    assert (again.settings.fabric, again.settings.surface.units) == ("silk", "cm")
+    with pytest.raises(InputError, match="units"):
+        scene_of_mesh(tmp_path / "my front.obj")
+    with pytest.raises(InputError, match=r"does not exist|no such file"):
+        scene_of_mesh(tmp_path / "none.obj", units="m")
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)

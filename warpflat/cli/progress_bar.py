@@ -85,7 +85,7 @@ class ProgressBar:
         self._stage = progress.stage
         self._bar.bar_format = _STEPS
         self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
-        numbers = f"model energy {progress.model_energy * 1e3:.4g} mJ"
+        numbers = f"model energy {progress.model_energy_j * 1e3:.4g} mJ"
         if math.isfinite(progress.residual):
             numbers += f", residual {progress.residual:.1e}"
         self._bar.set_postfix_str(numbers, refresh=False)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import time
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from warpflat.cli.options import DONE, EXIT_CODES, ComputingCommand
 
-__all__ = ["studio"]
+if TYPE_CHECKING:
+    from warpflat.scene.load import Scene
+
+__all__ = ["scene_of_mesh", "studio"]
 
 # What is edited where no scene is given.
 _BLOCK = {
@@ -23,7 +27,9 @@ _BLOCK = {
 
 
 @click.command(cls=ComputingCommand, epilog=EXIT_CODES)
-@click.argument("scene", type=click.Path(path_type=Path), required=False)
+@click.argument("scene", metavar="[SCENE|MESH]", type=click.Path(path_type=Path), required=False)
+@click.option("--units", metavar="UNIT", help="Of a mesh that carries none: m, dm, cm, mm, in or ft.")
+@click.option("--fabric", metavar="NAME", help="Of a mesh.  [default: isotropic]")
 @click.option(
     "--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 opens it to other machines."
 )
@@ -37,18 +43,21 @@ _BLOCK = {
     help="Where runs are saved.  [default: out]",
 )
 @click.option("--open/--no-open", "show", default=True, help="Open the page in the browser.  [default: open]")
-def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> int:
+def studio(
+    scene: Path | None, units: str | None, fabric: str | None, host: str, port: int, out: Path, show: bool
+) -> int:
     """Edit a scene on a page in the browser: body, form, cloth, ease, grain and cuts, with the pattern beside it.
 
-    Saving writes a scene file beside the one that was opened, under a name of its own, and runs it from scratch. Without a
-    SCENE it begins with the basic block of size EU 38. Ctrl-C ends the studio. The address that it prints has a token in it: only
-    who opens that address is let in.
+    Saving writes a scene file beside the scene or mesh that was opened, under a name of its own, and runs it from scratch. A MESH
+    is one piece: OBJ, PLY, STL, OFF, GLB, glTF or USD. Without either it begins with the basic block of size EU 38. Ctrl-C ends
+    the studio. The address that it prints has a token in it: only who opens that address is let in.
 
     It needs viser: pip install ".[studio]" in a checkout.
 
     \b
     Examples:
       warpflat studio scenes/bodice.toml
+      warpflat studio front.obj --units cm --fabric denim
       warpflat studio
     """
     from warpflat.cli.run import start_warp_silently
@@ -57,7 +66,13 @@ def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> i
 
     if find_spec("viser") is None:
         raise InputError('the studio needs viser: pip install ".[studio]" in a checkout')
-    made = load_scene(scene) if scene else make_scene(_BLOCK, name="block", folder=Path(), where="studio")
+    if scene is not None and scene.suffix.lower() != ".toml":
+        made = scene_of_mesh(scene, units=units, fabric=fabric)
+    else:
+        for option, value in (("--units", units), ("--fabric", fabric)):
+            if value is not None:
+                raise InputError(f"{option}: is for a mesh; a scene says it itself")
+        made = load_scene(scene) if scene else make_scene(_BLOCK, name="block", folder=Path(), where="studio")
     start_warp_silently()
     from warpflat.studio.page import Page
 
@@ -75,3 +90,24 @@ def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> i
     finally:
         page.close()
     return DONE
+
+
+def scene_of_mesh(mesh: Path, *, units: str | None = None, fabric: str | None = None) -> Scene:
+    """Return a scene of one piece of a mesh file, which lies where a scene of it will be saved.
+
+    Raises:
+        InputError: there is no such file, or it has no unit and none is given.
+    """
+    from warpflat.core.file_names import make_file_name
+    from warpflat.scene.load import make_scene
+    from warpflat.scene.surface import scene_surface
+
+    tables: dict[str, Any] = {"surface": {"file": mesh.name}}
+    if units is not None:
+        tables["surface"]["units"] = units
+    if fabric is not None:
+        tables["fabric"] = fabric
+    made = make_scene(tables, name=make_file_name(mesh.stem), folder=mesh.parent, where=str(mesh))
+    # Before a page is opened: what is wrong with the file is one line here.
+    scene_surface(made)
+    return made

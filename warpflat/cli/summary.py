@@ -123,7 +123,33 @@ def summary_lines(
                 _clipped(f"corrected: misfit {first:.2f} to {last:.2f} mm in {rounds}; {found['reason']}", width)
             )
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
-    return [*lines, _listed(f"files: {folder}: ", ordered, width)]
+    return [*lines, _listed(f"files: {folder}: ", ordered, width), _clipped(_last_line(metrics, files, folder), width)]
+
+
+def _last_line(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> str:
+    """Return in plain words whether it fits, which openings it needs, and what to print or open next.
+
+    Where a garment was draped, the drape says whether it fits.
+    """
+    pieces, drape = metrics["pieces"], metrics.get("drape")
+    judged = [piece["wear"] for piece in pieces.values() if piece.get("wear")]
+    wearer = metrics.get("wear", {}).get("wearer") or {}
+    parts = []
+    if not all(piece["converged"] for piece in pieces.values()):
+        parts.append("not at rest")
+    if drape is not None:
+        parts.append("fits when worn" if drape["fits"] else "does not fit when worn")
+    elif judged:
+        fits = all(wear["fits"] for wear in judged) and wearer.get("fits", True)
+        parts.append("fits by its strain" if fits else "does not fit by its strain: the cloth is held beyond its limit")
+    shut = [
+        f"{ring['name']} {ring['opening_needed_mm'] / 10:g} cm"
+        for ring in metrics.get("rings", ())
+        if ring["passes"] is False
+    ]
+    parts += [f"needs an opening at {' and '.join(shut)}"] if shut else []
+    parts += [f"print {folder}/pattern.pdf"] if "pattern.pdf" in files else []
+    return f"result: {'; '.join(parts) or f'see {folder}'}"
 
 
 def notes_line(notes: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
@@ -272,7 +272,7 @@ def edit_table(edit: Mapping[str, Any]) -> str:
     return _aligned(("", "before", "after"), rows)
 
 
-def fabric_table(fabrics: Iterable[Fabric]) -> str:
+def fabric_table(fabrics: Sequence[Fabric]) -> str:
     """Return the fabrics as text, a line each, with units and grades."""
     head = ("fabric", "kg/m2", "K warp", "K weft", "G [N/m]", "nu", "limit", "grade", "description")
     rows = []
@@ -293,10 +293,12 @@ def fabric_table(fabrics: Iterable[Fabric]) -> str:
                 fabric.description,
             )
         )
+    also = [f"{alias} is {fabric.name}" for fabric in fabrics for alias in fabric.aliases]
     grades_text = ", ".join(f"{grade} {GRADES[grade]}" for grade in sorted(used))
     notes = [
         "K: secant tensile stiffness [N/m], G: shear stiffness [N/m per rad]; ~ estimate, > lower bound",
         f"grades: {grades_text}",
+        *([f"also known: {', '.join(also)}"] if also else []),
         f"default: {DEFAULT_FABRIC}; test loads and sources: warpflat fabrics NAME",
     ]
     return "\n".join([_aligned(head, rows, left=(0, 8)), "", *notes])

@@ -53,6 +53,8 @@ PAPERS = {
 PROJECTED_WIDTH = 0.9
 #: Size [pt] of a sheet's name, its distance [m] from the sheet's joints, and the least one from lines and words.
 SHEET_NAME, NAME_INSIDE, NAME_CLEAR = 26, 0.006, 0.0015
+#: A strip slants if the box around it is so many times as large as the strip.
+SLANTING = 3.0
 # Nobody glues more sheets than these together.
 MOST_SHEETS = 1000
 #: Roles whose strokes lie on the layer of their size in a nest.
@@ -313,37 +315,75 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
         width, height = sheet.size + 2 * paper.margin + paper.overlap
         paper = replace(paper, width=float(width), height=float(height))
         return sheet, make_tiling(sheet, paper)
-    width = paper.step[0] + paper.overlap
-    # As many sheets as the pieces take: the legend goes where they leave room.
-    bare = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]))
-    tiling = make_tiling(bare, paper)
-    legends = [_free_place(tiling, tile) for tile in tiling.tiles]
-    found = next((place for place in legends if place is not None), None)
-    if found is not None:
-        return replace(bare, reserved=found), replace(tiling, sheet=replace(bare, reserved=found))
-    sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
+    packed = _on_pages(groups, paper)
+    if packed is not None:
+        sheet = packed
+    else:  # a piece is larger than the paper
+        width = paper.step[0] + paper.overlap
+        sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
     return sheet, make_tiling(sheet, paper)
 
 
-def _free_place(tiling: Tiling, tile: tuple[int, int]) -> FloatArray | None:
-    """Return the lower left [m] of a place for the legend on a tile where no piece and no label beside one lies; None without one."""
+def _on_pages(groups: Sequence[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet | None:
+    """Lay pieces and the legend on few pages, the largest first: each where its box lies clear of the pieces that are there.
+
+    A strip that slants, as a binding on the bias does, is stood upright. None where a piece has no room on a page.
+    """
     import shapely
 
-    shapes = [
-        shapely.Polygon(placed.on_sheet(piece.cut_line)) for placed in tiling.sheet.placed for piece in placed.pieces
-    ]
-    shapes += [
-        shapely.Polygon(placed.on_sheet(label.box))
-        for placed in tiling.sheet.placed
-        if (label := nest_label(placed.pieces)).leader is not None
-    ]
-    taken = shapely.union_all(shapes).buffer(0.005)
-    low = tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) + 0.005
-    room = tiling.paper.step - 0.010 - LEGEND_SIZE
-    places = [low + room * (x / 24, y / 32) for y in range(32, -1, -1) for x in range(25)]
-    boxes = shapely.box(*np.transpose(places), *(np.transpose(places) + np.reshape(LEGEND_SIZE, (2, 1))))
-    free = np.flatnonzero(shapely.disjoint(boxes, taken))
-    return places[int(free[0])] if len(free) else None
+    gap, step = 0.012, paper.step
+    turns, boxes, shapes = [], [], []
+    for group in groups:
+        points = occupied_points(group)
+        around = shapely.MultiPoint(points).minimum_rotated_rectangle
+        turn = np.eye(2)
+        if around.geom_type == "Polygon" and float(np.prod(np.ptp(points, axis=0))) > SLANTING * around.area:
+            sides = np.diff(np.asarray(around.exterior.coords), axis=0)[:2]
+            x, y = max(sides, key=lambda side: float(np.linalg.norm(side)))
+            x, y = np.array([x, y]) / np.hypot(x, y) * (1.0 if y >= 0 else -1.0)
+            turn = np.array([[y, -x], [x, y]])
+        lines = [piece.cut_line @ turn.T for piece in group]
+        label = nest_label(group)
+        lines += [] if label.leader is None else [label.box @ turn.T]
+        turns.append(turn)
+        boxes.append(np.stack([np.concatenate(lines).min(axis=0), np.concatenate(lines).max(axis=0)]))
+        shapes.append(shapely.union_all([shapely.Polygon(line) for line in lines]))
+    legend = len(groups)
+    boxes.append(np.array([(0.0, 0.0), LEGEND_SIZE]))
+    shapes.append(shapely.box(0.0, 0.0, *LEGEND_SIZE))
+    pages: list[Any] = []
+    places: dict[int, tuple[int, FloatArray]] = {}
+    for number in sorted(range(len(boxes)), key=lambda k: (k == legend, -float(np.prod(np.ptp(boxes[k], axis=0))), k)):
+        extent = np.ptp(boxes[number], axis=0)
+        room = step - extent - 2 * gap
+        if (room < 0.0).any():
+            return None
+        # From the upper left, down and then to the right.
+        shares = np.array([(x / 40, 1.0 - y / 40) for x in range(41) for y in range(41)])
+        corners = gap + shares * room
+        around = shapely.box(*(corners - gap).T, *(corners + extent + gap).T)
+        for page in range(len(pages) + 1):
+            if page == len(pages):
+                pages.append(shapely.Polygon())
+            free = np.flatnonzero(shapely.disjoint(around, pages[page]))
+            if len(free):
+                break
+        corner = corners[free[0]]
+        places[number] = (page, corner)
+        shift = corner - boxes[number][0]
+        pages[page] = pages[page].union(shapely.transform(shapes[number], lambda points, shift=shift: points + shift))
+    size = np.array([step[0], len(pages) * step[1]]) + paper.overlap
+    corners_on_sheet = {
+        number: corner + np.array([0.0, (len(pages) - page - 1) * step[1] + paper.overlap])
+        for number, (page, corner) in places.items()
+    }
+    placed = []
+    for number, group in enumerate(groups):
+        corner, low = corners_on_sheet[number], boxes[number][0]
+        matrix = np.column_stack([turns[number], corner - low])
+        box = np.stack([corner, corner + np.ptp(boxes[number], axis=0)])
+        placed.append(Placed(pieces=tuple(group), matrix=matrix, box=box))
+    return Sheet(placed=tuple(placed), size=size, reserved=corners_on_sheet[legend])
 
 
 def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:

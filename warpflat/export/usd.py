@@ -181,6 +181,7 @@ class FrameWriter:
         self._scale = float(scale)
         self._pieces: dict[str, FramePiece] = {}
         self._used_names = {"Looks", "cameras", "light"}
+        self._bodies: list[FloatArray] = []
         self._unsaved = self._unsaved_vertices = 0
         self._stage: Any = None
         self._hidden = ExitStack()
@@ -269,6 +270,9 @@ class FrameWriter:
         on_pattern = MeshSamples(
             define_energy_mesh(self._stage, f"{path}/pattern", upright, per_face=True), self._scale
         )
+        # Programs that show names of meshes alone, as Blender does, tell the pieces apart by these.
+        for samples, kind in ((on_surface, "surface"), (on_pattern, "pattern")):
+            samples.mesh.GetPrim().SetDisplayName(f"{name} {kind}")
         lines = polylines_of(surface.lines)
         group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
         colours = VertexColours(surface.faces, face_areas(surface.vertices, surface.faces), len(points))
@@ -301,6 +305,7 @@ class FrameWriter:
         self._stage.DefinePrim(path).GetReferences().AddReference(f"./{file}", path)
         shown = UsdGeom.Mesh(self._stage.OverridePrim(f"{path}/body"))
         set_points(shown, points)
+        self._bodies.append(np.asarray(points, dtype=np.float64))
         UsdGeom.Imageable(self._stage.OverridePrim(f"{path}/lines")).CreatePurposeAttr(UsdGeom.Tokens.guide)
 
     def write(
@@ -428,7 +433,8 @@ class FrameWriter:
         shown = [piece for piece in self._pieces.values() if piece.frames]
         if not shown:
             return
-        space = [piece.surface.vertices for piece in self._pieces.values()]
+        # The arms of a body reach beyond the cloth, and would stand in the patterns.
+        space = [*(piece.surface.vertices for piece in self._pieces.values()), *self._bodies]
         low = np.min([vertices.min(axis=0) for vertices in space], axis=0)
         high = np.max([vertices.max(axis=0) for vertices in space], axis=0)
         gap = 0.15 * max(float(np.max(high - low)), *(float(np.max(piece.high - piece.low)) for piece in shown))

@@ -420,13 +420,19 @@ def add_cameras(stage: Any, everything: FloatArray, patterns: FloatArray) -> Non
 
 
 def add_light(stage: Any) -> None:
-    """Define `/World/light/dome` and `/World/light/key`, a sun from the upper left."""
+    """Define `/World/light/dome` and `/World/light/key`, a sun from the upper left.
+
+    The sun's light is normalised: its intensity is what falls on a surface that faces it, however small its disc of 2 degrees is.
+    Without that, renderers that follow UsdLux, as Blender's import does, multiply by that disc, a thousandth.
+    """
     from pxr import Gf, UsdGeom, UsdLux
 
     UsdGeom.Scope.Define(stage, "/World/light")
     UsdLux.DomeLight.Define(stage, "/World/light/dome").CreateIntensityAttr(0.6)
     key = UsdLux.DistantLight.Define(stage, "/World/light/key")
-    key.CreateIntensityAttr(1.5)
+    key.CreateIntensityAttr(2.5)
+    key.CreateNormalizeAttr(True)
+    key.CreateExposureAttr(0.0)
     key.CreateAngleAttr(2.0)
     UsdGeom.Xformable(key).AddRotateXYZOp().Set(Gf.Vec3f(-35.0, -30.0, 0.0))
 

@@ -96,8 +96,8 @@ class Progress:
         step: approximate implicit steps and iterations of L-BFGS so far.
         work_units: all work so far, in such steps.
         max_steps: at most so many.
-        model_energy: springs and guard, or membrane and guard, at the last convergence check (see `RelaxOptions.check_every`) [J].
-        guard_energy: the part of it that keeps faces unfolded [J].
+        model_energy_j: springs and guard, or membrane and guard, at the last convergence check (see `RelaxOptions.check_every`) [J].
+        guard_energy_j: the part of it that keeps faces unfolded [J].
         residual: largest force over mean spring force, at the same check.
     """
 
@@ -107,8 +107,8 @@ class Progress:
         self.step = state.steps
         self.work_units = state.work_units
         self.max_steps = max_steps
-        self.model_energy = state.status.energies.potential
-        self.guard_energy = state.status.energies.guard
+        self.model_energy_j = state.status.energies.potential
+        self.guard_energy_j = state.status.energies.guard
         self.residual = state.status.residual
         self._state = state
 

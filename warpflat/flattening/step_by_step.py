@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray
@@ -16,7 +17,7 @@ from warpflat.flattening.flatten_piece import as_surface, check_settings, develo
 from warpflat.model.membrane import Model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import worn_strain
-from warpflat.solver.grain import GrainAlignment
+from warpflat.solver.grain import GrainAlignment, remove_rotation
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation
 from warpflat.surface.mesh import Surface
@@ -64,6 +65,7 @@ def relaxation(
     relax: RelaxOptions | None = None,
     device: str | None = None,
     energy_every: int = 1,
+    force: Callable[[FloatArray], ArrayLike] | None = None,
 ) -> Iterator[RelaxationStep]:
     """Iterate over the plain steps of a relaxation, from the development until it is at rest or the step limit is reached.
 
@@ -72,25 +74,44 @@ def relaxation(
     Args:
         surface, fabric, datum, grain_angle, units, model, relax, device: as `flatten` takes them.
         energy_every: energies are measured every so many steps, and convergence with them.
+        force: a force of one's own beside those of the cloth: takes the layout, #V by 2 [m], before each step, and gives #V by 2 [N]. What
+            of it only turns the piece is left out, since the grain is kept upright. Energies are those of the cloth alone; at rest is where
+            both forces balance, so a force that pushes the piece as a whole finds no rest.
 
     Raises:
-        InputError: what was given cannot be flattened; one line says what, where, and what would be right.
+        InputError: what was given cannot be flattened, or `force` gives no finite force per vertex; one line says what, where, and what
+            would be right.
     """
     if not isinstance(energy_every, int) or isinstance(energy_every, bool) or energy_every < 1:
         raise InputError(f"energy_every = {energy_every!r} must be a whole number, at least 1")
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=None, relax=relax, device=device)
     piece = develop_piece(as_surface(surface, units), datum, settings, None)
-    return _steps(piece.network, piece.development.positions, settings.options, piece.task.datum, energy_every)
+    return _steps(piece.network, piece.development.positions, settings.options, piece.task.datum, energy_every, force)
 
 
 def _steps(
-    network: SpringNetwork, start: FloatArray, options: RelaxOptions, datum: Any, energy_every: int
+    network: SpringNetwork,
+    start: FloatArray,
+    options: RelaxOptions,
+    datum: Any,
+    energy_every: int,
+    force: Callable[[FloatArray], ArrayLike] | None,
 ) -> Iterator[RelaxationStep]:
     grain = GrainAlignment(lower=int(datum[0]), upper=int(datum[-1]), vertices=slice(0, network.vertex_count))
     state = Relaxation(network, options, start=start, alignments=[grain])
     status = state.check_start()
     yield _snapshot(state, measured=True)
-    while not status.at_rest and state.steps < options.max_steps:
+    # A piece that is free of strain may still be pushed.
+    while not (status.at_rest and (force is None or state.steps)) and state.steps < options.max_steps:
+        if force is not None:
+            own = np.array(force(state.positions()), dtype=np.float64)
+            if own.shape != (network.vertex_count, 2) or not np.isfinite(own).all():
+                raise InputError(
+                    f"force: gave an array of shape {own.shape}; should be ({network.vertex_count}, 2), a finite force [N] per vertex"
+                )
+            # Beside the load that holds the grain, which `hold_grain` sets anew after the step: what is left then is cloth and own force.
+            remove_rotation([grain], state.position.numpy(), own, network.spring_stiffness.numpy())
+            state.load.assign(state.load.numpy() + own)
         state.step()
         state.hold_grain()
         measured = state.steps % energy_every == 0 or state.steps == options.max_steps

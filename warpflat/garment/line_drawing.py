@@ -32,12 +32,12 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
         sample: the size that is drawn.
     """
     garment = garments[sample]
-    pieces = list(garment.pieces.values())
+    pieces, half = list(garment.pieces.values()), garment.form is not None and garment.form.half
     views = {}
     for name, sign in (("front", 1.0), ("back", -1.0)):
         # What hangs nearer to the viewer hides what lies behind it: the inside of a back shows above the neck of a front.
         ordered = sorted(pieces, key=lambda flat: sign * float(flat.surface.vertices[:, 2].mean()))
-        seen = [_view(flat, sign, half=half) for flat in ordered for half in _halves(garment)]
+        seen = [_view(flat, sign, half=half) for flat in ordered]
         views[name] = tuple(piece for piece in seen if piece.outlines)
     measures = {}
     for size, each in garments.items():
@@ -57,19 +57,16 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
     return Worn(views=views, measures=measures, needed=needed)
 
 
-def _halves(garment: Garment) -> tuple[float, ...]:
-    """Return by what x is multiplied: a half garment is drawn twice."""
-    return (1.0, -1.0) if garment.form is not None and garment.form.half else (1.0,)
-
-
-def _view(flat: Flattening, sign: float, *, half: float) -> ViewedPiece:
-    """Return a piece as it is seen from the front (1) or the back (-1)."""
+def _view(flat: Flattening, sign: float, *, half: bool) -> ViewedPiece:
+    """Return a piece as it is seen from the front (1) or the back (-1); of a half garment with its mirror image."""
     import shapely
 
     faces, space = flat.faces, flat.surface.vertices[flat.vertex_origin]
-    seen = space[:, :2] * [sign * half, 1.0]
+    seen = space[:, :2] * [sign, 1.0]
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    covered = shapely.union_all(shapely.polygons(seen[triangles]), grid_size=1e-6).simplify(_WITHIN)
+    mirrored = [seen, seen * [-1.0, 1.0]] if half else [seen]
+    shown = np.concatenate([points[triangles] for points in mirrored])
+    covered = shapely.union_all(shapely.polygons(shown), grid_size=1e-6).simplify(_WITHIN)
     parts = [part for part in shapely.get_parts(covered) if part.geom_type == "Polygon" and part.area > _LEAST_AREA]
     corners = space[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -79,6 +76,9 @@ def _view(flat: Flattening, sign: float, *, half: float) -> ViewedPiece:
         for triangle, cosine in zip(triangles, facing, strict=True)
         for a, b in zip(triangle, np.roll(triangle, -1), strict=True)
     }
+    if half:
+        # The fold is no line of the garment.
+        near = {pair: side and bool(np.abs(seen[list(pair), 0]).max() > _WITHIN) for pair, side in near.items()}
     lines = []
     for loop in border_loops(faces):
         ends = list(zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True))
@@ -87,8 +87,8 @@ def _view(flat: Flattening, sign: float, *, half: float) -> ViewedPiece:
         for visible, stretch in groupby([*ends[start:], *ends[:start]], key=lambda pair: near.get(pair, True)):
             if visible:
                 pairs = list(stretch)
-                points = seen[[pairs[0][0], *(pair[1] for pair in pairs)]]
-                lines.append(np.asarray(shapely.LineString(points).simplify(_WITHIN).coords))
+                ids = [pairs[0][0], *(pair[1] for pair in pairs)]
+                lines += [np.asarray(shapely.LineString(points[ids]).simplify(_WITHIN).coords) for points in mirrored]
     return ViewedPiece(
         outlines=tuple(np.asarray(part.exterior.coords)[:-1] for part in parts), lines=tuple(lines)
     )  # fmt: skip

@@ -301,16 +301,20 @@ def _annotations(
         elif borders and edge.kind != "fold" and edge.name not in second_legs:
             named.append((edge.name, edge.line, "left"))
     named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
-    called = {name for name, _, _ in named}
+    called, hems = {name for name, _, _ in named}, {edge.name for edge in piece.edges if edge.kind == "hem"}
     drawn = [shapely.LineString(line) for _, line, _ in named]
     for index, (name, line, side) in enumerate(named):
-        text = translate_name(name_without_number(name, called))
+        # What is turned up is a hem for a sewer, whatever level of the body it lies at; a vent keeps its name.
+        kind = (
+            "hem" if name in hems and not {"vent", "slit"} & set(name.split(" ")) else name_without_number(name, called)
+        )
+        text = translate_name(kind)
         width = text_width(text, NAME)
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
             others = [*drawn[:index], *drawn[index + 1 :]]
             # Beside an edge, as a zip is, a name may have room on one side alone.
-            for edge_side in (side, "either") if side == "above" else (side,):
-                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=edge_side)
+            for which in (side, "either") if side == "above" else (side,):
+                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=which)
                 if write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
                     break
     # The first button and the first buttonhole of a row, which are too short for a name along them.
@@ -333,8 +337,8 @@ def _annotations(
             (1.6, 0),
             (-1.6, 0),
         ]
-        beside = [Spot(x=float(x), y=float(y)) for x, y in at + out * sides]
-        write(text, NAME, beside, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
+        around = [Spot(x=float(x), y=float(y)) for x, y in at + out * sides]
+        write(text, NAME, around, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
     letters = {} if paper is None else paper.letters
     for notch in piece.notches:
         letter = letters.get(notch.seam)

@@ -20,7 +20,7 @@ class Placed:
 
     Attributes:
         pieces: upon each other.
-        matrix: 2 by 3, from the pieces' coordinates to the sheet's [m]: quarter turns and a shift.
+        matrix: 2 by 3, from the pieces' coordinates to the sheet's [m]: a turn and a shift.
         box: lower left and upper right on the sheet [m].
     """
 

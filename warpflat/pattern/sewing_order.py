@@ -436,7 +436,8 @@ def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[l
         sides = sorted(
             tuple(sorted((without_side(s.piece), without_side(s.edge)) for s in side)) for side in seam.sides
         )
-        groups.setdefault((without_side(seam.name), tuple(sides)), []).append(seam)
+        # A zip in one side alone makes it another seam than the other side.
+        groups.setdefault((without_side(seam.name), tuple(sides), seam.openings), []).append(seam)
     return sorted(groups.values(), key=lambda group: (_stage(group[0], pieces), not group[0].openings))
 
 

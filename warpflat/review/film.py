@@ -32,6 +32,8 @@ _ROOM = 4_000_000
 # Bytes of a vertex in a layout: two coordinates of 16 bits, and a colour.
 _VERTEX = 5
 _COLOURS = 256
+# A body of more vertices than these is not shown.
+_MOST_OF_BODY = 100_000
 # Of zlib: the last level takes eight times as long as this one, and spares a twentieth of the bytes.
 _LEVEL = 6
 
@@ -55,7 +57,7 @@ class FilmPiece:
     def __init__(self, stage: Any, prim: Any) -> None:
         from pxr import UsdGeom
 
-        self._stage = stage  # prims live as long as it does
+        self.stage = stage  # prims live as long as it does
         self._pattern = UsdGeom.Mesh(stage.GetPrimAtPath(f"{prim.GetPath()}/pattern"))
         self._surface = UsdGeom.Mesh(stage.GetPrimAtPath(f"{prim.GetPath()}/surface"))
         self.name = prim.GetDisplayName() or prim.GetName()
@@ -179,6 +181,7 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         parts += [packer.compress(block) for block in blocks]
     parts.append(packer.flush())
     first, computed = pieces[0], set(pieces[0].computed)
+    body = _packed_body(first.stage)
     table = np.round(255.0 * energy_colours(np.arange(_COLOURS) / (_COLOURS - 1), 1.0)).astype(np.uint8)
     return {
         "frames": shown,
@@ -189,7 +192,38 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         "scale": first.scale,
         "colours": base64.b64encode(table.tobytes()).decode("ascii"),
         "pieces": entries,
+        **({} if body is None else {"body": body}),
         "data": base64.b64encode(b"".join(parts)).decode("ascii"),
+    }
+
+
+def _packed_body(stage: Any) -> dict[str, Any] | None:
+    """Return the body of a garment's film for the page; None without one, or where it cannot be shown."""
+    from pxr import UsdGeom
+
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/World/mannequin/body"))
+    if not mesh:
+        return None
+    points = np.array(mesh.GetPointsAttr().Get() or (), dtype=np.float64).reshape(-1, 3)
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or (), dtype=np.int64)
+    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get() or (), dtype=np.int64)
+    usable = len(counts) and counts.sum() == len(corners) and set(counts.tolist()) <= {3, 4}
+    if not usable or corners.min() < 0 or corners.max() >= len(points) or len(points) > _MOST_OF_BODY:
+        return None
+    used, corners = np.unique(corners, return_inverse=True)
+    points = points[used]
+    if not np.abs(points).max() < FARTHEST:
+        return None
+    faces = np.full((len(counts), 4), -1, dtype=np.int32)
+    faces[np.arange(4) < counts[:, None]] = corners
+    triangles, _ = triangulate(faces)
+    box = _Box(points)
+    data = zlib.compress(_planes(triangles.astype(np.uint32)) + _planes(box.steps(points)), _LEVEL)
+    return {
+        "space": box.as_list(),
+        "vertices": len(points),
+        "triangles": len(triangles),
+        "data": base64.b64encode(data).decode("ascii"),
     }
 
 

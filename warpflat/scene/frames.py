@@ -455,7 +455,7 @@ class FrameRecorder:
                 moved, travelled = (np.abs(positions - before).max() for before in (self._last, self._first))
                 if not moved > _KEPT * travelled:
                     return
-            measures = {"step": progress.step, "model_energy_j": progress.model_energy}
+            measures = {"step": progress.step, "model_energy_j": progress.model_energy_j}
             self._keep(positions, progress.face_energy_density(), measures)
 
     def record_result(self, result: Flattening) -> None:

@@ -10,9 +10,12 @@
     return;
   }
   const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([bytesOf(film.data)]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const data = new Uint8Array(await new Response(stream).arrayBuffer());
-  let at = 0;
+  const unpacked = async (text) => {
+    const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  };
+  const ofBody = film.body ? await unpacked(film.body.data) : null;
+  let data = await unpacked(film.data), at = 0;
   const planes = (count, width) => {  // numbers of `width` bytes, lowest bytes first
     const values = width === 4 ? new Uint32Array(count) : new Uint16Array(count);
     for (let b = 0; b < width; b++) for (let i = 0; i < count; i++) values[i] += data[at++] << (8 * b);
@@ -47,6 +50,15 @@
       before = { shape, steps, colours };
       piece.layouts.push({ number, shape, colours, points: placed(piece, steps) });
     }
+  }
+  if (film.body) {
+    [data, at] = [ofBody, 0];
+    const body = film.body;
+    body.index = interleaved(planes(3 * body.triangles, 4), 3);
+    const steps = interleaved(planes(3 * body.vertices, 2), 3);
+    body.surface = Float32Array.from(steps, (s, i) => body.space[i % 3] + (s / 65535) * body.space[3]);
+    body.normals = normalsOf(body);
+    body.shades = new Uint8Array(body.vertices);
   }
   function placed(piece, steps) {
     const count = steps.length / 2, points = new Float32Array(3 * count), [x, y, size] = piece.box;
@@ -90,7 +102,7 @@
       for (const p of all) for (let i = k; i < p.length; i += 3) { low = Math.min(low, p[i]); high = Math.max(high, p[i]); }
       return low + high;
     });
-    for (const piece of film.pieces) for (const shape of piece.topologies) {
+    for (const shape of [...film.pieces.flatMap((piece) => piece.topologies), ...(film.body ? [film.body] : [])]) {
       shape.turned = shape.surface.map((value, i) => (i % 3 === 1 ? value : twice[(i % 3) / 2] - value));
       shape.turnedNormals = shape.normals.map((value, i) => (i % 3 === 1 ? value : -value));
     }
@@ -110,10 +122,14 @@
     uniform mat4 view; uniform float pull; out vec3 n; out float s;
     void main() { gl_Position = view * vec4(position, 1.0); gl_Position.z -= pull * gl_Position.w; n = normal; s = share; }`);
   shader(gl.FRAGMENT_SHADER, `
-    in vec3 n; in float s; uniform sampler2D table; uniform vec4 ink; uniform vec3 eye; out vec4 colour;
+    in vec3 n; in float s; uniform sampler2D table; uniform vec4 ink; uniform vec3 eye; uniform float fade; uniform float two; uniform float skin; out vec4 colour;
     void main() {
-      if (ink.a > 0.0) { colour = vec4(ink.rgb, 1.0); return; }
+      if (ink.a > 0.0) { colour = vec4(mix(ink.rgb, vec3(0.6), fade), 1.0); return; }
       vec3 base = texture(table, vec2(s * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
+      // Shorter is blue, longer is red, no strain is white.
+      if (two > 0.0) { float d = 2.0 * s - 1.0; base = d < 0.0 ? mix(vec3(0.97), vec3(0.13, 0.40, 0.67), -d) : mix(vec3(0.97), vec3(0.70, 0.09, 0.17), d); }
+      base = mix(base, vec3(0.6), 0.75 * fade);
+      if (skin > 0.0) base = vec3(0.80, 0.77, 0.73);
       float lit = dot(normalize(n), normalize(eye + vec3(-0.3, 0.5, 0.2)));
       if (dot(n, eye) < 0.0) { base = mix(base, vec3(0.55), 0.6); lit = -lit; }
       colour = vec4(base * (0.62 + 0.40 * max(lit, 0.0)), 1.0);
@@ -121,13 +137,16 @@
   gl.linkProgram(program);
   gl.useProgram(program);
   const place = (name) => gl.getUniformLocation(program, name);
-  const [viewAt, pullAt, inkAt, eyeAt] = ["view", "pull", "ink", "eye"].map(place);
+  const [viewAt, pullAt, inkAt, eyeAt, fadeAt, twoAt, skinAt] = ["view", "pull", "ink", "eye", "fade", "two", "skin"].map(place);
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, 256, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, bytesOf(film.colours));
   for (const key of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, key, gl.LINEAR);
   for (const key of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, key, gl.CLAMP_TO_EDGE);
   gl.enable(gl.DEPTH_TEST);
-  gl.clearColor(0.975, 0.973, 0.965, 1);
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const ground = () => (dark.matches ? gl.clearColor(0.125, 0.137, 0.165, 1) : gl.clearColor(0.975, 0.973, 0.965, 1));
+  ground();
+  dark.addEventListener("change", () => { ground(); draw(); });
   const buffer = () => gl.createBuffer(), points = buffer(), normals = buffer(), shares = buffer();
   for (const piece of film.pieces) for (const shape of piece.topologies) {
     for (const [key, values] of [["indexBuffer", shape.index], ["edgeBuffer", shape.edge]]) {
@@ -136,12 +155,30 @@
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, values, gl.STATIC_DRAW);
     }
   }
+  if (film.body) {
+    film.body.indexBuffer = buffer();
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, film.body.indexBuffer);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, film.body.index, gl.STATIC_DRAW);
+  }
   const attribute = (slot, target, values, size, type, normalised) => {
     gl.bindBuffer(gl.ARRAY_BUFFER, target);
     gl.bufferData(gl.ARRAY_BUFFER, values, gl.DYNAMIC_DRAW);
     gl.enableVertexAttribArray(slot);
     gl.vertexAttribPointer(slot, size, type, normalised, 0, 0);
   };
+  function drawBody(eye) {
+    const body = film.body;
+    const turned = camera.which === "all" && body.turned;
+    attribute(0, points, turned || body.surface, 3, gl.FLOAT, false);
+    attribute(1, normals, turned ? body.turnedNormals : body.normals, 3, gl.FLOAT, false);
+    attribute(2, shares, body.shades, 1, gl.UNSIGNED_BYTE, true);
+    gl.uniform3fv(eyeAt, eye);
+    for (const [place, value] of [[pullAt, 0], [fadeAt, 0], [twoAt, 0], [skinAt, 1]]) gl.uniform1f(place, value);
+    gl.uniform4f(inkAt, 0, 0, 0, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, body.indexBuffer);
+    gl.drawElements(gl.TRIANGLES, body.index.length, gl.UNSIGNED_INT, 0);
+    gl.uniform1f(skinAt, 0);
+  }
   function drawMesh(shape, position, normal, colours, eye) {
     attribute(0, points, position, 3, gl.FLOAT, false);
     if (normal) attribute(1, normals, normal, 3, gl.FLOAT, false);
@@ -172,11 +209,72 @@
     return { shape: a.shape, points: blended(a.points, b.points, Float32Array), colours: blended(a.colours, b.colours, Uint8Array) };
   }
 
+  // --- maps: how much longer the cloth is in space than in the pattern, along its threads; the grain runs up the pattern
+  let map = "energy", picked = null;
+  const strainScale = 0.05;
+  function strains(piece, state, way) {
+    const key = "strain" + way, shape = state.shape, p = shape.surface, q = state.points, t = shape.index;
+    if (state[key]) return state[key];
+    const sum = new Float32Array(p.length / 3), area = new Float32Array(p.length / 3);
+    for (let i = 0; i < t.length; i += 3) {
+      const [a, b, c] = [3 * t[i], 3 * t[i + 1], 3 * t[i + 2]];
+      const [ux, uy, vx, vy] = [q[b] - q[a], q[b + 1] - q[a + 1], q[c] - q[a], q[c + 1] - q[a + 1]], twice = ux * vy - uy * vx;
+      if (Math.abs(twice) < 1e-12) continue;
+      const [g, h] = way === "warp" ? [-vx / twice, ux / twice] : [vy / twice, -uy / twice];
+      let long = 0;
+      for (let k = 0; k < 3; k++) long += (g * (p[b + k] - p[a + k]) + h * (p[c + k] - p[a + k])) ** 2;
+      for (const corner of [a, b, c]) { sum[corner / 3] += (Math.sqrt(long) - 1) * Math.abs(twice); area[corner / 3] += Math.abs(twice); }
+    }
+    return (state[key] = sum.map((value, i) => value / (area[i] || 1)));
+  }
+  const shadesOf = (piece, state) => map === "energy" ? state.colours
+    : Uint8Array.from(strains(piece, state, map), (e) => 127.5 + 127.5 * Math.min(1, Math.max(-1, e / strainScale)));
+  // The cloth under a place of the screen: piece, its value in the present map. The nearest triangle counts.
+  function under(x, y) {
+    const m = matrix(), px = (2 * x) / canvas.clientWidth - 1, py = 1 - (2 * y) / canvas.clientHeight;
+    let best = null, depth = 1e9;
+    for (const piece of film.pieces) {
+      const state = stateAt(piece, now), turned = camera.which === "all" && state.shape.turned, t = state.shape.index;
+      const shown = [camera.which !== "pattern" && (turned || state.shape.surface), camera.which !== "surface" && state.points];
+      for (const p of shown.filter(Boolean)) {
+        const count = p.length / 3, sx = new Float32Array(count), sy = new Float32Array(count), sz = new Float32Array(count);
+        for (let i = 0; i < count; i++) {
+          const [u, v, w] = [p[3 * i], p[3 * i + 1], p[3 * i + 2]], d = m[3] * u + m[7] * v + m[11] * w + m[15];
+          sx[i] = (m[0] * u + m[4] * v + m[8] * w + m[12]) / d;
+          sy[i] = (m[1] * u + m[5] * v + m[9] * w + m[13]) / d;
+          sz[i] = (m[2] * u + m[6] * v + m[10] * w + m[14]) / d;
+        }
+        for (let i = 0; i < t.length; i += 3) {
+          const [a, b, c] = [t[i], t[i + 1], t[i + 2]];
+          const twice = (sx[b] - sx[a]) * (sy[c] - sy[a]) - (sy[b] - sy[a]) * (sx[c] - sx[a]);
+          if (!twice) continue;
+          const f = ((px - sx[a]) * (sy[c] - sy[a]) - (py - sy[a]) * (sx[c] - sx[a])) / twice;
+          const g = ((sx[b] - sx[a]) * (py - sy[a]) - (sy[b] - sy[a]) * (px - sx[a])) / twice;
+          if (f < 0 || g < 0 || f + g > 1) continue;
+          const z = sz[a] + f * (sz[b] - sz[a]) + g * (sz[c] - sz[a]);
+          if (z >= depth) continue;
+          depth = z;
+          const from = map === "energy" ? state.colours : strains(piece, state, map);
+          best = { piece, value: from[a] + f * (from[b] - from[a]) + g * (from[c] - from[a]) };
+        }
+      }
+    }
+    return best;
+  }
+  const wordsOf = (found) => {
+    if (!found) return "";
+    const name = found.piece.name.replaceAll("_", " ");
+    if (map !== "energy") return `${name}: ${(100 * found.value).toFixed(1)} % along the ${map}`;
+    const energy = (found.value / 255) * film.scale;
+    return `${name}: ${found.value >= 254.5 ? "at least " : ""}${energy.toPrecision(3)} J/m²`;
+  };
+
   // --- camera
   const camera = { turn: 0, tilt: 0, away: 3, target: [0, 0, 0], which: "all", moved: false };
   function boxOf(which) {
     const low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
     const grow = (p) => { for (let i = 0; i < p.length; i++) { low[i % 3] = Math.min(low[i % 3], p[i]); high[i % 3] = Math.max(high[i % 3], p[i]); } };
+    if (film.body && which !== "pattern") grow(film.body.surface);
     for (const piece of film.pieces) {
       if (which !== "pattern") grow(piece.topologies[0].surface);
       if (which !== "surface") for (const k of [0, -1]) grow(piece.layouts.at(k).points);
@@ -215,11 +313,16 @@
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.uniformMatrix4fv(viewAt, false, matrix());
     const { back } = axes();
+    const bodyBox = document.getElementById("body");
+    if (film.body && camera.which !== "pattern" && bodyBox && bodyBox.checked) drawBody(back);
     for (const piece of film.pieces) {
       const state = stateAt(piece, now);
       const shape = state.shape, turned = camera.which === "all" && shape.turned;
-      if (camera.which !== "pattern") drawMesh(shape, turned || shape.surface, turned ? shape.turnedNormals : shape.normals, state.colours, back);
-      if (camera.which !== "surface") drawMesh(state.shape, state.points, null, state.colours, back);
+      const shades = shadesOf(piece, state);
+      gl.uniform1f(fadeAt, picked && picked !== piece ? 1 : 0);
+      gl.uniform1f(twoAt, map === "energy" ? 0 : 1);
+      if (camera.which !== "pattern") drawMesh(shape, turned || shape.surface, turned ? shape.turnedNormals : shape.normals, shades, back);
+      if (camera.which !== "surface") drawMesh(state.shape, state.points, null, shades, back);
     }
     const k = Math.min(Math.round(now), last);
     label.textContent = `${film.stages[k]} · frame ${film.frames[k]} of ${film.of}` + (film.computed[k] ? " · computed" : " · interpolated");
@@ -235,10 +338,10 @@
   function halt() { playing = false; play.textContent = "Play"; }
   function tick(time) {
     if (!playing) return;
-    const step = ((time - clock) / 1000) * film.rate * Math.max(film.frames.length / film.of, 0.01);
+    const step = Number(document.getElementById("speed").value) * ((time - clock) / 1000) * film.rate * Math.max(film.frames.length / film.of, 0.01);
     clock = time;
-    if (now >= last) { halt(); return; }
-    show(now + step);
+    if (now >= last && !document.getElementById("loop").checked) { halt(); return; }
+    show(now >= last ? 0 : now + step);
     requestAnimationFrame(tick);
   }
   play.addEventListener("click", () => {
@@ -251,6 +354,35 @@
   });
   const views = { all: ["all", 0, 0], front: ["surface", 0, 0.08], side: ["surface", Math.PI / 2, 0.08], back: ["surface", Math.PI, 0.08], pattern: ["pattern", 0, 0] };
   for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => look(...views[button.dataset.view]));
+  const bodyShown = document.getElementById("body");
+  if (bodyShown) bodyShown.addEventListener("change", draw);
+  const chosen = document.getElementById("map"), value = document.getElementById("value");
+  const [lowEnd, highEnd, bar] = [document.getElementById("low"), document.getElementById("high"), document.querySelector(".scale i")];
+  const energyEnds = lowEnd && [lowEnd.textContent, highEnd.textContent, bar.style.background];
+  chosen.addEventListener("change", () => {
+    map = chosen.value;
+    if (lowEnd) {
+      const ends = map === "energy" ? energyEnds
+        : [`-${100 * strainScale} %`, `+${100 * strainScale} %, longer in space than flat`, "linear-gradient(90deg,#2166ac,#f7f7f7,#b2182b)"];
+      [lowEnd.textContent, highEnd.textContent, bar.style.background] = ends;
+    }
+    value.textContent = "";
+    draw();
+  });
+  let pointed = null, pressed = null;
+  canvas.addEventListener("pointermove", (event) => {
+    if (event.buttons) return;
+    if (!pointed) requestAnimationFrame(() => { value.textContent = wordsOf(under(...pointed)); pointed = null; });
+    pointed = [event.offsetX, event.offsetY];
+  });
+  canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  canvas.addEventListener("click", (event) => {
+    if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return;
+    const found = under(event.offsetX, event.offsetY);
+    picked = found && picked !== found.piece ? found.piece : null;
+    value.textContent = wordsOf(found);
+    draw();
+  });
   const fingers = new Map();  // two of them zoom
   const spread = () => { const [a, b] = [...fingers.values()]; return Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY); };
   canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); fingers.set(event.pointerId, event); });
@@ -274,6 +406,7 @@
     draw();
   });
   canvas.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey && !event.metaKey) return;  // the page scrolls
     event.preventDefault();
     camera.moved = true;
     camera.away *= Math.exp(0.001 * event.deltaY);
@@ -281,6 +414,7 @@
   }, { passive: false });
   window.addEventListener("resize", () => { if (camera.moved) draw(); else look(camera.which, camera.turn, camera.tilt); });
   window.addEventListener("keydown", (event) => {
+    if (event.target.tagName === "SELECT") return;
     if (event.target !== slider && event.key === "ArrowRight") { halt(); show(Math.floor(now) + 1); }
     if (event.target !== slider && event.key === "ArrowLeft") { halt(); show(Math.ceil(now) - 1); }
     if (event.key === " " && event.target.tagName !== "BUTTON") { event.preventDefault(); play.click(); }
@@ -288,6 +422,6 @@
   now = last;
   look(...views.all);
   // For scripts and tests: what is shown.
-  window.review = { show, look: (name) => look(...views[name]), points: (name) => Array.from(stateAt(film.pieces.find((piece) => piece.name === name), now).points) };
+  window.review = { show, under: (x, y) => wordsOf(under(x, y)), picked: () => picked && picked.name, look: (name) => look(...views[name]), points: (name) => Array.from(stateAt(film.pieces.find((piece) => piece.name === name), now).points) };
   document.body.dataset.ready = "yes";
 })();
