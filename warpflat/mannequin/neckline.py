@@ -18,8 +18,8 @@ __all__ = ["Neckline", "widen_neck"]
 
 # Upright sections of chest and back begin so far [m] above the lowest point across chest or back.
 _ABOVE = 0.015
-# Powers of the superellipses of a neckline: 2 is an ellipse, which would be boxy where it rises little.
-_POWER = {"front": 2.0, "back": 1.6}
+# Power of the superellipse behind: 2 is an ellipse, which would be boxy where it rises little.
+_POWER_BEHIND = 1.6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,23 +29,25 @@ class Neckline:
     Attributes:
         side_cm: along the shoulder seams [cm].
         front_cm, back_cm: along the centre lines [cm].
+        front_power: of the superellipse in front: 2 is round, 1 a V, 6 nearly square.
     """
 
     side_cm: float = 0.0
     front_cm: float = 0.0
     back_cm: float = 0.0
+    front_power: float = 2.0
 
     @staticmethod
     def ranges() -> dict[str, tuple[float, float]]:
         """Return the least and the greatest valid value of every number."""
-        return {"side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0)}
+        return {"side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0), "front_power": (1.0, 8.0)}
 
 
 def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> FloatArray:
     """Return a form's vertices (#V by 3 [m]) with the neck's row moved to a wider neckline on the same surface.
 
-    Each quarter of the neckline is that of an ellipse from the centre line, which it meets at right angles, to the shoulder seam,
-    behind of a flatter superellipse: in the plane into which chest or back unroll, their upright sections side by side. What lies
+    Each quarter of the neckline is that of a superellipse from the centre line to the shoulder seam, in front of one of the power that is
+    asked for, behind of a flatter one: in the plane into which chest or back unroll, their upright sections side by side. What lies
     between it, the armholes and the bust follows smoothly.
 
     Raises:
@@ -83,9 +85,18 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
             quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
             share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
             # There they become a quarter of the superellipse of that power.
-            centre, shoulder, power = out[quarter[0]], out[quarter[-1]], _POWER[face]
+            centre, shoulder = out[quarter[0]], out[quarter[-1]]
+            power = neckline.front_power if face == "front" else _POWER_BEHIND
             level = float(half.vertices[:, 1].min()) + _ABOVE
             turn = 0.5 * np.pi * share[1:-1]
+            if face == "front" and power != Neckline.front_power:
+                # A V and a square are not turned through evenly as they are walked along.
+                fine = np.linspace(0.0, 0.5 * np.pi, 513)
+                wide, high = abs(shoulder[0] - centre[0]), abs(shoulder[1] - centre[1])
+                walked = arc_lengths(
+                    np.column_stack([wide * np.sin(fine) ** (2.0 / power), -high * np.cos(fine) ** (2.0 / power)])
+                )
+                turn = np.interp(share[1:-1] * walked[-1], walked, fine)
             across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
             # Just beside the seams, so that the sections do not run along edges of the mesh.
             sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
