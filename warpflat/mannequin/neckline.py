@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
 from warpflat.mannequin.closest import Closest
@@ -20,6 +21,8 @@ __all__ = ["Neckline", "widen_neck"]
 _ABOVE = 0.015
 # Power of the superellipse behind: 2 is an ellipse, which would be boxy where it rises little.
 _POWER_BEHIND = 1.6
+# How much more upright edges weigh than those across, as the rows below a neckline follow it; the first that folds nothing is taken.
+_ALONG_COLUMNS = (1.0, 4.0, 16.0, 64.0, 256.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +54,7 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     between it, the armholes and the bust follows smoothly.
 
     Raises:
-        InputError: the neckline takes a whole shoulder seam.
+        InputError: the neckline takes a whole shoulder seam, or is so deep that the cloth folds below it.
     """
     ids, laplacian, local = sheet_laplacian(layout, layout.level_row["bust"])
     quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
@@ -115,13 +118,41 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
         )
     )
     moved = np.setdiff1d(ids, fixed)
-    shift = _filled(out - vertices, ids, laplacian, local, fixed)
-    out[moved] = surface.nearest(vertices[moved] + shift[moved])
-    for line in centres:
-        # What lies on the centre stays on it.
-        for vertex in np.intersect1d(line, moved):
-            out[vertex] = nearest_on_polyline(vertices[vertex] + shift[vertex], vertices[line])
-    return out
+    # Smooth as far as that keeps every quad upright; below a deep neckline each column of the grid is drawn together by itself instead.
+    upright = _corners_upright(vertices, quads)
+    for stiffness in _ALONG_COLUMNS:
+        placed = out.copy()
+        shift = _filled(out - vertices, ids, _along_columns(laplacian, vertices[ids], stiffness), local, fixed)
+        placed[moved] = surface.nearest(vertices[moved] + shift[moved])
+        for line in centres:
+            # What lies on the centre stays on it.
+            for vertex in np.intersect1d(line, moved):
+                placed[vertex] = nearest_on_polyline(vertices[vertex] + shift[vertex], vertices[line])
+        if not (upright & ~_corners_upright(placed, quads, along=vertices)).any():
+            return placed
+    raise InputError("form: neckline: the cloth folds below it; make it less deep: a smaller front_cm or back_cm")
+
+
+def _along_columns(laplacian: Any, points: FloatArray, stiffness: float) -> Any:
+    """Return an umbrella operator in which upright edges weigh more, by a stiffness that is 1 as it is."""
+    from scipy import sparse
+
+    if stiffness == 1.0:
+        return laplacian
+    pairs = (laplacian - sparse.diags(laplacian.diagonal())).tocoo()
+    edge = points[pairs.row] - points[pairs.col]
+    upright = edge[:, 1] ** 2 / (edge**2).sum(axis=1)
+    weights = sparse.coo_matrix((1.0 + (stiffness - 1.0) * upright, (pairs.row, pairs.col)), laplacian.shape).tocsr()
+    return weights - sparse.diags(np.asarray(weights.sum(axis=1)).ravel())
+
+
+def _corners_upright(points: FloatArray, quads: IntArray, along: FloatArray | None = None) -> BoolArray:
+    """Return whether every corner of every quad looks the way that the quad looks, or looked `along` (#F by 4)."""
+    corners = points[quads]
+    before = corners if along is None else along[quads]
+    normal = np.cross(before[:, 2] - before[:, 0], before[:, 3] - before[:, 1])
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    return np.asarray((np.cross(ahead, behind) * normal[:, None]).sum(axis=2) > 0.0)
 
 
 class _Surface:
