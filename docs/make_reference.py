@@ -285,7 +285,8 @@ def _form_section() -> list[str]:
         _row("`ease`", "A preset, or ease by level [cm].", "`ease = { bust = 5.0 }`"),
         _row(
             "`neckline`",
-            "How far the edge lies from the base of the neck, along shoulder seams and centre lines [cm].",
+            "How far the edge lies from the base of the neck, along shoulder seams and centre lines [cm]; `front_power` is 2 for a round "
+            "neckline, 1 for a V, 6 for one that is nearly square.",
             "`neckline = { side_cm = 2.0, front_cm = 5.0, back_cm = 1.5 }`",
         ),
         "", inspect.cleandoc(Adjustment.__doc__ or "").split("\n\n")[0], "",

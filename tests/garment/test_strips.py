@@ -123,7 +123,7 @@ def test_ruffle_is_gathered_itself(shirt: Garment):
 def test_flounce_has_a_panel_for_each_piece_and_the_hem_of_a_ring(half_skirt: Garment, turns: float):
     pattern = finished(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=turns))
     found = lengths(pattern)
-    assert {"front knee flounce", "back knee flounce", "side left of knee flounce"} <= set(found)
+    assert {"front knee flounce", "back knee flounce", "side left of the flounce"} <= set(found)
     panels = [piece for piece in pattern.pieces[""] if piece.name.endswith("flounce")]
     assert len(panels) == 2
     assert all(piece.on_fold for piece in panels)

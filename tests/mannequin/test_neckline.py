@@ -67,3 +67,40 @@ def test_neckline_that_cannot_be_is_named():
     narrow = replace(shipped_form("bodice"), neckline=Neckline(side_cm=12.0))
     with pytest.raises(InputError, match=r"side_cm is 12, but the shoulder is \d+\.\d cm long"):
         mannequin.form(narrow)
+
+
+@pytest.mark.parametrize(("power", "depth"), [(1.0, 8.0), (2.0, 10.0), (5.0, 8.0)])
+def test_cloth_below_a_deep_neckline_is_not_folded(power: float, depth: float):
+    mannequin = Mannequin.from_size("EU 38", resolution_mm=16.0)
+    neckline = {"side_cm": 3.0, "front_cm": depth, "front_power": power}
+    made = mannequin.form(form_from_mapping("top", {"like": "bodice", "neckline": neckline}))
+    surface = made.pieces["front"].surface
+    corners = surface.vertices[surface.faces]
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    # Every corner of every quad of the chest looks forwards.
+    chest = corners.mean(axis=1)[:, 1] > mannequin.levels()["bust"].height
+    middle = np.abs(corners.mean(axis=1)[:, 0]) < 0.10
+    assert np.cross(ahead, behind)[chest & middle][:, :, 2].min() > 0.0
+
+
+def test_v_neckline_is_straight_from_the_centre_to_the_shoulder():
+    mannequin = Mannequin.from_size("EU 38", resolution_mm=16.0)
+    neckline = {"side_cm": 2.0, "front_cm": 8.0, "front_power": 1.0}
+    made = mannequin.form(form_from_mapping("top", {"like": "bodice", "neckline": neckline}))
+    front = made.pieces["front"]
+    points = front.surface.vertices[front.edges["neck"]]
+    half = points[points[:, 0] > -1e-6]
+    ends = half[[half[:, 0].argmin(), half[:, 0].argmax()]]
+    # The cloth is not flat: the line of sight from the front shows how straight it is.
+    along = (ends[1] - ends[0])[:2] / np.linalg.norm((ends[1] - ends[0])[:2])
+    away = (half - ends[0])[:, :2] @ [-along[1], along[0]]
+    assert np.abs(away).max() < 0.008
+
+
+def test_neckline_that_would_fold_the_cloth_is_refused():
+    mannequin = Mannequin.from_size("EU 38", resolution_mm=16.0)
+    deep = form_from_mapping(
+        "top", {"like": "bodice", "neckline": {"side_cm": 8.0, "front_cm": 15.0, "front_power": 1.0}}
+    )
+    with pytest.raises(InputError, match="the cloth folds below it"):
+        mannequin.form(deep)

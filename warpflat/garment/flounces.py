@@ -124,7 +124,7 @@ def with_flounce(pattern: Pattern, chain: FreeChain, width: float, turns: float,
             if all(side.mirrored for side in sides):
                 sides = (replace(sides[0], mirrored=False), replace(sides[1], mirrored=False))
             title = next((side.edge for side in sides if not side.mirrored), sides[0].edge)
-            seam = find_unused_name(f"{title} of {called} flounce", called_seams)
+            seam = find_unused_name(f"{title} of the flounce", called_seams)
             called_seams.add(seam)
             seams.append(Seam(name=seam, sides=((sides[0],), (sides[1],))))
     return replace(pattern, pieces=pieces, seams=seams)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
 from warpflat.mannequin.closest import Closest
@@ -18,8 +19,10 @@ __all__ = ["Neckline", "widen_neck"]
 
 # Upright sections of chest and back begin so far [m] above the lowest point across chest or back.
 _ABOVE = 0.015
-# Powers of the superellipses of a neckline: 2 is an ellipse, which would be boxy where it rises little.
-_POWER = {"front": 2.0, "back": 1.6}
+# Power of the superellipse behind: 2 is an ellipse, which would be boxy where it rises little.
+_POWER_BEHIND = 1.6
+# How much more upright edges weigh than those across, as the rows below a neckline follow it; the first that folds nothing is taken.
+_ALONG_COLUMNS = (1.0, 4.0, 16.0, 64.0, 256.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,27 +32,29 @@ class Neckline:
     Attributes:
         side_cm: along the shoulder seams [cm].
         front_cm, back_cm: along the centre lines [cm].
+        front_power: of the superellipse in front: 2 is round, 1 a V, 6 nearly square.
     """
 
     side_cm: float = 0.0
     front_cm: float = 0.0
     back_cm: float = 0.0
+    front_power: float = 2.0
 
     @staticmethod
     def ranges() -> dict[str, tuple[float, float]]:
         """Return the least and the greatest valid value of every number."""
-        return {"side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0)}
+        return {"side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0), "front_power": (1.0, 8.0)}
 
 
 def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> FloatArray:
     """Return a form's vertices (#V by 3 [m]) with the neck's row moved to a wider neckline on the same surface.
 
-    Each quarter of the neckline is that of an ellipse from the centre line, which it meets at right angles, to the shoulder seam,
-    behind of a flatter superellipse: in the plane into which chest or back unroll, their upright sections side by side. What lies
+    Each quarter of the neckline is that of a superellipse from the centre line to the shoulder seam, in front of one of the power that is
+    asked for, behind of a flatter one: in the plane into which chest or back unroll, their upright sections side by side. What lies
     between it, the armholes and the bust follows smoothly.
 
     Raises:
-        InputError: the neckline takes a whole shoulder seam.
+        InputError: the neckline takes a whole shoulder seam, or is so deep that the cloth folds below it.
     """
     ids, laplacian, local = sheet_laplacian(layout, layout.level_row["bust"])
     quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
@@ -83,9 +88,18 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
             quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
             share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
             # There they become a quarter of the superellipse of that power.
-            centre, shoulder, power = out[quarter[0]], out[quarter[-1]], _POWER[face]
+            centre, shoulder = out[quarter[0]], out[quarter[-1]]
+            power = neckline.front_power if face == "front" else _POWER_BEHIND
             level = float(half.vertices[:, 1].min()) + _ABOVE
             turn = 0.5 * np.pi * share[1:-1]
+            if face == "front" and power != Neckline.front_power:
+                # A V and a square are not turned through evenly as they are walked along.
+                fine = np.linspace(0.0, 0.5 * np.pi, 513)
+                wide, high = abs(shoulder[0] - centre[0]), abs(shoulder[1] - centre[1])
+                walked = arc_lengths(
+                    np.column_stack([wide * np.sin(fine) ** (2.0 / power), -high * np.cos(fine) ** (2.0 / power)])
+                )
+                turn = np.interp(share[1:-1] * walked[-1], walked, fine)
             across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
             # Just beside the seams, so that the sections do not run along edges of the mesh.
             sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
@@ -104,13 +118,41 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
         )
     )
     moved = np.setdiff1d(ids, fixed)
-    shift = _filled(out - vertices, ids, laplacian, local, fixed)
-    out[moved] = surface.nearest(vertices[moved] + shift[moved])
-    for line in centres:
-        # What lies on the centre stays on it.
-        for vertex in np.intersect1d(line, moved):
-            out[vertex] = nearest_on_polyline(vertices[vertex] + shift[vertex], vertices[line])
-    return out
+    # Smooth as far as that keeps every quad upright; below a deep neckline each column of the grid is drawn together by itself instead.
+    upright = _corners_upright(vertices, quads)
+    for stiffness in _ALONG_COLUMNS:
+        placed = out.copy()
+        shift = _filled(out - vertices, ids, _along_columns(laplacian, vertices[ids], stiffness), local, fixed)
+        placed[moved] = surface.nearest(vertices[moved] + shift[moved])
+        for line in centres:
+            # What lies on the centre stays on it.
+            for vertex in np.intersect1d(line, moved):
+                placed[vertex] = nearest_on_polyline(vertices[vertex] + shift[vertex], vertices[line])
+        if not (upright & ~_corners_upright(placed, quads, along=vertices)).any():
+            return placed
+    raise InputError("form: neckline: the cloth folds below it; make it less deep: a smaller front_cm or back_cm")
+
+
+def _along_columns(laplacian: Any, points: FloatArray, stiffness: float) -> Any:
+    """Return an umbrella operator in which upright edges weigh more, by a stiffness that is 1 as it is."""
+    from scipy import sparse
+
+    if stiffness == 1.0:
+        return laplacian
+    pairs = (laplacian - sparse.diags(laplacian.diagonal())).tocoo()
+    edge = points[pairs.row] - points[pairs.col]
+    upright = edge[:, 1] ** 2 / (edge**2).sum(axis=1)
+    weights = sparse.coo_matrix((1.0 + (stiffness - 1.0) * upright, (pairs.row, pairs.col)), laplacian.shape).tocsr()
+    return weights - sparse.diags(np.asarray(weights.sum(axis=1)).ravel())
+
+
+def _corners_upright(points: FloatArray, quads: IntArray, along: FloatArray | None = None) -> BoolArray:
+    """Return whether every corner of every quad looks the way that the quad looks, or looked `along` (#F by 4)."""
+    corners = points[quads]
+    before = corners if along is None else along[quads]
+    normal = np.cross(before[:, 2] - before[:, 0], before[:, 3] - before[:, 1])
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    return np.asarray((np.cross(ahead, behind) * normal[:, None]).sum(axis=2) > 0.0)
 
 
 class _Surface:
