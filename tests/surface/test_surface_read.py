@@ -10,7 +10,7 @@ from surface_meshes import broken_invariants, cylinder, grid
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.surface.io.read import METRES_PER_UNIT, read_surface
+from warpflat.surface.io.read import METRES_PER_UNIT, read_scan, read_surface
 from warpflat.surface.io.read_obj import chain_lines
 from warpflat.surface.triangles import triangulate
 
@@ -407,6 +407,9 @@ def test_one_of_several_mesh_prims_is_chosen_by_path_or_name(tmp_path):
     assert "holds 3 mesh prims" in message
     assert "/World/front/surface" in message
     assert read_surface(tmp_path / "a.usda", prim="/World/back/surface").name == "surface"
+    # A scan is all of them: an avatar's skin, eyes and hair.
+    vertices_of_all, faces = read_scan(tmp_path / "a.usda")
+    assert (len(vertices_of_all), len(faces)) == (3 * len(vertices), 3 * len(quads))
     assert read_surface(tmp_path / "a.usda", prim="hood").vertices.max() == pytest.approx(2)
     assert "names several" in refusal(tmp_path / "a.usda", prim="surface")
     assert "did you mean '/World/hood'" in refusal(tmp_path / "a.usda", prim="/World/hod")

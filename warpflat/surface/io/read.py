@@ -156,7 +156,7 @@ def surface_of_file(
 
 
 def read_scan(path: str | PathLike[str]) -> tuple[FloatArray, IntArray]:
-    """Read any mesh as it stands, closed or in several parts, such as the scan of a body.
+    """Read any mesh as it stands, closed or in several parts or prims, such as the scan of a body.
 
     Returns:
         #V by 3, positions in the file's own unit; #F by 4, faces, -1 in the last column of a triangle.
@@ -166,7 +166,7 @@ def read_scan(path: str | PathLike[str]) -> tuple[FloatArray, IntArray]:
     """
     file = Path(path)
     with _reading_mesh(file):
-        raw = _read(file, None, None)
+        raw = _read(file, None, ALL_PRIMS)
         polygons, keep, _ = distinct_corners(raw.polygons)
         return raw.vertices, split_polygons(check_positions(raw.vertices), polygons[keep])[0]
 
