@@ -24,7 +24,7 @@ _ATTRACT = 0.25
 _ATTRACT_ROUNDS = 4
 # So far [m] below the underarm the bust's row meets the side, where the rows below it keep this share of the height: a dart
 # from there keeps off the armhole.
-_DART_ROOM, _LEAST_SHARE = 0.04, 0.25
+_DART_ROOM, _LEAST_SHARE = 0.043, 0.2
 
 
 def build_trunk(layout: Layout, blueprint: Blueprint) -> FloatArray:
