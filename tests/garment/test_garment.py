@@ -309,15 +309,15 @@ def test_a_cut_is_offered_for_what_it_wins_and_not_for_what_sewing_does():
         SeamWish(name="shoulder left", factor=1.01),
     ]
     form = body.form("basic_block", half=True)
-    dress = flatten_form(body, form, fabric="linen", wishes=wishes, wear=Wear(), curves_mm=0.0)
+    dress = flatten_form(body, form, fabric="woven", wishes=wishes, wear=Wear(), curves_mm=0.0)
     dress = replace(dress, pieces={name: advise(piece) for name, piece in dress.pieces.items()})
     skirt, bodice = (dress.pieces[name].measures["wear"] for name in ("back_skirt", "front_bodice"))
     assert not skirt["fits"]
     assert skirt["outside_unsewn"] == 0.0
     assert skirt["would_help"] == []
-    alone = flatten_form(body, form, fabric="linen", wear=Wear(), sewn=False, curves_mm=0.0).pieces["front_bodice"]
+    alone = flatten_form(body, form, fabric="woven", wear=Wear(), sewn=False, curves_mm=0.0).pieces["front_bodice"]
     assert bodice["outside_unsewn"] == pytest.approx(alone.fit.outside)
-    assert bodice["outside"] > 1.2 * bodice["outside_unsewn"]
+    assert bodice["outside"] > 2 * bodice["outside_unsewn"]
     assert bodice["would_help"]
     assert all(remedy["outside_after"] < 0.9 * bodice["outside_unsewn"] for remedy in bodice["would_help"])
     lines = fit_lines(dress.metrics())
