@@ -8,10 +8,12 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import warpflat
 from warpflat.core.activity import activity_listener
-from warpflat.core.beside import Beside, work_beside
+from warpflat.core.beside import Beside, two_at_a_time, work_beside
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import note_read
 from warpflat.core.output import atomic_path, output_folder
@@ -37,6 +39,24 @@ def test_files_of_another_process_appear_with_those_of_the_run(tmp_path: Path):
         assert work.result() != os.getpid()
         assert not (out / "a.txt").exists()
     assert sorted(path.name for path in out.iterdir()) == ["a.txt", "b.txt"]
+
+
+def test_items_are_done_two_at_a_time_and_come_in_their_order():
+    with work_beside():
+        found = list(two_at_a_time(lambda item: (item, os.getpid()), range(5)))
+    assert [item for item, _ in found] == [0, 1, 2, 3, 4]
+    assert [process == os.getpid() for _, process in found] == [True, False, True, False, True]
+    assert [process for _, process in two_at_a_time(lambda item: (item, os.getpid()), range(3))] == [os.getpid()] * 3
+
+
+def test_a_flattened_piece_comes_back_from_another_process():
+    surface = warpflat.make_shape("dome", resolution=9)
+    with work_beside(), Beside(lambda: warpflat.flatten(surface)) as work:
+        there = work.result()
+        assert work.process != os.getpid()
+    here = warpflat.flatten(surface)
+    np.testing.assert_array_equal(there.positions, here.positions)
+    assert there.fit.outside == here.fit.outside
 
 
 def test_only_a_program_has_other_processes(monkeypatch: pytest.MonkeyPatch):

@@ -143,7 +143,9 @@ def find_seams(
     return FoundSeams(
         pieces=tuple(pieces),
         seams=tuple(seam for one in found for seam in one.seams),
-        what="; ".join(one.what for one in found),
+        what="; ".join(
+            what if count == 1 else f"{count} x {what}" for what, count in Counter(one.what for one in found).items()
+        ),
         up=found[0].up,
         front=found[0].front,
         notes=(*drawn, *(note for one in found for note in one.notes)),
