@@ -52,7 +52,7 @@ def measure(mesh: Mesh, fabric: Fabric, repeats: int) -> str:
         begun = time.perf_counter()
 
         def look(at: Progress, begun: float = begun, looks: list[tuple[float, float, float]] = looks) -> None:
-            looks.append((at.model_energy, at.work_units, time.perf_counter() - begun))
+            looks.append((at.model_energy_j, at.work_units, time.perf_counter() - begun))
 
         piece = warpflat.flatten(surface, fabric=fabric, datum=mesh.datum, device="cpu", callback=look)
         seconds, last = time.perf_counter() - begun, piece.stages[-1]

@@ -39,7 +39,7 @@ def measure(name: str, run: Callable[[Look], Flattening], repeats: int) -> None:
         begun = time.perf_counter()
 
         def look(at: Progress, begun: float = begun, looks: list[tuple[float, float, float]] = looks) -> None:
-            looks.append((at.model_energy, time.perf_counter() - begun, at.work_units))
+            looks.append((at.model_energy_j, time.perf_counter() - begun, at.work_units))
 
         last = run(look).stages[-1]
         seconds = time.perf_counter() - begun

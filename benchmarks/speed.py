@@ -172,7 +172,7 @@ class Runner:
             begun = now()
 
             def look(at: Progress, begun: float = begun, looks: list[Look] = looks) -> None:
-                looks.append((at.model_energy, now() - begun, at.work_units))
+                looks.append((at.model_energy_j, now() - begun, at.work_units))
 
             flat = warpflat.flatten(
                 surface, fabric=CLOTH, datum=self.mesh.datum, device=device, callback=look, **OURS[name]

@@ -61,7 +61,7 @@ def test_the_bar_shows_what_is_being_done_and_then_steps_again(monkeypatch: pyte
             return True
 
     stream = Terminal()
-    look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy=0.0021, residual=0.5)
+    look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy_j=0.0021, residual=0.5)
     monkeypatch.setattr("sys.stderr", stream)
     monkeypatch.setattr("warpflat.cli.progress_bar._REFRESH", 0.0)
     monkeypatch.setattr("warpflat.cli.progress_bar._TICK", 0.05)

@@ -260,7 +260,7 @@ def test_the_relaxation_goes_on_from_the_present_layout(bodice: Flattening):
 
     result = cut(bodice, paper_cuts()[0], callback=watch)
     assert np.array_equal(first[0], bodice.positions[result.vertex_origin])
-    assert seen[0].model_energy == pytest.approx(bodice.stages[-1].model_energy_j, rel=1e-9)
+    assert seen[0].model_energy_j == pytest.approx(bodice.stages[-1].model_energy_j, rel=1e-9)
     assert {progress.stage for progress in seen} == {"steps", "cut:bust"}
     assert [stage.name for stage in result.stages] == ["develop", "steps", "relax", "steps", "cut:bust"]
 

@@ -158,7 +158,7 @@ def test_what_is_told_on_the_way():
         assert told[number][0].surface is surfaces[number]
         np.testing.assert_array_equal(layouts[number][0], piece.development.positions)
         assert layouts[number][-1].shape == piece.positions.shape
-        assert told[number][0].model_energy == piece.stages[0].model_energy_j
+        assert told[number][0].model_energy_j == piece.stages[0].model_energy_j
         assert told[number][-1].step == sum(stage.steps for stage in piece.stages)
 
 

@@ -89,12 +89,12 @@ class Tiling:
 
     @property
     def joints(self) -> list[FloatArray]:
-        """The lines along which sheets meet, 2 by 2 [m]: each sheet's left and upper line lies on its neighbours."""
+        """The lines along which sheets meet or end, 2 by 2 [m]: each sheet's left and upper line lies on its neighbours."""
         if not self.joined:
             return []
         step, (width, height) = self.paper.step, self.sheet.size
-        across = [np.array([[k * step[0], 0.0], [k * step[0], height]]) for k in range(1, self.columns)]
-        down = [np.array([[0.0, height - k * step[1]], [width, height - k * step[1]]]) for k in range(1, self.rows)]
+        across = [np.array([[k * step[0], 0.0], [k * step[0], height]]) for k in range(self.columns + 1)]
+        down = [np.array([[0.0, height - k * step[1]], [width, height - k * step[1]]]) for k in range(self.rows + 1)]
         return across + down
 
     def name(self, row: int, column: int) -> str:

@@ -25,6 +25,8 @@ _POWER_BEHIND = 1.6
 _ALONG_COLUMNS = (1.0, 4.0, 16.0, 64.0, 256.0)
 # Share of corners that may look aside: those of a scan do so in its hollows. Beside a V or a square any of them shows.
 _FOLDED = 0.002
+# A neckline deeper than this [cm] may fold the cloth below it.
+_DEEP = 8.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +136,9 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
             best, fewest = placed, folded
         if folded <= (few if neckline.front_power == Neckline.front_power else 0):
             break
-    if fewest > few:
+    # A round one that is not deep, as forms ask for by themselves, is drawn as well as it can be on anybody.
+    is_deep = max(neckline.front_cm, neckline.back_cm) > _DEEP or neckline.front_power != Neckline.front_power
+    if fewest > few and is_deep:
         raise InputError("neckline: the cloth folds below it; make it less deep: a smaller front_cm or back_cm")
     return best
 

@@ -68,7 +68,7 @@ class OnPaper:
     """What printing changes: a fold is not cut, words cross no joint, notches have letters.
 
     Attributes:
-        joints: lines (2 by 2 [m]) where sheets of paper meet.
+        joints: lines (2 by 2 [m]) where sheets of paper meet or end.
         letters: of seams, by their names.
     """
 
@@ -348,8 +348,10 @@ def _annotations(
             # Beside the outer slit of a double notch.
             aside = [max(float((base - notch.base[0]) @ along * sign) for base in notch.base) for sign in (1.0, -1.0)]
             half = text_width(letter, LETTER, bold=True) / 2 + LETTER_GAP
+            # Close to the notch, or where the sheet ends there, some way along the edge.
             places = [
-                notch.base[0] + middle + sign * (out + half) * along
+                notch.base[0] + middle + sign * (out + half + way) * along
+                for way in (0.0, LETTER, 2.0 * LETTER)
                 for sign, out in zip((1.0, -1.0), aside, strict=True)
             ]
             beside = [Spot(x=float(x), y=float(y)) for x, y in places]
