@@ -160,7 +160,8 @@ def cut_by_energy(
         prepare: makes the surface of a piece, with its grain.
     """
     pieces = _measured(cloth, anatomy, fabric, prepare, [])
-    total = sum(piece.area for piece in pieces)
+    # Of a speck no piece may have an area.
+    total = sum(piece.area for piece in pieces) or 1.0
     cloth, pieces, trials = _priced(cloth, pieces, anatomy, fabric, options, prepare)
     exhausted = set[int]()
     tried = 0
