@@ -60,7 +60,7 @@ class Panel:
 
     @property
     def area(self) -> float:
-        """Of the cloth as it was cut [m2]."""
+        """The area of the cloth as it was cut [m2]."""
         return _area(self.cut, self.surface.faces)
 
     @property

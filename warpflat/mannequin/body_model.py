@@ -223,6 +223,12 @@ class BodyModel:
         out[:, :, -1] = posed
         return posed + person.place, out
 
+    def departures(self, person: Person) -> FloatArray:
+        """Return how far a person departs from the mean: shapes, then bends in the frames of the joints' parents [rad]."""
+        turn, _ = self.frames(self.shaped(person.shape)[self.count :], person.bend)
+        bends = np.einsum("jab,jb->ja", turn[self.parents], rotation_vector(person.bend))
+        return np.concatenate([person.shape, bends.ravel()])
+
     def moved(self, person: Person, step: FloatArray) -> Person:
         """Return a person after a step in the parameters of :meth:`jacobian`."""
         shapes, joints = len(self.shapes), len(self.parents)

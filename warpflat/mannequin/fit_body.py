@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.compile import launch_quietly
 from warpflat.kernels.closest import find_closest
-from warpflat.mannequin.body_model import BodyModel, Person, rotation, rotation_vector
+from warpflat.mannequin.body_model import BodyModel, Person, rotation
 
 __all__ = ["FittedBody", "Mesh", "fit_body"]
 
@@ -201,12 +201,7 @@ def _step(
         bends[joint] += 1.0 if name == "spine03" else 0.5 if name.startswith(("clavicle", "lowerleg")) else 0.0
     stiffness[count : count + 3 * joints] = bends.ravel()
     value = np.zeros(len(gradient))
-    value[:count] = person.shape
-    # Bends are preferred small in the frame of the joint's parent.
-    turn, _ = model.frames(model.shaped(person.shape)[model.count :], person.bend)
-    value[count : count + 3 * joints] = np.einsum(
-        "jab,jb->ja", turn[model.parents], rotation_vector(person.bend)
-    ).ravel()
+    value[: count + 3 * joints] = model.departures(person)
     matrix[np.diag_indices_from(matrix)] += stiffness + 1e-6
     gradient += stiffness * value
     free = np.arange(len(gradient)) >= (0 if shapes else count)

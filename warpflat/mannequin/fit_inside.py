@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
-from warpflat.mannequin.body_model import BodyModel, Person, rotation, rotation_vector
+from warpflat.mannequin.body_model import BodyModel, Person, rotation
 from warpflat.mannequin.fit_body import FittedBody, Mesh, vertex_normals
 
 __all__ = ["fit_inside"]
@@ -120,11 +120,7 @@ def _step(
     stiffness[count : count + 3 * joints] = np.repeat(held, 3)
     stiffness[-1] = 30.0 * preference
     value = np.zeros(len(gradient))
-    value[:count] = person.shape
-    turn, _ = model.frames(model.shaped(person.shape)[model.count :], person.bend)
-    value[count : count + 3 * joints] = np.einsum(
-        "jab,jb->ja", turn[model.parents], rotation_vector(person.bend)
-    ).ravel()
+    value[: count + 3 * joints] = model.departures(person)
     value[-1] = np.log(person.scale / _STATURE)
     matrix[np.diag_indices_from(matrix)] += stiffness + 1e-6
     gradient += stiffness * value

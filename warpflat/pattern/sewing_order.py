@@ -290,7 +290,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
 
 
 def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
-    """Return what is needed beside the cloth: zips, elastics and buttons."""
+    """Return what is needed beside the cloth: thread, zips, elastics and buttons."""
     units = garment.garment.units
     zips = [
         translate(
@@ -332,7 +332,7 @@ def _buttons_at_one_end(piece: DraftedPiece) -> bool:
 
 def tools(garment: DraftedGarment, size: str) -> str:
     """Return what the garment is made with, in words."""
-    steps = [
+    needed = [
         "paper scissors and glue or tape",
         "cloth scissors",
         "tape measure",
@@ -340,13 +340,13 @@ def tools(garment: DraftedGarment, size: str) -> str:
         "pins",
         "iron",
         "sewing machine",
+        "hand needle",
     ]
-    steps += ["hand needle"]
     if any(_zips(seam) for seam in sewn_seams(garment, size)):
-        steps.append("zip foot")
+        needed.append("zip foot")
     if _buttons(garment.pieces[size]) or any(map(_buttons_at_one_end, garment.pieces[size])):
-        steps.append("buttonhole foot")
-    return ", ".join(translate(word) for word in steps)
+        needed.append("buttonhole foot")
+    return ", ".join(translate(word) for word in needed)
 
 
 def step_pictures(garment: DraftedGarment, size: str, steps: Sequence[str]) -> list[dict[str, frozenset[str]]]:
