@@ -160,7 +160,7 @@ def cut_by_energy(
         prepare: makes the surface of a piece, with its grain.
     """
     pieces = _measured(cloth, anatomy, fabric, prepare, [])
-    # Of a speck no piece may have an area.
+    # A tube is not measured until it is opened: there may be nothing else.
     total = sum(piece.area for piece in pieces) or 1.0
     cloth, pieces, trials = _priced(cloth, pieces, anatomy, fabric, options, prepare)
     exhausted = set[int]()
