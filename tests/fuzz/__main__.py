@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from .folders import packed
 from .foreign_files import FOREIGN_ENDINGS
+from .geometry import GEOMETRY_SHARES
 from .known_faults import known_faults
 from .mutations import SHARES, random_case
 from .promise import Case, Verdict, Worker
@@ -52,7 +53,7 @@ def _judged(cases: Iterator[Case], *, workers: int, seconds: float | None) -> It
 def _save(case: Case, number: int) -> Path:
     """Leaves the odd file of a case, or its command line, where it can be run again and moved to tests/regressions."""
     FOUND.mkdir(exist_ok=True)
-    if case.kind in ("batch", "result", "folder", "form", "tables", "pieces", "open"):
+    if case.kind in ("batch", "result", "folder", *GEOMETRY_SHARES):
         file = FOUND / f"{number}.folder.json"
         file.write_bytes(packed(case))
         return file
