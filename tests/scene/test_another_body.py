@@ -17,6 +17,7 @@ from warpflat.seams.layers import read_garment
 from warpflat.surface.io.file_seams import file_seams
 
 BARE = ("--frames", "0", "--no-picture", "--quiet")
+ON = ("--from", "EU 36")
 
 
 def _skirt(path: Path, *, texture: bool = True, shift: float = 0.0, unit: float = 1.0) -> None:
@@ -112,10 +113,10 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--to", "EU 39"), "--to: size 'EU 39' is in no table"),
+        ((*ON, "--to", "EU 39"), "--to: size 'EU 39' is in no table"),
         (("--from", "EU 39", "--to", "EU 40"), "--from: size 'EU 39' is in no table"),
-        (("--to", "gone.obj"), "gone.obj"),
-        (("--to", "skirt.obj"), "--to: skirt.obj: scan"),
+        ((*ON, "--to", "gone.obj"), "gone.obj"),
+        ((*ON, "--to", "skirt.obj"), "--to: skirt.obj: scan"),
         (("--to", "EU 40", "--to", "EU 40"), "--to: 'EU 40' is given twice"),
         (("--to", "EU 40", "--ease", "waist"), "give a level and a length with its unit"),
         (("--to", "EU 40", "--ease", "waist=4"), "give a level and a length with its unit"),

@@ -292,7 +292,7 @@ def made_light(scene: Scene) -> Scene:
     settings = scene.settings
     if settings.mannequin is not None and settings.mannequin.size is not None:
         settings = settings.model_copy(
-            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 25.0})}
+            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 40.0})}
         )
     if settings.marker is not None:
         settings = settings.model_copy(update={"marker": settings.marker.model_copy(update={"seconds": 1})})
@@ -326,7 +326,8 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
     assert faults(read_pattern_json(tmp_path / "pattern.json")) == []
     openings = {str(table["kind"]).removesuffix("s") for table in read_toml(path).get("openings", ())}
     if openings:
-        export_patterns(tmp_path, ["pdf", "svg", "dxf"], out=tmp_path / "opened")
+        # Large sheets: fewer pages have to be read.
+        export_patterns(tmp_path, ["pdf", "svg", "dxf"], out=tmp_path / "opened", paper="A0")
         own_name = path.stem.replace("_", " ")
         pages = [
             page.extract_text().replace(own_name, "") for page in PdfReader(tmp_path / "opened" / "pattern.pdf").pages

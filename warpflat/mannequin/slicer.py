@@ -54,6 +54,7 @@ class Slicer:
         self.vertices = vertices
         self.triangles = triangles
         self._corners = np.ascontiguousarray(triangles.T)
+        self._place = np.zeros(len(self.edges), dtype=np.int64)
         self._along: tuple[bytes, FloatArray, FloatArray, FloatArray] | None = None
 
     def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
@@ -73,8 +74,12 @@ class Slicer:
         pairs = np.where(
             first == second, edges[:, [1, 2]], np.where(second == third, edges[:, [0, 2]], edges[:, [0, 1]])
         )
-        used, local = np.unique(pairs, return_inverse=True)
-        local = np.ravel(local).reshape(-1, 2)
+        # A table of all edges numbers the few that are cut sooner than sorting them does.
+        is_cut = np.zeros(len(self.edges), dtype=bool)
+        is_cut[pairs] = True
+        used = np.flatnonzero(is_cut)
+        self._place[used] = np.arange(len(used))
+        local = self._place[pairs]
         a, b = self.edges[used].T
         t = ((along[a] - offset) / (along[a] - along[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
@@ -102,6 +107,8 @@ def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
             root[b] = a
         else:
             root[a] = b
+    parts = 0
     for i, above in enumerate(root):
-        root[i] = root[above]
-    return np.asarray(np.unique(root, return_inverse=True)[1].reshape(-1))
+        # A root stands before all that it leads.
+        root[i], parts = (parts, parts + 1) if above == i else (root[above], parts)
+    return np.asarray(root)
