@@ -18,9 +18,9 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, project_on_segments
 from warpflat.core.text import quote_value
 from warpflat.seams.anatomy import Anatomy
-from warpflat.seams.cloth import Cloth, edge_components
+from warpflat.seams.cloth import Cloth, edge_components, section
 from warpflat.seams.options import SeamCut, SeamOptions, in_family
-from warpflat.seams.tailor import BESIDE, FACING, LEFT, section, tidied
+from warpflat.seams.tailor import BESIDE, FACING, LEFT, tidied
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import are_joined
 from warpflat.surface.paths.section import plane_sections
