@@ -16,6 +16,7 @@ from warpflat.core.short_repr import short_repr
 from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
+from warpflat.pattern.pieces import FoundSeam
 from warpflat.seams.anatomy import ROLES, Anatomy, axis_name, describe, find_anatomy
 from warpflat.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.seams.cloth import Cloth, PieceMesh
@@ -53,27 +54,6 @@ _LONG = 2.0
 
 #: The line of a piece along which its grain runs.
 GRAIN = "grain"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FoundSeam:
-    """A seam that was found.
-
-    Attributes:
-        name: as "side left".
-        length: [m].
-        released: strain energy that it releases, by trial [J]; None where nothing was tried.
-        needed: why the cloth cannot lie flat without it: "opens a tube"; "" where it can.
-    """
-
-    name: str
-    length: float
-    released: float | None = None
-    needed: str = ""
-
-    def as_dict(self) -> dict[str, object]:
-        """Return plain data."""
-        return {"name": self.name, "length_m": self.length, "released_j": self.released, "needed": self.needed}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
