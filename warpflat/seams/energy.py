@@ -569,8 +569,8 @@ def _can_be_sewn(
 
 
 def _trial_options(energy_left: float) -> RelaxOptions:
-    """Return options that tell good from bad, no more."""
-    return replace(coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=5)
+    """Return options that tell good from bad, no more; what is left is estimated at every step, and checked where it is little."""
+    return replace(coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=100)
 
 
 def _strained_by_sewing(cloth: Cloth, pieces: Sequence[_Measured]) -> float:
