@@ -206,6 +206,24 @@ def test_seams_are_kept_though_no_energy_asks_for_them() -> None:
     assert set(lengths(alone)) == {"cut", "side left", "side right"}
 
 
+def test_a_waist_is_made_where_the_body_has_it() -> None:
+    found = cut(shirt(), find="auto", keep=("waist",), waist=(9.0, 0.31, -9.0))
+    waist = next(piece.vertices[piece.lines["waist"]] for piece in found.pieces if "waist" in piece.lines)
+    assert waist[:, 1] == pytest.approx(0.31, abs=1e-3)
+    with pytest.raises(warpflat.InputError, match=r"waist = \(1.0, inf\) is no place"):
+        cut(shirt(), waist=(1.0, float("inf")))
+
+
+def test_a_body_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mesh = write(skirt(), tmp_path / "skirt.obj")
+    for body, words in ((tmp_path / "body.obj", "--body: "), (mesh, "skirt.obj: scan: ")):
+        command = ["flatten", str(mesh), "--units", "m", "--seams", "auto", "--body", str(body)]
+        assert main([*command, "--out", str(tmp_path / "out")]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert words in line
+        assert not (tmp_path / "out").exists()
+
+
 FAULTS = [
     (warpflat.SeamCut(points=((0, 0, 0.2), (0, 30, 0))), r"cut: the point \(0, 30, 0\) lies 29.4 m off the garment; points are in met"),
     (warpflat.SeamCut(plane=((0, 3, 0), (0, 1, 0))), "cut: the plane misses the garment: along its normal that spans 0 to 0.6 m, and"),

@@ -144,6 +144,15 @@ def test_trousers_become_four_legs() -> None:
         assert abs(way[1]) > 0.98 * np.linalg.norm(way)
 
 
+def test_a_panel_of_a_leg_is_no_band() -> None:
+    panel = warpflat.SeamCut(name="panel", plane=((0.155, 0.0, 0.0), (1.0, 0.107, 0.0)))
+    found = warpflat.find_seams(trousers(), warpflat.SeamOptions(cuts=(panel,)))
+    # It is narrow, and ends at the waist and at the ankle.
+    assert {piece.name for piece in found.pieces if piece.name.startswith("left")} == {
+        "left_front_leg", "left_back_leg", "left_leg",
+    }  # fmt: skip
+
+
 def test_a_skirt_becomes_front_and_back() -> None:
     found = warpflat.find_seams(solids.skirt())
     assert {piece.name for piece in found.pieces} == {"front", "back"}

@@ -50,6 +50,11 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     '"plane:POINT NORMAL" or "plane:POINT NORMAL TOWARDS" for half a plane, "edges:FILE" of vertex numbers, "line:NAME" of the file, '
     '"marked" for all lines and creases of the file.',
 )
+@click.option(
+    "--body",
+    metavar="FILE",
+    help="A mesh of the body under a whole garment, in the same place and unit: seams at the waist are made at its waist.",
+)
 @click.option("--smooth", type=float, metavar="MM", help="Smooth wrinkles over so many millimetres before it is cut.")
 @click.option("--most-pieces", type=int, metavar="N", help="At most so many pieces.  [default: as usual for its kind]")
 @click.option(
@@ -172,6 +177,7 @@ def flatten(
         "most_pieces": ("find_seams", "most_pieces"),
         "limit": ("find_seams", "limit"),
         "smooth": ("find_seams", "smooth_mm"),
+        "body": ("find_seams", "body"),
     }
     for option, (table, key) in places.items():
         if options[option] is not None:
@@ -218,7 +224,11 @@ def flatten(
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
     except InputError as error:
         message = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
-        message = message.replace("command line: bands", "--bands").replace("--bands_shorter", "--bands-shorter")
+        message = (
+            message.replace("command line: find_seams.body", "--body")
+            .replace("command line: bands", "--bands")
+            .replace("--bands_shorter", "--bands-shorter")
+        )
         message = re.sub(
             r"command line: seams_cut\[(\d+)\]",
             lambda found: f"--cut-seam {options['cut_seams'][int(found[1])]!r}",

@@ -38,7 +38,7 @@ from warpflat.pattern.drafted import (
 )
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.pieces import Elastic, FoundSeam, Pattern, Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 
 __all__ = [
@@ -224,6 +224,7 @@ class SideEntry(Entry):
     edge: Name
     reversed: bool
     mirrored: bool = False
+    copy_number: Annotated[int, Field(alias="copy", ge=0, le=1_000_000)] = 0
 
 
 class OpeningEntry(Entry):
@@ -301,6 +302,15 @@ class WornEntry(Entry):
     needed: list[NeededEntry] = Field(default_factory=list)
 
 
+class FoundSeamEntry(Entry):
+    """A seam that was found on a whole garment (see `warpflat.pattern.pieces.FoundSeam`)."""
+
+    name: Name
+    length_m: Length
+    released_j: float | None
+    needed: Text
+
+
 class PatternEntry(Entry):
     """The whole file: pieces by size and name, stitches, the lengths of seams, and the garment as it is worn."""
 
@@ -312,6 +322,7 @@ class PatternEntry(Entry):
     seams: list[SeamEntry]
     elastics: list[ElasticEntry] = Field(default_factory=list)
     worn: WornEntry | None = None
+    found_seams: list[FoundSeamEntry] = Field(default_factory=list)
 
 
 #: Increased when a reader of the old form would misread the new one.
@@ -322,9 +333,9 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
     """Return the whole pattern as plain lists and numbers: lengths in metres, angles in radians, y along the grain.
 
     A stitch sews two sides. Each side lists its edges in the order in which the seam meets them, and whether the seam
-    runs against the edge's own direction (counter-clockwise round its piece); "mirrored" is an edge of the copy that is
-    cut turned over. An edge's `point_lengths` are the lengths along its line at the points of its mesh's border, and
-    `fit_error` is the largest distance of the curve from them. Numbers are not rounded.
+    runs against the edge's own direction (counter-clockwise round its piece); "mirrored" is an edge of a copy that is
+    cut turned over, and "copy" its number, from 1 for the second. An edge's `point_lengths` are the lengths along its line at the
+    points of its mesh's border, and `fit_error` is the largest distance of the curve from them. Numbers are not rounded.
     """
     sample = next(iter(garment.pieces.values()))
     stitches: list[dict[str, Any]] = [
@@ -367,6 +378,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
         "stitches": stitches,
         "elastics": [asdict(elastic) for elastic in garment.garment.elastics],
         "worn": None if garment.garment.worn is None else _worn(garment.garment.worn),
+        "found_seams": [seam.as_dict() for seam in garment.garment.found_seams],
         "seams": [
             {
                 "name": report.name,
@@ -390,7 +402,8 @@ def write_pattern_json(garment: DraftedGarment, path: str | os.PathLike[str]) ->
 
 
 def _side(side: SeamSide) -> dict[str, Any]:
-    return {"piece": side.piece, "edge": side.edge, "reversed": side.reversed, "mirrored": side.mirrored}
+    entry = {"piece": side.piece, "edge": side.edge, "reversed": side.reversed, "mirrored": side.mirrored}
+    return {**entry, "copy": side.copy} if side.copy else entry
 
 
 def _piece(piece: DraftedPiece) -> dict[str, Any]:
@@ -533,6 +546,10 @@ def pattern_from_json(data: Any) -> DraftedGarment:
             words=data.words,
             elastics=tuple(Elastic(**each.model_dump()) for each in data.elastics),
             worn=None if data.worn is None else _read_worn(data.worn),
+            found_seams=[
+                FoundSeam(name=one.name, length=one.length_m, released=one.released_j, needed=one.needed)
+                for one in data.found_seams
+            ],
         )
         reports = tuple(
             SeamReport(
@@ -584,7 +601,10 @@ def _read_worn(data: WornEntry) -> Worn:
 
 
 def _read_side(parts: Sequence[SideEntry]) -> tuple[SeamSide, ...]:
-    return tuple(SeamSide(piece=p.piece, edge=p.edge, reversed=p.reversed, mirrored=p.mirrored) for p in parts)
+    return tuple(
+        SeamSide(piece=p.piece, edge=p.edge, reversed=p.reversed, mirrored=p.mirrored, copy=p.copy_number)
+        for p in parts
+    )
 
 
 def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:

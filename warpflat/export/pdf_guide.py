@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.text import energy_words, without_side
 from warpflat.export.pdf_legend import page_footer
 from warpflat.pattern.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
 from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
+from warpflat.pattern.pieces import FoundSeam
 from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams, step_pictures, tools
 from warpflat.pattern.words import translate, translate_name
 from warpflat.pattern.worn import Worn
@@ -184,6 +186,8 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         ]
         head = ["", *(translate(word) for word in ("seam", "piece", "length", "sewn to", "length"))]
         page.table(head, rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
+    if whole.garment.found_seams:
+        _prices(page, whole.garment.found_seams, units)
     notes = dict.fromkeys(f"{piece.piece.printed_name}: {note}." for piece in pieces for note in piece.notes)
     if notes:
         page.heading(translate("Notes"), 3 * LINE)
@@ -255,6 +259,29 @@ def _worn(page: _Page, worn: Worn, size: str, units: str) -> None:
         page.paragraph(translate("It can be put on: every edge and level passes what of the body goes through it."))
     page.left, page.width = left, page.width + 0.100
     page.y = min(page.y, top - high - 0.006)
+
+
+def _prices(page: _Page, found: Sequence[FoundSeam], units: str) -> None:
+    """Write what each seam that was found releases, left and right together, for how much sewing."""
+    groups: dict[str, list[FoundSeam]] = {}
+    for seam in found:
+        groups.setdefault(without_side(seam.name), []).append(seam)
+    prices = {name: sum(seam.released or 0.0 for seam in own) for name, own in groups.items()}
+    rows = []
+    for name in sorted(groups, key=lambda one: -prices[one]):
+        own, length = groups[name], sum(seam.length for seam in groups[name])
+        tried = any(seam.released is not None for seam in own)
+        rows.append(
+            [
+                translate_name(name) + (f" ({len(own)} x)" if len(own) > 1 else ""),
+                length_words(length, units),
+                energy_words(prices[name]) if tried else translate(own[0].needed or "not tried"),
+                f"{energy_words(prices[name] / max(100.0 * length, 1e-9))}/cm" if tried else "",
+            ]
+        )
+    page.heading(translate("What each seam is for"), 3 * LINE)
+    page.paragraph(translate("The strain energy that a seam takes from the cloth, for its length of sewing."))
+    page.table(["", *map(translate, ("length", "releases", "per length"))], rows, (0.34, 0.16, 0.34, 0.16))
 
 
 def _step(page: _Page, number: int, words: str, pieces: Sequence[tuple[DraftedPiece, frozenset[str]]]) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from warpflat.garment.garment import Garment
     from warpflat.pattern.drafted import DraftedGarment
     from warpflat.pattern.marker import Cloth
-    from warpflat.pattern.pieces import Pattern
+    from warpflat.pattern.pieces import FoundSeam, Pattern
     from warpflat.pattern.walked import WalkedSeam
     from warpflat.surface.border_seams import BorderSeam
 
@@ -108,6 +108,7 @@ def garment_files(
     name: str,
     options: PatternOptions | None = None,
     sample_size: str | None = None,
+    found_seams: Sequence[FoundSeam] = (),
 ) -> WrittenPattern:
     """Write the pattern of a garment; on a form in one or more sizes, of which several lie upon each other as a nest.
 
@@ -120,6 +121,7 @@ def garment_files(
         name: of the files.
         options: formats, rules and cloth.
         sample_size: the one that the files show first.
+        found_seams: of a garment whose seams were found; their prices are printed.
 
     Raises:
         InputError: a printed name is for no piece, or the folder cannot be written.
@@ -129,10 +131,12 @@ def garment_files(
     options, first = options or PatternOptions(), next(iter(garments.values()))
     if first.form is not None:
         check_names(options.names, first.parts)
-    return _write_pattern(
-        lambda: pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size),
-        folder, name, options,
-    )  # fmt: skip
+
+    def make() -> tuple[Pattern, tuple[str, ...]]:
+        pattern, notes = pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size)
+        return replace(pattern, found_seams=tuple(found_seams)), notes
+
+    return _write_pattern(make, folder, name, options)
 
 
 def surface_files(

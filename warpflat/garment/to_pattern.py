@@ -22,6 +22,7 @@ from warpflat.garment.closed_cuts import CLOSED, are_closed, close_cuts, seams_o
 from warpflat.garment.darts import pleat_depths
 from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges
 from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
@@ -91,7 +92,9 @@ def pattern_of_garment(
         pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
         drawn, more = _drawn_once(pattern.pieces, pairs)
-        return replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs)), (*notes, *more)
+        pattern = replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs))
+        pattern, equal = draw_equal_pieces_once(pattern)
+        return pattern, (*notes, *more, *equal)
     forms = {size: garment.form for size, garment in garments.items() if garment.form is not None}
     form = sample.form
     if sample.wished is not None:

@@ -91,30 +91,33 @@ class ConstraintEquations:
 class Correction:
     """The growth of the offsets from round to round (augmented Lagrangian).
 
-    An equation's offset grows by its residual. That of equations that hold together grows by their mean residual over its
-    response to the last growth (secant method).
+    An equation's offset grows by its residual. Those of equations that hold together grow by a step of Broyden's method (1965):
+    seams of one piece push each other, so that none has a response of its own.
     """
 
     def __init__(self, equations: ConstraintEquations) -> None:
         self._equations = equations
         self._weight = np.bincount(equations.group, equations.share, minlength=len(equations.sum_tolerance))
+        # By how much the mean residuals of the groups change with their offsets.
+        self._response = -_RESPONSE * np.eye(int((self._weight > 0).sum()))
         self._last: tuple[FloatArray, FloatArray] | None = None
 
     def __call__(self, residuals: FloatArray) -> FloatArray:
         """Return by how much the offsets grow (#P [m])."""
-        equations = self._equations
+        equations, own = self._equations, self._weight > 0
         change = np.where(equations.soft > 0, 0.0, residuals)
-        together = equations.share > 0
-        if together.any():
-            mean = equations.group_sums(residuals) / np.maximum(self._weight, 1e-300)
-            response = np.full(len(mean), _RESPONSE)
+        if own.any():
+            mean = equations.group_sums(residuals)[own] / self._weight[own]
             if self._last is not None:
-                before, grown = self._last
-                moved = np.abs(grown) > 1e-9
-                np.divide(before - mean, grown, out=response, where=moved)
-            grown = np.where(self._weight > 0, mean / np.clip(response, _LEAST_RESPONSE, 1.0), 0.0)
-            self._last = mean, grown
-            change = np.where(together, grown[equations.group], change)
+                before, step = self._last
+                missed = mean - before - self._response @ step
+                self._response += np.outer(missed, step) / max(float(step @ step), 1e-300)
+            most = float(np.abs(mean).max()) / _LEAST_RESPONSE
+            step = np.clip(np.linalg.lstsq(-self._response, mean, rcond=1e-3)[0], -most, most)
+            self._last = mean, step
+            grown = np.zeros(len(own))
+            grown[own] = step
+            change = np.where(equations.share > 0, grown[equations.group], change)
         return change
 
 

@@ -231,6 +231,9 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
 def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None:
     """Return the part of a cubic (4 by 2) on one side of a line x = axis that it crosses once at most."""
     away = side * (control[:, 0] - axis)
+    if abs(away[0]) <= ON_AXIS and abs(away[3]) <= ON_AXIS:
+        # It bows to one side, as the edge of a gore from tip to tip.
+        return control if away[1] + away[2] > ON_AXIS else None
     if away[0] <= ON_AXIS and away[3] <= ON_AXIS:
         return None
     if away[0] >= -ON_AXIS and away[3] >= -ON_AXIS:

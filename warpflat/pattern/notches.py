@@ -37,9 +37,11 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
     for seam in seams:
         lines = [SeamLine(side, pieces) for side in seam.sides]
         first, second = (line.length for line in lines)
-        # Edges that come from no mesh have no common vertices.
+        # Edges that come from no mesh have no common vertices, nor need copies of equal pieces.
         worst = None
-        if all(edge.edge.vertices is not None for line in lines for edge in line.edges):
+        if all(edge.edge.vertices is not None for line in lines for edge in line.edges) and (
+            len(lines[0].places) == len(lines[1].places)
+        ):
             worst = worst_difference(lines[0].places, lines[1].places, seam.ease, seam.eased)
         reports.append(
             SeamReport(
@@ -91,7 +93,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
                 table = (shares, reached) if line is first else (reached, shares)
                 length = float(np.interp(float(joint), *table)) * other.length
-                if np.abs(other.joints - length).min() > CLEAR and not other.mirrored(length):
+                if np.abs(other.joints - length).min() > CLEAR and other.is_drawn(length):
                     single = other.notch(seam.name, length, double=False)
                     if single is not None:
                         notches.setdefault(other.piece_name(length), []).append(single)
@@ -107,7 +109,7 @@ def _notch_pair(seam: Seam, lines: Sequence[SeamLine], fraction: float) -> list[
         names = [line.piece_name(length).lower() for line, length in places]
         back = any("back" in name for name in names) and not any("front" in name for name in names)
         double = back if seam.double is None else seam.double
-        places = [(line, length) for line, length in places if not line.mirrored(length)]
+        places = [(line, length) for line, length in places if line.is_drawn(length)]
         found = [(line.piece_name(length), line.notch(seam.name, length, double)) for line, length in places]
         matched = [(piece, notch) for piece, notch in found if notch is not None]
         if len(matched) == len(found):
@@ -201,9 +203,9 @@ class SeamLine:
         """Return the piece at a length [m]."""
         return self.side[self.index(length)].piece
 
-    def mirrored(self, length: float) -> bool:
-        """Return whether the edge at a length [m] is that of a second copy, cut turned over."""
-        return self.side[self.index(length)].mirrored
+    def is_drawn(self, length: float) -> bool:
+        """Return whether the edge at a length [m] is that of the piece itself, not of another copy."""
+        return self.side[self.index(length)].is_drawn
 
     def notch(self, seam: str, length: float, double: bool) -> Notch | None:
         """Return a notch at a length [m]; the two slits of a double one lie on either side of it.

@@ -24,7 +24,7 @@ from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Elastic", "Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
+__all__ = ["Elastic", "FoundSeam", "Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
 
 
 #: Kinds of :class:`SeamOpening`.
@@ -133,17 +133,24 @@ class SeamSide:
     Attributes:
         piece, edge: names.
         reversed: the seam runs against the edge's own (counter-clockwise) direction.
-        mirrored: the edge belongs to the piece's second copy, which is cut turned over; both copies have the same
-            notches.
+        mirrored: the edge belongs to a copy of the piece that is cut turned over; all copies have the same notches.
+        copy: the number of the copy, from 0: of pieces that are cut more than once, or in more than one pair.
     """
 
     piece: str
     edge: str
     reversed: bool = False
     mirrored: bool = False
+    copy: int = 0
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it is the piece itself, not another copy."""
+        return not self.mirrored and self.copy == 0
 
     def __str__(self) -> str:
-        return f"{self.piece}.{self.edge}" + (" (mirrored)" if self.mirrored else "")
+        which = [f"copy {self.copy + 1}"] * (self.copy > 0) + ["mirrored"] * self.mirrored
+        return f"{self.piece}.{self.edge}" + (f" ({', '.join(which)})" if which else "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,6 +240,27 @@ class Elastic:
     count: int = 1
 
 
+@dataclass(frozen=True, kw_only=True)
+class FoundSeam:
+    """A seam that was found on a whole garment, and its price.
+
+    Attributes:
+        name: as "side left"; where pieces are named by what they cover, their seams in the pattern may be parts of it.
+        length: [m].
+        released: strain energy that it releases, by trial [J]; None where nothing was tried.
+        needed: why the cloth cannot lie flat without it: "opens a tube"; "" where it can.
+    """
+
+    name: str
+    length: float
+    released: float | None = None
+    needed: str = ""
+
+    def as_dict(self) -> dict[str, object]:
+        """Return plain data."""
+        return {"name": self.name, "length_m": self.length, "released_j": self.released, "needed": self.needed}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pattern:
     """All pieces of a garment in one or more sizes, and the seams between them (the same in every size).
@@ -245,6 +273,7 @@ class Pattern:
         words: what is printed instead of English words and names (see `warpflat.pattern.words`).
         elastics: that are threaded through its casings.
         worn: how it looks and what it measures on its body; None where that is not known.
+        found_seams: with their prices, of a garment whose seams were found.
     """
 
     __repr__ = short_repr
@@ -256,6 +285,7 @@ class Pattern:
     words: Mapping[str, str] = field(default_factory=dict)
     elastics: Sequence[Elastic] = ()
     worn: Worn | None = None
+    found_seams: Sequence[FoundSeam] = ()
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):
@@ -281,9 +311,14 @@ class Pattern:
             for seam in self.seams:
                 for side in (*seam.sides[0], *seam.sides[1]):
                     try:
-                        edge = self.piece(side.piece, size).edge(side.edge)
+                        piece = self.piece(side.piece, size)
+                        edge = piece.edge(side.edge)
                     except InputError as error:
                         raise InputError(f"seam {seam.name!r}{f', size {size}' if size else ''}: {error}") from None
+                    if not 0 <= side.copy < piece.quantity:
+                        raise InputError(
+                            f"seam {seam.name!r}: {side} is not cut; piece {piece.name!r} has a quantity of {piece.quantity}"
+                        )
                     if edge.kind == "fold":
                         raise InputError(f"seam {seam.name!r}: edge {side} lies on the fold and cannot be sewn")
         if self.sample_size is not None and self.sample_size not in self.pieces:

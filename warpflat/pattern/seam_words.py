@@ -13,13 +13,14 @@ __all__ = ["seam_words", "seams_of_words"]
 def seam_words(seams: Iterable[Seam]) -> dict[tuple[str, str], list[str]]:
     """Return what is written at each edge, by piece and edge: "NAME | side 1 part 1 | against mirrored | ease 0.03 0 1".
 
-    The third part says how the seam runs along the edge, and whether the edge is one of the copy that is cut turned over.
+    The third part says how the seam runs along the edge, whether the edge is one of a copy that is cut turned over, and which copy.
     """
     found: dict[tuple[str, str], list[str]] = {}
     for seam in seams:
         for number, chain in enumerate(seam.sides, start=1):
             for part, side in enumerate(chain, start=1):
                 how = ("against" if side.reversed else "with") + (" mirrored" if side.mirrored else "")
+                how += f" copy {side.copy + 1}" if side.copy else ""
                 words = f"{seam.name} | side {number} part {part} | {how}"
                 if seam.ease:
                     words += f" | ease {seam.ease:.6g} {seam.eased[0]:.6g} {seam.eased[1]:.6g}"
@@ -40,7 +41,10 @@ def seams_of_words(found: Iterable[tuple[str, str, str]]) -> list[Seam]:
             name, place, how, *rest = words.split(" | ")
             _, number, _, part = place.split(" ")
             chain = sides.setdefault(name, ({}, {}))[int(number) - 1]
-            side = SeamSide(piece=piece, edge=edge, reversed="against" in how, mirrored="mirrored" in how)
+            side = SeamSide(
+                piece=piece, edge=edge, reversed="against" in how, mirrored="mirrored" in how,
+                copy=int(how.partition("copy ")[2] or 1) - 1,
+            )  # fmt: skip
             chain[int(part)] = side
             if rest:
                 eases[name] = [float(value) for value in rest[0].split(" ")[1:4]]

@@ -432,7 +432,16 @@ def _opened_steps(seam: SewnSeam, units: str) -> list[str]:
 def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[list[Seam]]:
     """Return seams that are each other's mirror images together, in the order in which they are sewn: those with openings first."""
     groups: dict[object, list[Seam]] = {}
+    copied = {(s.piece, s.edge) for seam in seams for row in seam.sides for s in row if s.copy}
+    alike: dict[tuple[str, str], object] = {}
     for seam in seams:
+        # Edges of equal pieces, of which one is drawn, have the notches of one seam.
+        own = [(s.piece, s.edge) for row in seam.sides for s in row if (s.piece, s.edge) in copied]
+        if own:
+            key = next((alike[edge] for edge in own if edge in alike), own[0])
+            alike |= dict.fromkeys(own, key)
+            groups.setdefault(key, []).append(seam)
+            continue
         sides = sorted(
             tuple(sorted((without_side(s.piece), without_side(s.edge)) for s in side)) for side in seam.sides
         )

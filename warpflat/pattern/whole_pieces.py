@@ -45,8 +45,14 @@ def whole_pieces(
         name for name, p in given.items() if name not in halves and (name in asked or (p.quantity == 2 and p.paired))
     }
     whole = {name: _unfolded(piece) if name in halves else piece for name, piece in given.items() if name in sewn}
+    for side in sides:
+        if side.copy:
+            # Where it is worn, no other copy says.
+            title = _copy_name(side)
+            whole[title] = replace(given[side.piece], name=title, placement=None)
     across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
-    for piece in [given[name] for name in twice if name in sewn]:
+    over = {_copy_name(side) for side in sides if side.mirrored} | {name for name in twice if name in sewn}
+    for piece in [whole[name] for name in whole if name in over]:
         # Cut turned over.
         turned = [replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]]
         title = piece.name + MIRRORED
@@ -99,12 +105,19 @@ def _named(chain: Sequence[SeamSide], halves: set[str]) -> tuple[SeamSide, ...]:
     """Return a chain whose mirrored sides are named: a mirrored outline runs the other way."""
     found = []
     for side in chain:
+        if side.copy and not side.mirrored:
+            side = replace(side, piece=_copy_name(side), copy=0)
         if side.mirrored:
-            piece = side.piece if side.piece in halves else side.piece + MIRRORED
+            piece = side.piece if side.piece in halves else _copy_name(side) + MIRRORED
             edge = side.edge + MIRRORED if side.piece in halves else side.edge
             side = SeamSide(piece=piece, edge=edge, reversed=not side.reversed)
         found.append(side)
     return tuple(found)
+
+
+def _copy_name(side: SeamSide) -> str:
+    """Return the name of a side's piece, and which of its copies it is."""
+    return f"{side.piece} copy {side.copy + 1}" if side.copy else side.piece
 
 
 def _unfolded(piece: Piece) -> Piece:

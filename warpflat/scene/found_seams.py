@@ -48,6 +48,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     Raises:
         InputError: the file is wrong.
     """
+    from warpflat.seams.body_lines import waist_of_body
     from warpflat.seams.find import find_seams
     from warpflat.seams.layers import read_garment
     from warpflat.seams.options import SeamOptions
@@ -118,7 +119,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         layers = [layers[table.component]]
     elif table.component == "largest":
         layers = layers[:1]
-    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"smooth_mm"})
+    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"smooth_mm", "body"})
     given["find"] = "auto" if taken is None and (by_itself or (asked is not None and asked.find == "auto")) else "none"
     smooth = 0.0 if asked is None else 1e-3 * asked.smooth_mm
     cuts = [cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, read.marks)]
@@ -128,11 +129,17 @@ def found_seams(scene: Scene) -> FoundSeams | None:
                 f"{format_count(taken.joined, 'island')} of less than a thousandth of the cloth joined to a neighbour"
             )
         cuts += _cuts_of_file(taken, read, layers, f"{path}")
+    waist = None
+    if asked is not None and asked.body is not None:
+        with errors_named(f"{scene.where}: find_seams.body"):
+            waist = waist_of_body(scene.folder / expand_variables(asked.body), read.scale)
+        notes.append(f"a waist is looked for where the body of {Path(asked.body).name} has its own")
     with errors_named(scene.where):
         options = SeamOptions(
             **{**given, "no": tuple(given.get("no", ())), "keep": tuple(given.get("keep", ()))},
             smooth=smooth,
             cuts=tuple(cuts),
+            waist=waist,
         )
         found = find_seams(layers, options, fabric=scene_fabric(scene))
     if taken is not None:

@@ -262,7 +262,10 @@ def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], own_size:
     else:  # by their numbers where the scene leaves out the mannequin's own
         order = sorted(sizes, key=lambda size: (int("".join(filter(str.isdigit, size)) or 0), size))
     garments = {size: sizes[size] for size in order}
-    pattern = garment_files(garments, folder, name=scene.name, options=plan.drawing, sample_size=own_size)
+    found = plan.found.seams if isinstance(plan, MeshPlan) and plan.found is not None else ()
+    pattern = garment_files(
+        garments, folder, name=scene.name, options=plan.drawing, sample_size=own_size, found_seams=found
+    )
     if plan.mannequin is None or not (scene.settings.output.picture and pattern.walked):
         return pattern
     files = list(pattern.files)

@@ -330,6 +330,8 @@ class FindSeamsTable(Table):
     """Share of the cloth that may stay beyond its strain limit before further seams and darts are looked for."""
     most_pieces: Annotated[int, Field(ge=1, le=1000)] | None = None
     """At most so many pieces of one layer; as many as are usual for its kind if not given."""
+    body: str | None = None
+    """A mesh file of the body under the garment, in the same place and unit: a seam at the waist is made at the body's waist."""
 
 
 class SeamCutPlane(PlaneTable):

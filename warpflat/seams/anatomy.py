@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
-from warpflat.seams.cloth import Cloth
+from warpflat.seams.cloth import Cloth, section
 from warpflat.seams.fields import MirrorMap, Operators, mirror_map
+from warpflat.surface.connectivity import components
 
 __all__ = ["AXES", "HOLE", "ROLES", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
 
@@ -45,6 +46,14 @@ _SHORTEST_SLEEVE = 0.05
 _STRAIGHT = np.cos(np.radians(160.0))
 # Two limbs are the same, mirrored, if their directions are within this angle [cosine].
 _SAME_WAY = np.cos(np.radians(20.0))
+# Nothing that is worn around the trunk, and no head's opening, is narrower [m]; no sleeve is wider.
+_SLIMMEST = 0.55
+# What is narrower below its upper end by this share is no skirt; if it goes on below its waist by this [m], it is a dress.
+_WAISTED, _BELOW_WAIST = 0.93, 0.3
+# Openings around heads, and around wrists and ankles, are so long [m]; a hand is no thicker than this share of its width.
+_HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
+# A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
+_SLANT, _ENOUGH_ABOVE = 0.15, 0.2
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
 
@@ -145,7 +154,9 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
     upward = AXES[up] if up else _upward([one for one in raw if one[1] >= HOLE * size])
     if up is None and abs(upward[1]) < 0.5 and len(loops) > 1:
         notes.append(f"up is taken as {axis_name(upward)}, as its openings lie; --up says otherwise")
-    normal, offset, asymmetry = _plane_of_symmetry(cloth.vertices, operators.mass, upward, size)
+    normal, offset, asymmetry = _plane_of_symmetry(
+        cloth.vertices, _above_slanted_hem(cloth.vertices, operators.mass, upward, raw, size), upward, size
+    )
     holds = asymmetry <= _SYMMETRIC * size
     side = np.cross(upward, normal)
     side /= max(float(np.linalg.norm(side)), 1e-300)
@@ -186,6 +197,11 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
     heights = cloth.vertices @ upward
     kind, borders, open_front = _kind(cloth, borders, upward, heights, size)
     limbs = _limbs(cloth, borders, upward, kind, size)
+    if holds:
+        # An armhole whose facing is as long as the shortest sleeve is the same on both sides.
+        both = {(limb.kind, limb.side) for limb in limbs}
+        mates = {(border.role, -border.side) for border in borders}
+        limbs = [limb for limb in limbs if (limb.kind, limb.side) not in mates or (limb.kind, -limb.side) in both]
     if front is None:
         turned_words = _faces_backwards(cloth, borders, kind, upward, forward, open_front, size)
         if turned_words:
@@ -256,6 +272,24 @@ def axis_name(direction: FloatArray) -> str:
     """Return the axis of space that is nearest to a direction, as "+y"."""
     k = int(np.abs(direction).argmax())
     return f"{'+' if direction[k] > 0 else '-'}{'xyz'[k]}"
+
+
+def _above_slanted_hem(
+    vertices: FloatArray,
+    mass: FloatArray,
+    upward: FloatArray,
+    loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
+    size: float,
+) -> FloatArray:
+    """Return the masses of vertices [m2]; 0 beside a hem that slants: it says nothing about the body."""
+    heights = vertices @ upward
+    wide = [heights[loop] for _, length, _, loop in loops if length >= HOLE * size]
+    if len(wide) < 2:
+        return mass
+    hem = min(wide, key=lambda own: float(own.mean()))
+    above = mass * (heights > hem.max())
+    slants = np.ptp(hem) > _SLANT * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * mass.sum()
+    return above if slants else mass
 
 
 def _plane_of_symmetry(
@@ -415,11 +449,12 @@ def _kind(
         if apart < 0.2 * girth:
             kind = "band"
             roles[a], roles[b] = "border", "border"
-        elif upright and (girth > 0.55 or girth > 0.75 * apart):
-            kind = "skirt"
-            roles[a], roles[b] = "hem", "waist"
+        elif upright and girth > _SLIMMEST:
+            kind = _around_the_trunk(cloth, reach(a)[1], reach(b)[0], heights)
+            roles[a], roles[b] = "hem", "waist" if kind == "skirt" else "neck"
         else:
-            kind = "sleeve"
+            ratio = max(borders[a].length, borders[b].length) / min(borders[a].length, borders[b].length)
+            kind = "sleeve" if girth < _SLIMMEST and apart > 0.75 * girth and ratio < _PAIR_RATIO else "other"
             roles[a], roles[b] = "border", "border"
     elif len(middles) == 1:
         kind = _one_border(cloth, borders[middles[0]], upward, size)
@@ -446,15 +481,62 @@ def _trunk_width(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) ->
     return 0.5 * hem.length
 
 
+def _around_the_trunk(cloth: Cloth, low: float, high: float, heights: FloatArray) -> Kind:
+    """Return what a tube around the trunk is: a skirt is narrowest at its upper end; one that widens again below a waist is a dress.
+
+    Args:
+        cloth: the tube.
+        low, high: between its borders [m].
+        heights: #V [m].
+    """
+    if high - low < 0.02:
+        return "skirt"
+    everywhere = np.ones(len(cloth.faces), dtype=bool)
+    levels = np.linspace(high, low, 17)[1:-1]
+    girths = np.array([section(cloth, heights - level, everywhere)[0] for level in levels])
+    narrowest = int(girths.argmin())
+    if girths[narrowest] > _WAISTED * girths[0]:
+        return "skirt"
+    return "dress" if levels[narrowest] - low > _BELOW_WAIST else "top"
+
+
 def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -> Kind:
-    """Return what a thing with one border is: a deep one a hat, a sock or a glove; a flat one a panel."""
-    depth = (cloth.vertices - border.middle) @ upward
-    # A disk that is no deeper than a panel has about the area of its outline.
+    """Return what a thing with one border is: a hat, a sock or a glove if its size and its shape say so, else "other"."""
     if border.length > 3.0 * size:
+        # A disk that is no deeper than a panel.
         return "other"
-    if -depth.min() > 2.0 * max(depth.max(), 0.0):
-        return "sock"
-    return "hat" if depth.max() > 0.5 * np.sqrt(border.length**2 / (4 * np.pi**2)) else "other"
+    way = cloth.vertices - border.middle
+    depth = way @ upward
+    girth, radius = border.length, border.length / (2.0 * np.pi)
+    if _HEADS[0] < girth < _HEADS[1] and max(0.5 * radius, -2.0 * depth.min()) < depth.max() < 2.0 * girth:
+        return "hat"
+    if not _HANDS[0] < girth < _HANDS[1]:
+        return "other"
+    # A foot is much longer than the leg above it is wide.
+    level = way - np.outer(depth, upward)
+    tall = -float(depth.min())
+    if tall > 2.0 * depth.max():
+        foot, leg = level[depth < -0.75 * tall], level[depth > -0.4 * tall]
+        axes = np.linalg.eigh(foot.T @ foot)[1] if len(foot) > 2 else np.eye(3)
+        spans = np.ptp(foot @ axes[:, 1:], axis=0) if len(foot) > 2 else np.zeros(2)
+        if len(leg) and spans[1] > 1.8 * max(float(np.ptp(leg @ axes[:, 2])), float(spans[0])):
+            return "sock"
+    # A hand is flat, and its thumb or its fingers stand apart.
+    areas = cloth.face_areas
+    along = areas @ way[cloth.faces].mean(axis=1)
+    along /= max(float(np.linalg.norm(along)), 1e-300)
+    reach = way @ along
+    outer = way[reach > 0.4 * reach.max()]
+    outer = outer - np.outer(outer @ along, along)
+    axes = np.linalg.eigh(np.cov(outer.T))[1] if len(outer) > 3 else np.eye(3)
+    thick, wide = np.ptp(outer @ axes[:, 1:], axis=0)
+    if thick < _FLAT_HAND * wide:
+        for part in np.linspace(0.3, 0.95, 14):
+            above = reach[cloth.faces] > part * reach.max()
+            crossed = cloth.faces[above.any(axis=1) & ~above.all(axis=1)].astype(np.int32)
+            if len(crossed) and components(crossed).max() > 0:
+                return "glove"
+    return "other"
 
 
 def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Kind, size: float) -> list[Limb]:

@@ -18,9 +18,9 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, project_on_segments
 from warpflat.core.text import quote_value
 from warpflat.seams.anatomy import Anatomy
-from warpflat.seams.cloth import Cloth, edge_components
+from warpflat.seams.cloth import Cloth, edge_components, section
 from warpflat.seams.options import SeamCut, SeamOptions, in_family
-from warpflat.seams.tailor import BESIDE, FACING, LEFT, section, tidied
+from warpflat.seams.tailor import BESIDE, FACING, LEFT, tidied
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import are_joined
 from warpflat.surface.paths.section import plane_sections
@@ -346,7 +346,7 @@ def keep_seams(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> tuple[Cl
     for name in options.keep:
         if any(in_family(seam.removeprefix(HAND), name) for seam in cloth.seams):
             continue
-        made = _kept(cloth, anatomy, name)
+        made = _kept(cloth, anatomy, name, options)
         if made is None:
             notes.append(f"there is no {name} to keep: none was found in what is taken for: {anatomy.kind}")
         else:
@@ -354,7 +354,7 @@ def keep_seams(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> tuple[Cl
     return cloth, notes
 
 
-def _kept(cloth: Cloth, anatomy: Anatomy, name: str) -> Cloth | None:
+def _kept(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> Cloth | None:
     """Return the cloth with a centre line, a waist or a yoke; None where it has none."""
     sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1, dtype=np.int64))
     cloth = replace(cloth, labels={**cloth.labels, "sleeve": sleeve})
@@ -366,7 +366,7 @@ def _kept(cloth: Cloth, anatomy: Anatomy, name: str) -> Cloth | None:
         ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
         edges = edges[ahead if name == "centre front" else ~ahead]
     elif name in ("waist", "yoke"):
-        level = _level(cloth, anatomy, name)
+        level = _level(cloth, anatomy, name, options)
         if level is None:
             return None
         height = cloth.vertices @ anatomy.up - level
@@ -380,7 +380,7 @@ def _kept(cloth: Cloth, anatomy: Anatomy, name: str) -> Cloth | None:
     return cloth.with_seam(name, edges) if len(edges) else None
 
 
-def _level(cloth: Cloth, anatomy: Anatomy, name: str) -> float | None:
+def _level(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> float | None:
     """Return the height of a waist or a yoke [m]; None where the garment has none."""
     trunk = cloth.labels["sleeve"] < 0
     heights = cloth.vertices @ anatomy.up
@@ -394,6 +394,9 @@ def _level(cloth: Cloth, anatomy: Anatomy, name: str) -> float | None:
         return high - _YOKE * (high - bottom)
     if anatomy.kind not in ("top", "dress", "jumpsuit"):
         return None
+    waist = options.waist_along(anatomy.up)
+    if waist is not None and low < waist < high:
+        return waist
     top = min(forks["sleeve"] or [high])
     bottom = max(forks["leg"] or [top - 0.75 * min(top - low, anatomy.size)])
     levels = np.linspace(top - 0.15 * (top - bottom), bottom + 0.15 * (top - bottom), _LEVELS)

@@ -22,7 +22,7 @@ from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.trace import SurfacePath
 
-__all__ = ["Cloth", "PieceMesh", "edge_components"]
+__all__ = ["Cloth", "PieceMesh", "edge_components", "section"]
 
 Ids = NDArray[np.int64]
 
@@ -349,3 +349,20 @@ def edge_components(edges: Ids, *, ends: Ids | None = None) -> list[Ids]:
     same = edges.ravel()[order[1:]] == edges.ravel()[order[:-1]]
     label = join_labels(len(edges), order[1:][same] // 2, order[:-1][same] // 2)
     return [edges[label == number] for number in np.unique(label)]
+
+
+def section(cloth: Cloth, f: FloatArray, within: BoolArray) -> tuple[float, FloatArray]:
+    """Return length [m] and middle of the zero line of a field within some faces."""
+    faces = cloth.faces[within]
+    faces = faces[(f[faces].min(axis=1) < 0.0) & (f[faces].max(axis=1) >= 0.0)]
+    ends = []
+    for k in range(3):
+        a, b = faces[:, k], faces[:, (k + 1) % 3]
+        t = np.clip(f[a] / np.where(f[a] == f[b], 1.0, f[a] - f[b]), 0.0, 1.0)[:, None]
+        cross = (f[a] >= 0.0) != (f[b] >= 0.0)
+        ends.append(np.where(cross[:, None], (1.0 - t) * cloth.vertices[a] + t * cloth.vertices[b], np.nan))
+    points = np.stack(ends, axis=1)
+    low, high = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
+    steps = np.linalg.norm(high - low, axis=1)
+    total = max(float(steps.sum()), 1e-300)
+    return float(steps.sum()), (np.nanmean(points, axis=1) * steps[:, None]).sum(axis=0) / total

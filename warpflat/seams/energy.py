@@ -204,7 +204,7 @@ def cut_by_energy(
         number = next(k for k, piece in enumerate(pieces) if piece is worst)
         candidates = [
             candidate
-            for candidate in _candidates(cloth, worst, anatomy, may_part=parting and now < most)
+            for candidate in _candidates(cloth, worst, anatomy, options, may_part=parting and now < most)
             if not options.forbids(candidate.name)
         ]
 
@@ -569,8 +569,8 @@ def _can_be_sewn(
 
 
 def _trial_options(energy_left: float) -> RelaxOptions:
-    """Return options that tell good from bad, no more."""
-    return replace(coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=5)
+    """Return options that tell good from bad, no more; what is left is estimated at every step, and checked where it is little."""
+    return replace(coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=100)
 
 
 def _strained_by_sewing(cloth: Cloth, pieces: Sequence[_Measured]) -> float:
@@ -641,7 +641,9 @@ def _twin(piece: _Measured, pieces: Sequence[_Measured], anatomy: Anatomy) -> _M
     return nearest if min(away) < 0.06 * anatomy.size and abs(nearest.area / piece.area - 1.0) < 0.25 else None
 
 
-def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: bool) -> Iterator[_Candidate]:
+def _candidates(
+    cloth: Cloth, piece: _Measured, anatomy: Anatomy, options: SeamOptions, *, may_part: bool
+) -> Iterator[_Candidate]:
     """Yield lines that may relieve a piece: a seam across the garment through the place, and darts from the borders near it."""
     surface, size = piece.surface, anatomy.size
     triangles = surface.vertices[surface.faces[:, :3]]
@@ -658,7 +660,10 @@ def _candidates(cloth: Cloth, piece: _Measured, anatomy: Anatomy, *, may_part: b
             yield _Candidate(name=name, normal=anatomy.normal, point=anatomy.offset * anatomy.normal, parts=True)
         tall = float(np.ptp(heights))
         level = float(np.average(heights[[m.vertex for m in misfits]], weights=[m.area for m in misfits]))
-        name = "waist" if tall > 0.8 * size else "yoke"
+        name, waist = "waist" if tall > 0.8 * size else "yoke", options.waist_along(anatomy.up)
+        if waist is not None and 0.2 * tall < waist - heights.min() < 0.8 * tall:
+            # Where the body has it.
+            name, level = "waist", waist
         known = [edges for other, edges in cloth.seams.items() if other.startswith(name)]
         if known:
             # Front and back meet at the sides.

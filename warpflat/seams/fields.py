@@ -11,6 +11,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.sparse import factor_symmetric
+from warpflat.surface.closest import nearest_on_triangles
 
 __all__ = ["MirrorMap", "Operators", "mirror_map"]
 
@@ -146,7 +147,6 @@ def mirror_map(
         normal: of length 1, offset: [m].
         reach: a vertex whose image is so far from the surface has no mirror image [m].
     """
-    import trimesh
     from scipy.spatial import cKDTree
 
     corners = vertices[faces]
@@ -156,17 +156,15 @@ def mirror_map(
     facing = facing - 2.0 * (facing @ normal)[:, None] * normal
     tried = min(_TRIED, len(faces))
     nearest = np.asarray(cKDTree(corners.mean(axis=1)).query(image, k=tried)[1]).reshape(len(image), tried)
-    best, place, chosen = np.full(len(image), np.inf), image.copy(), np.zeros(len(image), dtype=np.int64)
+    best, shares, chosen = np.full(len(image), np.inf), np.zeros((len(image), 3)), np.zeros(len(image), dtype=np.int64)
     for column in nearest.T:
-        point = trimesh.triangles.closest_point(corners[column], image)
-        away = np.linalg.norm(point - image, axis=1)
+        share = nearest_on_triangles(corners[column], image)
+        away = np.linalg.norm(np.einsum("vk,vkj->vj", share, corners[column]) - image, axis=1)
         # Another layer that faces the other way is not the mirror image.
         cost = away + np.where(np.einsum("ij,ij->i", turned[column], facing) < 0.0, reach, 0.0)
         better = cost < best
         best, chosen = np.where(better, cost, best), np.where(better, column, chosen)
-        place[better] = point[better]
-    shares = np.clip(np.nan_to_num(trimesh.triangles.points_to_barycentric(corners[chosen], place)), 0.0, 1.0)
-    shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
+        shares[better] = share[better]
     rows = np.repeat(np.arange(len(vertices)), 3)
     matrix = coo_array((shares.ravel(), (rows, faces[chosen].ravel())), shape=(len(vertices), len(vertices))).tocsr()
     return MirrorMap(matrix=csr_array(matrix), distance=best, weight=np.clip(2.0 - 2.0 * best / reach, 0.0, 1.0))

@@ -16,6 +16,7 @@ from warpflat.core.short_repr import short_repr
 from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
+from warpflat.pattern.pieces import FoundSeam
 from warpflat.seams.anatomy import ROLES, Anatomy, axis_name, describe, find_anatomy
 from warpflat.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.seams.cloth import Cloth, PieceMesh
@@ -39,6 +40,8 @@ Ids = NDArray[np.int64]
 
 # A band has no more than this share of the cloth, and its border, squared, is so many times its area: 4.5 times as long as wide.
 _BAND_AREA, _BAND = 0.12, 27.0
+# It runs along an opening by at least this share of its border: a panel of a leg only ends there.
+_ALONG = 0.2
 #: What a band is called, by the border along which it runs.
 BANDS = {"waist": "waistband", "neck": "neck_band", "sleeve": "cuff", "leg": "cuff"}
 
@@ -53,27 +56,6 @@ _LONG = 2.0
 
 #: The line of a piece along which its grain runs.
 GRAIN = "grain"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FoundSeam:
-    """A seam that was found.
-
-    Attributes:
-        name: as "side left".
-        length: [m].
-        released: strain energy that it releases, by trial [J]; None where nothing was tried.
-        needed: why the cloth cannot lie flat without it: "opens a tube"; "" where it can.
-    """
-
-    name: str
-    length: float
-    released: float | None = None
-    needed: str = ""
-
-    def as_dict(self) -> dict[str, object]:
-        """Return plain data."""
-        return {"name": self.name, "length_m": self.length, "released_j": self.released, "needed": self.needed}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -380,16 +362,19 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
 def _band(cloth: Cloth, mesh: PieceMesh) -> str:
     """Return what a piece is called that is a narrow strip along the waist, the neck, a sleeve's or a leg's end; "" for others."""
     area = float(cloth.face_areas[mesh.face_of].sum())
-    around = sum(
-        float(np.linalg.norm(np.diff(mesh.vertices[np.append(loop, loop[0])], axis=0), axis=1).sum())
-        for loop in border_loops(mesh.faces.astype(np.int32))
-    )
+    loops = [np.append(loop, loop[0]) for loop in border_loops(mesh.faces.astype(np.int32))]
+    steps = [np.linalg.norm(np.diff(mesh.vertices[loop], axis=0), axis=1) for loop in loops]
+    around = float(sum(step.sum() for step in steps))
     if "role" not in cloth.values or area > _BAND_AREA * float(cloth.face_areas.sum()) or around**2 < _BAND * area:
         return ""
     roles = np.round(cloth.values["role"][mesh.vertex_of]).astype(int)
-    names = [ROLES[number - 1] for number in roles[roles > 0].tolist()]
-    most = max(BANDS, key=names.count)
-    return BANDS[most] if names.count(most) > 2 else ""
+
+    def along(role: str) -> float:
+        own = roles == 1 + ROLES.index(role)
+        return sum(float(step[own[loop[:-1]] & own[loop[1:]]].sum()) for loop, step in zip(loops, steps, strict=True))
+
+    most = max(BANDS, key=along)
+    return BANDS[most] if along(most) > _ALONG * around else ""
 
 
 def _alike(pieces: Sequence[Surface]) -> list[str]:

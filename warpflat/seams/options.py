@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, is_number, nearest
 from warpflat.core.text import quote_value
 
@@ -120,6 +123,7 @@ class SeamOptions:
         limit: share of the cloth that may stay beyond its strain limit before further seams and darts are looked for.
         smooth: wrinkles of draped or scanned cloth are smoothed over this length before anything is cut [m]; 0 leaves them.
         most_pieces: at most so many of one layer; as many as are usual for its kind if not given.
+        waist: a place at the height of the body's waist [m], where seams called so are made; found from the shape if not given.
     """
 
     find: Literal["auto", "none"] = "auto"
@@ -131,6 +135,11 @@ class SeamOptions:
     limit: float = 0.02
     most_pieces: int | None = None
     smooth: float = 0.0
+    waist: Point | None = None
+
+    def waist_along(self, up: FloatArray) -> float | None:
+        """Return the height of the body's waist along a direction [m], if it is known."""
+        return None if self.waist is None else float(np.array(self.waist) @ up)
 
     def forbids(self, seam: str) -> bool:
         """Return whether a seam is to be left closed."""
@@ -164,6 +173,8 @@ class SeamOptions:
         for key, value in (("up", self.up), ("front", self.front)):
             if value is not None and value not in DIRECTIONS:
                 raise InputError(f"{key} = {value!r} is no direction; {nearest(str(value), DIRECTIONS)}")
+        if self.waist is not None and not (len(self.waist) == 3 and all(map(_is_coordinate, self.waist))):
+            raise InputError(f"waist = {self.waist!r} is no place; give three numbers [m], of which its height counts")
         if not 0.0 <= self.smooth <= 0.1:
             raise InputError(f"smooth = {1e3 * self.smooth:g} mm is out of range; it lies between 0 and 100 mm")
         if not 0.0 <= self.limit <= 1.0:

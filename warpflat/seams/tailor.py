@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.seams.anatomy import Anatomy, Limb
-from warpflat.seams.cloth import Cloth, edge_components
+from warpflat.seams.cloth import Cloth, edge_components, section
 from warpflat.seams.fields import Operators
 
 __all__ = [
@@ -21,7 +21,6 @@ __all__ = [
     "Fields",
     "cut_as_a_tailor",
     "draw_fields",
-    "section",
     "side_word",
     "tidied",
     "with_drawn_sleeves",
@@ -214,23 +213,6 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
         if len(lengths) > 3 and all(lengths[-4 + k] - lengths[-2 + k] < _STEEP * 2.0 * step for k in (0, 1)):
             return offsets[-4], middles[-4]
     return (offsets[0], middles[0]) if offsets else None
-
-
-def section(cloth: Cloth, f: FloatArray, within: BoolArray) -> tuple[float, FloatArray]:
-    """Return length [m] and middle of the zero line of a field within some faces."""
-    faces = cloth.faces[within]
-    faces = faces[(f[faces].min(axis=1) < 0.0) & (f[faces].max(axis=1) >= 0.0)]
-    ends = []
-    for k in range(3):
-        a, b = faces[:, k], faces[:, (k + 1) % 3]
-        t = np.clip(f[a] / np.where(f[a] == f[b], 1.0, f[a] - f[b]), 0.0, 1.0)[:, None]
-        cross = (f[a] >= 0.0) != (f[b] >= 0.0)
-        ends.append(np.where(cross[:, None], (1.0 - t) * cloth.vertices[a] + t * cloth.vertices[b], np.nan))
-    points = np.stack(ends, axis=1)
-    low, high = np.nanmin(points, axis=1), np.nanmax(points, axis=1)
-    steps = np.linalg.norm(high - low, axis=1)
-    total = max(float(steps.sum()), 1e-300)
-    return float(steps.sum()), (np.nanmean(points, axis=1) * steps[:, None]).sum(axis=0) / total
 
 
 def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]:

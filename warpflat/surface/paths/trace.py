@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length, project_on_segments
+from warpflat.surface.closest import nearest_on_triangles
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
@@ -119,8 +120,6 @@ def locate(surface: Surface, point: ArrayLike | int) -> Place:
         if not 0 <= point < len(surface.vertices):
             raise InputError(f"vertex {int(point)} does not exist; valid: 0 to {len(surface.vertices) - 1}")
         return {int(point): 1.0}
-    import trimesh
-
     target = np.asarray(point, dtype=float)
     if target.shape != (3,) or not np.isfinite(target).all():
         raise InputError(f"a point on the surface is a vertex index or three finite numbers [m], got {point!r}")
@@ -130,7 +129,8 @@ def locate(surface: Surface, point: ArrayLike | int) -> Place:
     reach = np.linalg.norm(surface.vertices[np.unique(triangles)] - target, axis=1).min()
     outside = np.maximum(np.maximum(corners.min(axis=1) - target, target - corners.max(axis=1)), 0.0)
     near = np.flatnonzero(np.linalg.norm(outside, axis=1) <= reach * (1 + 1e-9))
-    nearest = trimesh.triangles.closest_point(corners[near], np.broadcast_to(target, (len(near), 3)))
+    shares = nearest_on_triangles(corners[near], np.broadcast_to(target, (len(near), 3)))
+    nearest = np.einsum("tk,tkj->tj", shares, corners[near])
     distance = np.linalg.norm(nearest - target, axis=1)
     # Several triangles share a point on an edge: the largest gives the best-conditioned coordinates.
     normal = np.cross(corners[near, 1] - corners[near, 0], corners[near, 2] - corners[near, 0])

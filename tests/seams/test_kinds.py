@@ -1,0 +1,119 @@
+"""A garment is called by a name only where its size and its shape say so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+import seam_solids as solids
+
+import warpflat
+from warpflat.seams.anatomy import Anatomy, axis_name, describe, find_anatomy
+from warpflat.seams.fields import Operators
+from warpflat.seams.find import cloth_of
+from warpflat.surface.mesh import Surface
+
+
+def loft(rings: Sequence[tuple[Sequence[float], float, float]], *, closed: bool = False, slope: float = 0.0) -> Surface:
+    """A tube through ellipses about places, across the way between them; `closed` at its last; the first one slants along x."""
+    around = 32
+    turn = np.arange(around) * 2 * np.pi / around
+    centres = np.array([ring[0] for ring in rings], dtype=float)
+    along = np.gradient(centres, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    vertices = list[np.ndarray]()
+    for (_, wide, deep), centre, way in zip(rings, centres, along, strict=True):
+        across = np.cross(way, [1.0, 0.0, 0.0])
+        ring = centre + wide * np.outer(np.sin(turn), [1.0, 0.0, 0.0]) + deep * np.outer(np.cos(turn), across)
+        if slope and not vertices:
+            ring[:, 1] += slope * ring[:, 0]
+        vertices += list(ring)
+    faces = [
+        [r * around + k, r * around + (k + 1) % around, (r + 1) * around + (k + 1) % around, (r + 1) * around + k]
+        for r in range(len(rings) - 1)
+        for k in range(around)
+    ]
+    if closed:
+        last = (len(rings) - 1) * around
+        vertices.append(centres[-1] + 0.2 * rings[-1][1] * along[-1])
+        faces += [[last + k, last + (k + 1) % around, len(vertices) - 1, -1] for k in range(around)]
+    return warpflat.make_surface(np.array(vertices), faces)
+
+
+def girths(*rows: tuple[float, float]) -> Surface:
+    """A tube around the trunk, through heights and widths [m]."""
+    heights = np.linspace(rows[0][0], rows[-1][0], 24)
+    wide = np.interp(heights, *zip(*rows, strict=True))
+    return loft([((0.0, y, 0.0), w, 0.7 * w) for y, w in zip(heights, wide, strict=True)])
+
+
+def beanie() -> Surface:
+    turn = np.linspace(0.0, 0.48 * np.pi, 14)
+    return loft([((0.0, 0.15 * np.sin(t), 0.0), 0.09 * np.cos(t), 0.1 * np.cos(t)) for t in turn], closed=True)
+
+
+def sock() -> Surface:
+    leg = [((0.0, y, 0.0), 0.045, 0.045) for y in np.linspace(0.25, 0.05, 8)]
+    heel = [((0.0, 0.05 - 0.05 * np.sin(t), 0.05 - 0.05 * np.cos(t)), 0.045, 0.045) for t in np.linspace(0.3, 1.5, 6)]
+    foot = [((0.0, 0.0, z), 0.042, 0.04) for z in np.linspace(0.07, 0.2, 6)]
+    return loft([*leg, *heel, *foot], closed=True)
+
+
+def mitten() -> Surface:
+    parts = [solids.rod([0, 0, 0], [0, 0.17, 0], 0.045, 0.5), solids.rod([0.02, 0.06, 0], [0.085, 0.14, 0], 0.016)]
+    return solids.skin(
+        solids.joined(parts, 0.006), [-0.07, -0.07, -0.05], [0.13, 0.24, 0.05], 0.009, [([0, 0.0, 0], [0, -1, 0])]
+    )
+
+
+def shoe_upper() -> Surface:
+    """From the edge of the sole up to the ankle."""
+    rows = [(0.0, 0.045, 0.13, 0.05), (0.03, 0.045, 0.12, 0.045), (0.07, 0.042, 0.06, 0.0), (0.1, 0.035, 0.04, -0.03)]
+    y, wide, deep, z = np.array(rows).T
+    at = np.linspace(0.0, 0.1, 14)
+    return loft([((0.0, h, np.interp(h, y, z)), np.interp(h, y, wide), np.interp(h, y, deep)) for h in at.tolist()])
+
+
+def pouch() -> Surface:
+    return loft([((0.0, y, 0.0), 0.11, 0.1) for y in np.linspace(0.3, 0.0, 12)], closed=True)
+
+
+def anatomy_of(surface: Surface) -> Anatomy:
+    cloth = cloth_of(surface)
+    return find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+
+
+@pytest.mark.parametrize(
+    ("kind", "make"),
+    [
+        ("skirt", lambda: girths((0.0, 0.24), (0.6, 0.13))),
+        ("skirt", lambda: girths((0.0, 0.165), (0.4, 0.17), (0.6, 0.13))),
+        ("top", lambda: girths((0.0, 0.13), (0.25, 0.165))),
+        ("dress", lambda: girths((0.0, 0.3), (0.6, 0.12), (0.85, 0.165))),
+        ("hat", beanie),
+        ("sock", sock),
+        ("glove", mitten),
+        ("other", shoe_upper),
+        ("other", pouch),
+    ],
+    ids=["skirt", "pencil skirt", "tube top", "strapless dress", "beanie", "sock", "mitten", "shoe upper", "pouch"],
+)
+def test_what_is_not_surely_something_is_called_other(kind: str, make: Callable[[], Surface]) -> None:
+    assert describe(anatomy_of(make())) == kind
+
+
+def test_a_slanted_hem_does_not_turn_a_skirt_around() -> None:
+    straight = girths((0.0, 0.28), (0.7, 0.14))
+    slanted = loft(
+        [((0.0, y, 0.0), 0.28 - 0.2 * y, 0.7 * (0.28 - 0.2 * y)) for y in np.linspace(0.0, 0.7, 24)], slope=0.6
+    )
+    for surface in (straight, slanted):
+        anatomy = anatomy_of(surface)
+        assert (anatomy.kind, axis_name(anatomy.front)) == ("skirt", "+z")
+
+
+def test_armholes_are_sleeves_on_both_sides_or_on_none() -> None:
+    # What there is of its sleeves is as long as the shortest sleeve on one side, and a little shorter on the other.
+    anatomy = anatomy_of(solids.shirt(arm=0.0, sleeve=0.18, step=0.045))
+    assert {limb.side for limb in anatomy.limbs} in (set(), {1, -1})
