@@ -40,7 +40,7 @@ def test_labels_and_steps_say_the_printed_name_in_the_asked_units(dress: Drafted
         assert piece.piece.printed_name == "Vorderteil"
         assert piece.label.lines[0][0] == "VORDERTEIL"
         assert any(text.startswith("Includes ") and text.endswith(" in") for text, _ in piece.label.lines)
-    steps = " ".join(sewing_steps(dress, "38"))
+    steps = " ".join(step.words for step in sewing_steps(dress, "38"))
     assert "Vorderteil" in steps
     assert whole.name not in steps.replace("Vorderteil", "").split(" ")
     assert dress.garment.units == "in"

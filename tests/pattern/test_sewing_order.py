@@ -72,7 +72,7 @@ def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
     )
     pattern = finish_edges(top(ZIP), [facing, binding], gaps=["centre back"])
     drafted = draft_garment(add_lining(add_interfacing(pattern, "interfacing"), "lining"))
-    steps = sewing_steps(drafted, "")
+    steps = [step.words for step in sewing_steps(drafted, "")]
     places = {
         name: next(i for i, step in enumerate(steps) if text in step)
         for name, text in {
@@ -95,11 +95,22 @@ def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
     assert notions(drafted, "") == ("sewing thread", "1 invisible zip of 30 cm")
     # The letters follow the steps.
     assert seam_letters(drafted)["centre back"] == "A"
+    # Each step knows what it sews, in whatever words.
+    sewn = [step.sewn for step in sewing_steps(drafted, "")]
+    assert sewn[places["zip"]] == {"back_right": {"centre back"}, "back_left": {"centre back"}}
+    assert sewn[places["baste"]] == {
+        "front_lining": {"armhole right", "armhole left"},
+        "back_right_lining": {"armhole right"},
+        "back_left_lining": {"armhole left"},
+    }
+    assert sewn[places["hems"]]["front"] == {"hem"}
     # A pattern that was written and read again is sewn alike.
     again = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
-    assert sewing_steps(again, "") == steps
+    assert sewing_steps(again, "") == sewing_steps(drafted, "")
     with printed_in(language_words("de")):
-        german = " ".join(sewing_steps(drafted, ""))
+        german_steps = sewing_steps(drafted, "")
+    german = " ".join(step.words for step in german_steps)
+    assert [step.sewn for step in german_steps] == sewn
     assert "Reißverschluss, 30 cm, an beide Kanten von A (hintere Mitte" in german
     assert "Säume umschlagen und nähen: 3 cm (Vorderteil" in german
 
@@ -109,7 +120,7 @@ def test_a_zip_in_one_side_alone_is_one_zip():
     seams = [replace(seam, openings=(ZIP,)) if seam.name == "side left" else seam for seam in pattern.seams]
     drafted = draft_garment(replace(pattern, seams=seams))
     assert notions(drafted, "") == ("sewing thread", "1 invisible zip of 30 cm")
-    steps = sewing_steps(drafted, "")
+    steps = [step.words for step in sewing_steps(drafted, "")]
     (zip_in,) = [step for step in steps if "zip" in step]
     assert "(side left: front to back left)" in zip_in
     assert any("side right: front to back right" in step for step in steps)
@@ -129,12 +140,12 @@ def test_a_zip_in_one_side_alone_is_one_zip():
     ],
 )
 def test_every_opening_has_a_step(opening: SeamOpening, expected: str):
-    steps = sewing_steps(draft_garment(top(opening)), "")
+    steps = [step.words for step in sewing_steps(draft_garment(top(opening)), "")]
     assert any(expected in step for step in steps)
 
 
 def test_a_zip_above_a_vent_is_closed_down_to_the_vent():
-    steps = sewing_steps(draft_garment(top(ZIP, SeamOpening(kind="vent", length=0.1))), "")
+    steps = [step.words for step in sewing_steps(draft_garment(top(ZIP, SeamOpening(kind="vent", length=0.1))), "")]
     assert "then close the seam below it, down to the vent." in steps[0]
     assert steps[1].startswith("Fold the vent of 10 cm")
     with pytest.raises(InputError, match=r"unknown kind of opening 'zipp'; did you mean 'zip'\?"):
@@ -144,9 +155,9 @@ def test_a_zip_above_a_vent_is_closed_down_to_the_vent():
 def test_a_band_that_is_shorter_than_its_edge_is_stretched():
     band = Finishing(kind="band", edge="neck", width=0.02, share=0.85)
     (step,) = [
-        step
+        step.words
         for step in sewing_steps(draft_garment(finish_edges(top(), [band])), "")
-        if "bands" in step and "edges" in step
+        if "bands" in step.words and "edges" in step.words
     ]
     assert step.endswith("stretch the neck band).")
 
@@ -154,4 +165,4 @@ def test_a_band_that_is_shorter_than_its_edge_is_stretched():
 def test_nothing_ends_at_a_zip_that_is_not_there():
     facing = Finishing(kind="facing", edge="neck", width=0.05)
     pattern = finish_edges(top(SeamOpening(kind="buttons", length=0.2)), [facing], gaps=["centre back"])
-    assert not any("zip" in step for step in sewing_steps(draft_garment(pattern), ""))
+    assert not any("zip" in step.words for step in sewing_steps(draft_garment(pattern), ""))

@@ -16,7 +16,7 @@ from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_
 from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
 from warpflat.pattern.pieces import FoundSeam
-from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams, step_pictures, tools
+from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams, tools
 from warpflat.pattern.words import translate, translate_name
 from warpflat.pattern.worn import Worn
 
@@ -160,15 +160,13 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
                 for entry in entries
             ]
             page.paragraph(", ".join(cut), indent=0.030, lead=cloth)
-    steps = sewing_steps(whole, size)
     page.heading(translate("Sewing order"), 3 * LINE)
     page.paragraph(
         translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
     )
-    pictures = step_pictures(whole, size, steps)
-    for number, (words, picture) in enumerate(zip(steps, pictures, strict=True), 1):
+    for number, sewing in enumerate(sewing_steps(whole, size), 1):
         _step(
-            page, number, words, [(piece, picture[piece.name]) for piece in whole.pieces[size] if piece.name in picture]
+            page, number, sewing.words, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn]
         )
     seams = sewn_seams(whole, size)
     if seams:

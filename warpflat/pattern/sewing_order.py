@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from string import ascii_uppercase
 
@@ -14,13 +13,13 @@ from warpflat.pattern.pieces import Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.words import translate, translate_name
 
 __all__ = [
+    "SewingStep",
     "SewnSeam",
     "notions",
     "piece_titles",
     "seam_letters",
     "sewing_steps",
     "sewn_seams",
-    "step_pictures",
     "tools",
 ]
 
@@ -55,6 +54,31 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
 _ON_FACINGS, _LININGS, _LAST = (len(_STAGES) + k for k in (1, 2, 5))
 
 
+#: A piece and an edge of it, by their names.
+Place = tuple[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SewingStep:
+    """A step of making a garment.
+
+    Attributes:
+        words: a sentence.
+        sewn: of each piece that is at work, by its name, the edges that are sewn; fisheye darts among them.
+    """
+
+    words: str
+    sewn: Mapping[str, frozenset[str]]
+
+    @classmethod
+    def at(cls, words: str, places: Iterable[Place] = (), pieces: Iterable[DraftedPiece] = ()) -> SewingStep:
+        """Return a step that sews at some places, and at which further pieces are handled."""
+        sewn: dict[str, set[str]] = {piece.name: set() for piece in pieces}
+        for piece, edge in places:
+            sewn.setdefault(piece, set()).add(edge)
+        return cls(words=words, sewn={piece: frozenset(edges) for piece, edges in sewn.items()})
+
+
 @dataclass(frozen=True, kw_only=True)
 class SewnSeam:
     """A seam as the maker meets it; its mirror image, which is sewn alike, is the same one.
@@ -69,6 +93,7 @@ class SewnSeam:
         stage: its place in `_STAGES` and `_FINISHING`.
         count: how often it is sewn.
         openings: where it can be opened, or is not closed.
+        places: piece and edge of all that it joins, of both sides of the body.
     """
 
     letter: str
@@ -80,6 +105,7 @@ class SewnSeam:
     stage: int
     count: int
     openings: tuple[SeamOpening, ...]
+    places: tuple[Place, ...]
 
     def words(self) -> str:
         """Return its letter, its name, its pieces, and how its longer or shorter side is held."""
@@ -131,6 +157,7 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
                 stage=_stage(seam, pieces),
                 count=len(group),
                 openings=seam.openings,
+                places=tuple((s.piece, s.edge) for each in group for row in each.sides for s in row),
             )
         )
     return tuple(found)
@@ -144,147 +171,175 @@ def seam_letters(garment: DraftedGarment) -> dict[str, str]:
     return {seam.name: _letter(number) for number, group in enumerate(groups) for seam in group}
 
 
-def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
-    """Return the steps of making the garment, a sentence each."""
+def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
+    """Return the steps of making the garment."""
     pieces = garment.pieces[size]
     titles = piece_titles([piece.piece for piece in pieces])
-    units, steps = garment.garment.units, list[str]()
-    fused = [titles[piece.name] for piece in pieces if piece.piece.also or piece.piece.role == "interfacing"]
+    units, steps = garment.garment.units, list[SewingStep]()
+
+    def called(places: Iterable[Place | DraftedPiece]) -> str:
+        names = (place.name if isinstance(place, DraftedPiece) else place[0] for place in places)
+        return ", ".join(dict.fromkeys(titles[name] for name in names))
+
+    fused = [piece for piece in pieces if piece.piece.also or piece.piece.role == "interfacing"]
     if fused:
-        steps.append(translate("Fuse the interfacing: {pieces}.", pieces=", ".join(fused)))
-    pleats = [
-        f"{titles[piece.name]}: {_listed(names)}" for piece in pieces if (names := _dart_names(piece, pleats=True))
-    ]
-    darts = [f"{titles[piece.name]}: {_listed(names)}" for piece in pieces if (names := _dart_names(piece))]
-    if darts:
-        steps.append(
-            translate("Sew the darts, from the edge to the tip, and press them: {darts}.", darts="; ".join(darts))
-        )
-    if pleats:
-        steps.append(
-            translate(
-                "Fold the pleats and sew them as far as they are marked; they hang open below: {pleats}.",
-                pleats="; ".join(pleats),
-            )
-        )
+        steps.append(SewingStep.at(translate("Fuse the interfacing: {pieces}.", pieces=called(fused)), pieces=fused))
+    for pleats, phrase in (
+        (False, "Sew the darts, from the edge to the tip, and press them: {darts}."),
+        (True, "Fold the pleats and sew them as far as they are marked; they hang open below: {pleats}."),
+    ):
+        legs = {piece.name: _dart_legs(piece, pleats=pleats) for piece in pieces}
+        words = [f"{titles[piece]}: {_listed(list(of_piece))}" for piece, of_piece in legs.items() if of_piece]
+        if words:
+            places = [(piece, leg) for piece, of_piece in legs.items() for row in of_piece.values() for leg in row]
+            steps.append(SewingStep.at(translate(phrase, darts="; ".join(words), pleats="; ".join(words)), places))
     patches = [
-        titles[piece.name]
-        for piece in pieces
-        if piece.piece.role == "pocket" and any(edge.kind == "hem" for edge in piece.edges)
+        piece for piece in pieces if piece.piece.role == "pocket" and any(edge.kind == "hem" for edge in piece.edges)
     ]
     if patches:
         steps.append(
-            translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=", ".join(patches))
+            SewingStep.at(
+                translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=called(patches)),
+                [(piece.name, edge.name) for piece in patches for edge in piece.edges if edge.kind == "seam"],
+                patches,
+            )
         )
-    placket = [titles[piece.name] for piece in pieces if piece.name.endswith("_placket")]
+    placket = [piece for piece in pieces if piece.name.endswith("_placket")]
     if placket:
         steps.append(
-            translate(
-                "Cut the slits where they are marked, and bind both their edges with one strip each: {plackets}.",
-                plackets=", ".join(placket),
+            SewingStep.at(
+                translate(
+                    "Cut the slits where they are marked, and bind both their edges with one strip each: {plackets}.",
+                    plackets=called(placket),
+                ),
+                pieces=placket,
             )
         )
     seams = sewn_seams(garment, size)
     # Edges of linings and facings that no seam takes: they end at a zip, are caught in a binding, or are finished by themselves.
-    free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
-    shell = {piece.name: piece.piece for piece in pieces if piece.piece.role == "shell"}
+    free = _free_edges(pieces, garment.garment.seams)
+    roles = {piece.name: piece.piece.role for piece in pieces}
     zipped = {
-        side.edge
+        without_side(side.edge)
         for seam in garment.garment.seams
         for row in seam.sides
         for side in row
         if any(each.kind == "zip" for each in seam.openings)
     }
     bound = {
-        without_side(side.edge)
-        for seam in garment.garment.seams
-        if _stage(seam, {piece.name: piece.piece for piece in pieces}) == _LAST
-        for row in seam.sides
-        for side in row
-        if side.piece in shell
+        without_side(edge)
+        for seam in seams
+        if seam.stage == _LAST
+        for piece, edge in seam.places
+        if roles.get(piece) == "shell"
     }
-    inside = {titles[piece.name] for piece in pieces if piece.piece.role in ("lining", "facing")}
-    at_zip = [
-        title for edge, rows in free.items() if edge in map(without_side, zipped) for title in rows if title in inside
-    ]
-    basted = {edge: [t for t in rows if t in inside] for edge, rows in free.items() if edge in bound}
+    inside = {edge: [place for place in row if roles[place[0]] in ("lining", "facing")] for edge, row in free.items()}
+    at_zip = [place for edge, row in inside.items() if edge in zipped for place in row]
+    basted = {edge: row for edge, row in inside.items() if edge in bound and row}
+    turned_in_at = max((each.stage for each in seams if each.stage in (_LININGS + 1, _ON_FACINGS)), default=None)
     for stage in sorted({seam.stage for seam in seams}):
         what = translate([*_STAGES, *_FINISHING][stage][0])
         here = [seam for seam in seams if seam.stage == stage]
-        if stage == _LAST and any(basted.values()):
+        if stage == _LAST and basted:
             steps.append(
-                translate(
-                    "Baste the lining to the shell, wrong sides together: {edges}.",
-                    edges=", ".join(translate_name(edge) for edge, rows in basted.items() if rows),
+                SewingStep.at(
+                    translate(
+                        "Baste the lining to the shell, wrong sides together: {edges}.",
+                        edges=", ".join(translate_name(edge) for edge in basted),
+                    ),
+                    [place for row in basted.values() for place in row],
                 )
             )
         plain = [seam for seam in here if not seam.openings or stage == _LININGS]
         for seam in (seam for seam in here if seam not in plain):
-            steps += _opened_steps(seam, units)
+            steps += [SewingStep.at(words, seam.places) for words in _opened_steps(seam, units)]
         if plain:
             words = [seam.words() + (translate(", open beside the zip") if _zips(seam) else "") for seam in plain]
-            steps.append(translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(words)))
-        if stage == _LININGS:
-            at_zip += [side for seam in here if _zips(seam) for side in seam.sides]
-        if (
-            stage in (_LININGS + 1, _ON_FACINGS)
-            and at_zip
-            and stage == max(each.stage for each in seams if each.stage in (_LININGS + 1, _ON_FACINGS))
-        ):
             steps.append(
-                translate(
-                    "At the zip, turn in the edges and sew them to its tape by hand: {pieces}.",
-                    pieces=", ".join(dict.fromkeys(at_zip)),
+                SewingStep.at(
+                    translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(words)),
+                    [place for seam in plain for place in seam.places],
                 )
             )
-    left = {
-        edge: [title for title in rows if not (title in at_zip or title in basted.get(edge, ()))]
-        for edge, rows in free.items()
-    }
-    if any(left.values()):
-        words = [f"{translate_name(edge)} ({', '.join(rows)})" for edge, rows in left.items() if rows]
+        if stage == _LININGS:
+            at_zip += [place for seam in here if _zips(seam) for place in seam.places]
+        if stage == turned_in_at and at_zip:
+            steps.append(
+                SewingStep.at(
+                    translate(
+                        "At the zip, turn in the edges and sew them to its tape by hand: {pieces}.",
+                        pieces=called(at_zip),
+                    ),
+                    at_zip,
+                )
+            )
+    done = {*at_zip, *(place for row in basted.values() for place in row)}
+    left = {edge: rest for edge, row in free.items() if (rest := [place for place in row if place not in done])}
+    if left:
+        words = [f"{translate_name(edge)} ({called(row)})" for edge, row in left.items()]
         steps.append(
-            translate("Finish the raw edges with a facing, a band or binding: {edges}.", edges="; ".join(words))
+            SewingStep.at(
+                translate("Finish the raw edges with a facing, a band or binding: {edges}.", edges="; ".join(words)),
+                [place for row in left.values() for place in row],
+            )
         )
     # Slits and vents are hems of their own, which the steps of their seams have turned in.
-    hems: dict[float, list[str]] = {}
+    hems: dict[float, list[Place]] = {}
     opened, cased = {"slit", "vent"}, {elastic.edge for elastic in garment.garment.elastics}
     for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
         for edge in piece.edges:
-            called = without_side(edge.name).rstrip(" 0123456789")
-            if edge.kind == "hem" and called not in cased and not opened & set(edge.name.split(" ")):
-                hems.setdefault(round(edge.width, 4), []).append(titles[piece.name])
+            name = without_side(edge.name).rstrip(" 0123456789")
+            if edge.kind == "hem" and name not in cased and not opened & set(edge.name.split(" ")):
+                hems.setdefault(round(edge.width, 4), []).append((piece.name, edge.name))
     if hems:
-        words = [f"{length_words(width, units)} ({', '.join(dict.fromkeys(rows))})" for width, rows in hems.items()]
-        steps.append(translate("Turn up and sew the hems: {edges}.", edges=", ".join(words)))
+        words = [f"{length_words(width, units)} ({called(row)})" for width, row in hems.items()]
+        steps.append(
+            SewingStep.at(
+                translate("Turn up and sew the hems: {edges}.", edges=", ".join(words)),
+                [place for row in hems.values() for place in row],
+            )
+        )
     for elastic in garment.garment.elastics:
-        # Without a strip of its own the edge is turned in.
-        turned_in = any(
-            edge.kind == "hem" and without_side(edge.name).rstrip(" 0123456789") == elastic.edge
+        cased_edges = [
+            (piece.name, edge)
             for piece in pieces
             for edge in piece.edges
-        )
+            if without_side(edge.name).rstrip(" 0123456789") == elastic.edge
+        ]
+        # Without a strip of its own the edge is turned in.
+        turned_in = any(edge.kind == "hem" for _, edge in cased_edges)
         phrase = "Turn in the {edge} as a casing of {width}" if turned_in else "Fold the band of the {edge} to {width}"
         steps.append(
-            translate(
-                f"{phrase}, leave a gap in its seam, thread elastic of {{length}} through it, and close both.",
-                edge=translate_name(elastic.edge),
-                width=length_words(elastic.width, units),
-                length=length_words(elastic.lengths[size], units),
+            SewingStep.at(
+                translate(
+                    f"{phrase}, leave a gap in its seam, thread elastic of {{length}} through it, and close both.",
+                    edge=translate_name(elastic.edge),
+                    width=length_words(elastic.width, units),
+                    length=length_words(elastic.lengths[size], units),
+                ),
+                [(piece, edge.name) for piece, edge in cased_edges],
             )
         )
     for title, count in _buttons(pieces).items():
         steps.append(
-            translate(
-                "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
-                count=count,
-                title=title,
+            SewingStep.at(
+                translate(
+                    "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
+                    count=count,
+                    title=title,
+                ),
+                pieces=[piece for piece in pieces if titles[piece.name] == title],
             )
         )
-    ends = [titles[piece.name] for piece in pieces if _buttons_at_one_end(piece)]
+    ends = [piece for piece in pieces if _buttons_at_one_end(piece)]
     if ends:
         steps.append(
-            translate("Work a buttonhole at one end, and sew a button to the other: {pieces}.", pieces=", ".join(ends))
+            SewingStep.at(
+                translate(
+                    "Work a buttonhole at one end, and sew a button to the other: {pieces}.", pieces=called(ends)
+                ),
+                pieces=ends,
+            )
         )
     return tuple(steps)
 
@@ -347,38 +402,6 @@ def tools(garment: DraftedGarment, size: str) -> str:
     if _buttons(garment.pieces[size]) or any(map(_buttons_at_one_end, garment.pieces[size])):
         needed.append("buttonhole foot")
     return ", ".join(translate(word) for word in needed)
-
-
-def step_pictures(garment: DraftedGarment, size: str, steps: Sequence[str]) -> list[dict[str, frozenset[str]]]:
-    """Return for each step its pieces, and of each the edges that are sewn.
-
-    A step names its seams by their letters, and its pieces by their titles.
-    """
-    pieces = {piece.name: piece for piece in garment.pieces[size]}
-    titles = piece_titles([piece.piece for piece in pieces.values()])
-    letters = seam_letters(garment)
-    darts = translate("Sew the darts, from the edge to the tip, and press them: {darts}.", darts="\n").split("\n")[0]
-    hems = translate("Turn up and sew the hems: {edges}.", edges="\n").split("\n")[0]
-    found = []
-    for step in steps:
-        named = set(re.findall(r"(?<!\w)([A-Z]{1,2})(?= \()", step)) | set(
-            re.findall(r"(?<= )([A-Z]{1,2})(?= [a-z])", step)
-        )
-        sewn: dict[str, set[str]] = {}
-        for seam in garment.garment.seams:
-            if letters[seam.name] in named:
-                for side in (side for row in seam.sides for side in row):
-                    sewn.setdefault(side.piece, set()).add(side.edge)
-        if not sewn:
-            rest = step
-            for name, title in sorted(titles.items(), key=lambda each: -len(each[1])):
-                if re.search(rf"(?<!\w){re.escape(title)}(?!\w)", rest):
-                    rest = re.sub(rf"(?<!\w){re.escape(title)}(?!\w)", "", rest)
-                    kind = "dart" if step.startswith(darts) else "hem" if step.startswith(hems) else ""
-                    sewn[name] = {edge.name for edge in pieces[name].edges if edge.kind == kind}
-                    sewn[name] |= set(pieces[name].fisheyes) if kind == "dart" else set()
-        found.append({name: frozenset(edges) for name, edges in sewn.items()})
-    return found
 
 
 def _buttons(pieces: Sequence[DraftedPiece]) -> dict[str, int]:
@@ -481,25 +504,27 @@ def _words(side: Sequence[SeamSide], titles: Mapping[str, str]) -> str:
     return " + ".join(dict.fromkeys(titles[part.piece] for part in side))
 
 
-def _dart_names(piece: DraftedPiece, *, pleats: bool = False) -> list[str]:
-    names = [without_side(dart.dart.name) for dart in piece.darts if (dart.dart.pleat is not None) == pleats]
-    names += [without_side(name) for name in ([] if pleats else piece.fisheyes)]
-    return [translate_name(name) for name in dict.fromkeys(names)]
+def _dart_legs(piece: DraftedPiece, *, pleats: bool) -> dict[str, list[str]]:
+    """Return the edges of a piece's darts, or of its pleats, by the names that are printed; a fisheye dart is its own line."""
+    legs: dict[str, list[str]] = {}
+    for dart in (each.dart for each in piece.darts):
+        if (dart.pleat is not None) == pleats:
+            legs.setdefault(translate_name(without_side(dart.name)), []).extend([dart.left, dart.right])
+    for name in () if pleats else piece.fisheyes:
+        legs.setdefault(translate_name(without_side(name)), []).append(name)
+    return legs
 
 
-def _free_edges(
-    pieces: Sequence[DraftedPiece], seams: Sequence[Seam], titles: Mapping[str, str], kinds: Sequence[str]
-) -> dict[str, list[str]]:
-    """Return the pieces of the edges of some kinds that are in no seam, by the edges' names without side and number."""
+def _free_edges(pieces: Sequence[DraftedPiece], seams: Sequence[Seam]) -> dict[str, list[Place]]:
+    """Return the edges of kind "seam" that are in no seam, by their names without side and number."""
     sewn = {(part.piece, part.edge) for seam in seams for side in seam.sides for part in side}
     # A strip that is cut twice is drawn for one side.
     sewn |= {(of, other_side(edge)) for piece, edge in sewn for of in (piece, other_side(piece))}
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[Place]] = {}
     for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
         for edge in piece.piece.edges:
-            if edge.kind in kinds and (piece.name, edge.name) not in sewn:
-                of_edge = found.setdefault(without_side(edge.name).rstrip(" 0123456789"), [])
-                of_edge += [] if titles[piece.name] in of_edge else [titles[piece.name]]
+            if edge.kind == "seam" and (piece.name, edge.name) not in sewn:
+                found.setdefault(without_side(edge.name).rstrip(" 0123456789"), []).append((piece.name, edge.name))
     return found
 
 
