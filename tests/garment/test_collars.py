@@ -185,3 +185,29 @@ def test_hood_goes_around_the_neck_and_over_the_head(plain: Garment, strip: floa
 def test_hood_needs_a_neckline_that_is_whole_behind(zipped: Garment):
     with pytest.raises(InputError, match="begins and ends at the centre front"):
         with_neck(zipped, kind="hood")
+
+
+def test_placket_opens_the_neck_in_front_and_its_strips_fill_a_box(plain: Garment):
+    wish = Finishing(
+        kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07)
+    )
+    garment = replace(plain, finishing=(wish,))
+    pattern = pattern_of_garment({"": garment}, name="garment")[0]
+    check_seams(pattern)
+    strips, front = pattern.piece("neck_placket", ""), pattern.piece("front", "")
+    assert strips.quantity == 2
+    assert np.ptp(strips.outline, axis=0) == pytest.approx([0.16, 0.06])
+    slit = next(line for name, line in front.internal_lines.items() if name.startswith("slit"))
+    assert np.linalg.norm(slit[1] - slit[0]) == pytest.approx(0.14, abs=1e-6)
+    # The box is as wide as a finished strip, with the slit in its middle.
+    low = front.internal_lines["placket 3"]
+    assert np.linalg.norm(low[1] - low[0]) == pytest.approx(0.03)
+    assert low.mean(axis=0) == pytest.approx(slit[1])
+    steps = " ".join(sewing_steps(draft_garment(pattern), ""))
+    assert "Sew a strip to each side of the marked box" in steps
+    assert "bind both their edges" not in steps
+    # Both edges of the slit widen the ring of the neck.
+    rings = {ring.name: ring for ring in garment.rings}
+    assert rings["neck"].opened == pytest.approx(0.28)
+    with pytest.raises(InputError, match="does not lie within 'front'"):
+        pattern_of_garment({"": replace(plain, finishing=(replace(wish, placket=0.9),))}, name="garment")

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name
@@ -147,7 +148,7 @@ def with_placket(
             allowance=dict.fromkeys(names, 0.010),
         )
         count = max(2, int((length - 0.02) / _APART))
-        marks, holes = {}, {}
+        marks, holes = dict[str, FloatArray](), dict[str, FloatArray]()
         # The upper end lies on the left. Both strips are marked: one gets the buttons, the other one the buttonholes.
         for number, x in enumerate(np.linspace(0.018, length - 0.030, count)):
             marks[find_unused_name("button", marks)] = np.array([x, 0.5 * _STRIP])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -140,10 +141,11 @@ def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
                 ("pocket_welt", pocket.width + 2 * _WELT_ENDS, 2 * pocket.welt),
                 ("pocket_bag", pocket.width + 2 * _BESIDE, pocket.height),
             ):
-                sides = swept(Strip(length=long, height=tall))
                 names = ["lower", "right end", "upper", "left end"]
                 outlines[what] = strip_edges(
-                    *sides, kinds=dict.fromkeys(names, "cut"), allowance=dict.fromkeys(names, 0.010)
+                    *swept(Strip(length=long, height=tall)),
+                    kinds=dict.fromkeys(names, "cut"),
+                    allowance=dict.fromkeys(names, 0.010),
                 )
         for what, edges in outlines.items():
             title = find_unused_name(f"{pocket.where}_{what}", {piece.name for piece in pattern.pieces[pattern.sample]})
@@ -258,16 +260,16 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
         rim = _between_ends(ring, ends[0], ends[1], corner)
         straight = np.array([parts[upper][0][-1], parts[front.edge][0][-1]])
         own, side = piece.edge(upper), piece.edge(front.edge)
-        under = {"kind": "cut", "allowance": 0.010}
+        under: dict[str, Any] = {"kind": "cut", "allowance": 0.010}
         # From the corner along the side, around and back along the upper edge, then turned into the outline's direction.
-        facing_rows = [
+        facing_rows: list[tuple[str, FloatArray, dict[str, Any]]] = [
             (upper, parts[upper][0][::-1], {"kind": own.kind, "allowance": own.allowance}),
             (front.edge, parts[front.edge][0], {"kind": side.kind, "allowance": side.allowance}),
             (f"{front.edge} under", parts[front.edge][1], under),
             ("rim", rim[::-1], {}),
             (f"{upper} under", parts[upper][1][::-1], under),
         ]
-        bag_rows = [
+        bag_rows: list[tuple[str, FloatArray, dict[str, Any]]] = [
             (opening, straight, {}),
             (f"{front.edge} under", parts[front.edge][1], under),
             ("rim", rim[::-1], {}),
@@ -294,8 +296,10 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
         marks = {name: mark for name, mark in piece.marks.items() if left.contains(shapely.Point(mark))}
         cut_panel = replace(piece, edges=new, internal_lines=kept_lines, marks=marks)
         made = []
-        for name, rows in ((behind, facing_rows), (bag, bag_rows)):
-            edges = [Edge(name=n, points=p if first else p[::-1], **k) for n, p, k in (rows if first else rows[::-1])]
+        for name, parts_of in ((behind, facing_rows), (bag, bag_rows)):
+            edges = [
+                Edge(name=n, points=p if first else p[::-1], **k) for n, p, k in (parts_of if first else parts_of[::-1])
+            ]
             middle = np.asarray(region.centroid.coords)[0]
             count = piece.quantity * (2 if piece.on_fold else 1)
             made.append(
@@ -307,10 +311,10 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
         pieces[size] = [*(cut_panel if each.name == piece.name else each for each in row), *made]
     seams = []
     for seam in pattern.seams:
-        rows = []
-        for row in seam.sides:
-            sides = []
-            for each in row:
+        rows = list[tuple[SeamSide, ...]]()
+        for own_row in seam.sides:
+            sides = list[SeamSide]()
+            for each in own_row:
                 if each.piece != front.piece or each.edge not in (upper, front.edge):
                     sides.append(each)
                     continue
@@ -321,7 +325,7 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
             rows.append(tuple(sides))
         seams.append(replace(seam, sides=(rows[0], rows[1])))
     taken = {seam.name for seam in seams}
-    for words, panel, name, edge in (
+    for words, panel, name, along in (
         ("pocket opening", front.piece, bag, opening),
         ("pocket bag", behind, bag, "rim"),
     ):
@@ -330,7 +334,7 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
         seams.append(
             Seam(
                 name=title,
-                sides=((SeamSide(piece=panel, edge=edge),), (SeamSide(piece=name, edge=edge, mirrored=True),)),
+                sides=((SeamSide(piece=panel, edge=along),), (SeamSide(piece=name, edge=along, mirrored=True),)),
             )
         )
     return replace(pattern, pieces=pieces, seams=seams)

@@ -147,8 +147,8 @@ def scene_text(
         tables["mannequin"] = dict(mannequin)
     elif offer.of_body and mannequin:
         lengths = mannequin_from_table(check_table(MannequinTable, mannequin, "body"), path_of=Path).lengths
-        own = {key: round(share * lengths[name] + more, 3) for key, (name, share, more) in offer.of_body.items()}
-        tables = laid_over(tables, {"surface": own})
+        sized = {key: round(share * lengths[name] + more, 3) for key, (name, share, more) in offer.of_body.items()}
+        tables = laid_over(tables, {"surface": sized})
     words = [
         f"{choice.capitalize()}: {option}, {offer.choices[choice][option][0]}." for choice, option in taken.items()
     ]

@@ -138,11 +138,11 @@ def make_pieces(name: str, **parameters: Any) -> tuple[Surface, ...]:
     Raises:
         InputError: an unknown parameter (names the nearest), or one of the wrong kind or out of range.
     """
-    return meet_borders(tuple(make_named(name, PIECES[name], parameters)), MEET)[0]
+    return tuple(meet_borders(make_named(name, PIECES[name], parameters), MEET)[0])
 
 
 def _piece(name: str, points: FloatArray, *free: str) -> Surface:
-    """Return a piece that has lines on those sides only that are sewn to nothing: seams name the others."""
+    """Return a piece that has lines on those sides only that are sewn to nothing: seams name the others, and borders may get vertices."""
     surface = grid_surface(name, points)
     return replace(surface, lines={line: surface.lines[line] for line in ("centre", *free)})
 
