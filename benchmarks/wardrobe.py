@@ -68,13 +68,14 @@ def row(offer: GarmentOffer, wearer: str, chosen: Mapping[str, str], out: Path |
     pieces, pattern = metrics["pieces"].values(), metrics["pattern"]
     flips = sum(piece["flipped_faces"] for piece in pieces)
     converged = all(piece["stages"][-1]["converged"] for piece in pieces)
-    shut = [ring["name"] for ring in metrics["rings"] if ring["passes"] is False]
+    shut = [ring["name"] for ring in metrics.get("rings", ()) if ring["passes"] is False]
     if "not_drawn" in pattern:
         return f"{head} exit 1: {pattern['not_drawn']}"
     drawn = sum(len(cloth["pieces"]) for cloth in metrics["cloths"])
+    beyond = metrics.get("wear", {}).get("outside", 0.0)
     return (
         f"{head} {0 if converged and not flips else 1:>4} {flips:>5} {pattern['seam_difference_mm']:>6.2f} "
-        f"{', '.join(shut) or 'pass':<12} {drawn:>6} {metrics['wear']['outside']:>7.2%} {sheets:>6} {time.process_time() - start:>6.0f}"
+        f"{', '.join(shut) or 'pass':<12} {drawn:>6} {beyond:>7.2%} {sheets:>6} {time.process_time() - start:>6.0f}"
     )
 
 
@@ -89,7 +90,9 @@ def main() -> None:
     print(f"{'garment':<28} {'wearer':<9} exit flips   seam rings        pieces  beyond sheets      s")
     for name in arguments.garments:
         offer = garment_offer(name)
-        for wearer in arguments.wearers:
+        for wearer in arguments.wearers if offer.on_body or offer.of_body else arguments.wearers[:1]:
+            if wearer == "scan" and not offer.on_body:
+                continue
             if wearer == "scan" and "WARPFLAT_DATA" not in os.environ:
                 continue
             for chosen in variants(offer, options=arguments.options):

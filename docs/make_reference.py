@@ -28,6 +28,7 @@ from warpflat.mannequin.blend import Adjustment
 from warpflat.mannequin.ease import EASE_PRESETS
 from warpflat.scene.schema import SceneTable
 from warpflat.solver.options import RelaxOptions
+from warpflat.surface.first_shapes import PIECES
 from warpflat.surface.shapes import SHAPES
 
 DOCS = Path(__file__).resolve().parent
@@ -312,7 +313,7 @@ def _lists() -> list[str]:
     lines += ["", "## Presets of ease", "", _row("preset [cm]", *levels), "|---|" + "---|" * len(levels)]
     lines += [_row(f"`{name}`", *(f"{preset[level]:g}" for level in levels)) for name, preset in EASE_PRESETS.items()]
     lines += ["", "## Shapes", "", _row("shape", "surface", "parameters and defaults"), "|---|---|---|"]
-    for name, make in SHAPES.items():
+    for name, make in {**SHAPES, **PIECES}.items():
         about = inspect.cleandoc(make.__doc__ or "").split("\n\n")[0]
         parameters = inspect.signature(make).parameters.values()
         lines.append(_row(f"`{name}`", about, ", ".join(f"`{p.name} = {toml_value(p.default)}`" for p in parameters)))

@@ -7,13 +7,15 @@ import matplotlib
 import numpy as np
 import pytest
 from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
+from matplotlib.patches import Polygon
 
 from warpflat.core.sums import weighted_percentile
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
 from warpflat.export.figure import GREY, Pen, new_figure, write_figure
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
-from warpflat.export.picture import PicturePiece, write_picture
+from warpflat.export.picture import PicturePiece, draw_figure, write_picture
+from warpflat.export.picture_drafted import DraftedOutline
 from warpflat.export.picture_garment import Body, crop_body
 from warpflat.export.picture_page import BETWEEN, pack_boxes, pack_rows, place_views
 from warpflat.export.picture_views import Silhouette, make_facets, pattern_view
@@ -210,6 +212,27 @@ def test_all_kinds_of_pieces_can_be_drawn(tmp_path: Path) -> None:
     ]
     write_picture(tmp_path / "a.png", pieces)
     assert (pixels_of(tmp_path / "a.png").min(axis=-1) < 0.9).mean() > 0.05
+
+
+def test_drafted_pieces_stand_below_the_others_with_their_longer_side_across(tmp_path: Path) -> None:
+    pieces = [find_piece(dome(9))]
+    band = np.array([[0.0, 0.0], [0.05, 0.0], [0.05, 3.0], [0.0, 3.0]])
+    collar = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.08], [0.0, 0.08]])
+    drafted = [DraftedOutline(name="neck band", points=band), DraftedOutline(name="collar, 2 times", points=collar)]
+    write_picture(tmp_path / "without.png", pieces)
+    figure = draw_figure(pieces, drafted=drafted)
+    write_figure(tmp_path / "with.png", figure)
+    without, whole = pixels_of(tmp_path / "without.png"), pixels_of(tmp_path / "with.png")
+    more = whole.shape[0] - without.shape[0]
+    assert more > 60
+    assert whole.shape[1] == without.shape[1]
+    words = {text.get_text() for text in figure.axes[0].texts}
+    assert {"neck band", "collar, 2 times"} <= words
+    # What is as long as three metres is drawn smaller, within the page; its outline is closed.
+    shapes = [patch.get_xy() for patch in figure.axes[0].patches if isinstance(patch, Polygon)][-2:]
+    assert np.ptp(shapes[0][:, 0]) < figure.get_size_inches()[0]
+    assert np.ptp(shapes[0][:, 0]) / np.ptp(shapes[1][:, 0]) == pytest.approx(10.0)
+    assert all(shape[:, 1].min() > 0.0 for shape in shapes)
 
 
 def test_a_picture_needs_a_piece(tmp_path: Path) -> None:

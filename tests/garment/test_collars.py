@@ -19,11 +19,18 @@ from warpflat.garment.openings import Buttons, Opening, part_at_centres
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form
 from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.fitting import drawn_length
+from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern
 from warpflat.pattern.sewing_order import sewing_steps
 
 BUTTONS = Opening(kind="buttons", line="centre front", length=np.inf, width=0.02, buttons=Buttons())
 ZIP = Opening(kind="zip", line="centre back", length=0.3)
+
+
+def drawn(edge: Edge) -> float:
+    """Return the length of an edge along the curve as which it is drawn."""
+    return drawn_length(edge.points)
 
 
 def flat(*openings: Opening) -> Garment:
@@ -75,7 +82,9 @@ def test_stand_goes_to_the_edges_of_the_button_stand_and_leans_to_the_neck(butto
     check_seams(pattern)
     stand, front, back = (pattern.piece(name, "") for name in ("collar_stand", "front_left", "back"))
     assert stand.quantity == 2
-    assert stand.edge("lower").length == pytest.approx(2.0 * front.edge("neck").length + back.edge("neck").length)
+    assert drawn(stand.edge("lower")) == pytest.approx(
+        2.0 * drawn(front.edge("neck")) + drawn(back.edge("neck")), abs=2e-6
+    )
     assert {"button"} == set(stand.marks)
     assert "buttonhole" in stand.internal_lines
     lower = stand.edge("lower").points
@@ -90,7 +99,7 @@ def test_outer_edge_of_a_shirt_collar_reaches_around_the_line_below_the_seam_of_
     pattern = with_neck(buttoned, style="shirt", width=0.03, fall=fall, point=0.07)
     check_seams(pattern)
     collar, stand = pattern.piece("collar", ""), pattern.piece("collar_stand", "")
-    assert collar.edge("lower").length == pytest.approx(stand.edge("upper").length)
+    assert drawn(collar.edge("lower")) == pytest.approx(drawn(stand.edge("upper")), abs=2e-5)
     # From one centre front to the other: the button stand lies beyond.
     assert stand.edge("lower").length - stand.edge("upper").length > 2.0 * BUTTONS.width
     chain = free_chain(pattern_of_garment({"": buttoned}, name="plain")[0], [("front_left", "neck"), ("back", "neck")])
@@ -126,12 +135,12 @@ def test_flat_collar_repeats_the_neckline_and_meets_in_front(plain: Garment):
     check_seams(pattern)
     collar = pattern.piece("collar", "")
     whole = sum(
-        edge.length
+        drawn(edge)
         for piece in ("front", "back")
         for edge in pattern.piece(piece, "").edges
         if edge.name.startswith("neck")
     )
-    assert collar.edge("lower").length == pytest.approx(whole)
+    assert drawn(collar.edge("lower")) == pytest.approx(whole, abs=2e-6)
     distance = shapely.LineString(collar.edge("lower").points).distance(
         shapely.points(collar.edge("upper").points[20:-20])
     )
@@ -159,12 +168,12 @@ def test_hood_goes_around_the_neck_and_over_the_head(plain: Garment, strip: floa
     check_seams(pattern)
     hood = pattern.piece("hood", "")
     whole = sum(
-        edge.length
+        drawn(edge)
         for piece in ("front", "back")
         for edge in pattern.piece(piece, "").edges
         if edge.name.startswith("neck")
     )
-    assert 2.0 * hood.edge("neck").length + strip == pytest.approx(whole, abs=1e-4)
+    assert 2.0 * drawn(hood.edge("neck")) + strip == pytest.approx(whole, abs=1e-4)
     assert plain.mannequin is not None
     head = plain.mannequin.extremity("head")
     assert head is not None
@@ -172,9 +181,35 @@ def test_hood_goes_around_the_neck_and_over_the_head(plain: Garment, strip: floa
     assert 2.0 * hood.edge("front edge").length + strip > head
     if strip:
         middle = pattern.piece("hood_strip", "")
-        assert middle.edge("right side").length == pytest.approx(hood.edge("crown").length)
+        assert middle.edge("right side").length == pytest.approx(drawn(hood.edge("crown")))
 
 
 def test_hood_needs_a_neckline_that_is_whole_behind(zipped: Garment):
     with pytest.raises(InputError, match="begins and ends at the centre front"):
         with_neck(zipped, kind="hood")
+
+
+def test_placket_opens_the_neck_in_front_and_its_strips_fill_a_box(plain: Garment):
+    wish = Finishing(
+        kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07)
+    )
+    garment = replace(plain, finishing=(wish,))
+    pattern = pattern_of_garment({"": garment}, name="garment")[0]
+    check_seams(pattern)
+    strips, front = pattern.piece("neck_placket", ""), pattern.piece("front", "")
+    assert strips.quantity == 2
+    assert np.ptp(strips.outline, axis=0) == pytest.approx([0.16, 0.06])
+    slit = next(line for name, line in front.internal_lines.items() if name.startswith("slit"))
+    assert np.linalg.norm(slit[1] - slit[0]) == pytest.approx(0.14, abs=1e-6)
+    # The box is as wide as a finished strip, with the slit in its middle.
+    low = front.internal_lines["placket 3"]
+    assert np.linalg.norm(low[1] - low[0]) == pytest.approx(0.03)
+    assert low.mean(axis=0) == pytest.approx(slit[1])
+    steps = " ".join(sewing_steps(draft_garment(pattern), ""))
+    assert "Sew a strip to each side of the marked box" in steps
+    assert "bind both their edges" not in steps
+    # Both edges of the slit widen the ring of the neck.
+    rings = {ring.name: ring for ring in garment.rings}
+    assert rings["neck"].opened == pytest.approx(0.28)
+    with pytest.raises(InputError, match="does not lie within 'front'"):
+        pattern_of_garment({"": replace(plain, finishing=(replace(wish, placket=0.9),))}, name="garment")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -92,3 +94,43 @@ def test_shaped_waistband_and_skirt_are_the_skirt_before():
     assert notch.length == pytest.approx(0.25 * whole, abs=1e-4)
     longest = max(line[:, 1].max() for line in rest.internal_lines.values())
     assert longest < 0.57 - 0.035
+
+
+def test_welt_has_its_place_and_its_bags():
+    pattern = add_pockets(skirt(), [replace(PATCH, kind="welt", welt=0.02)])
+    front = pattern.piece("front", "")
+    sides = [line for name, line in front.internal_lines.items() if name.startswith("pocket")]
+    assert sum(np.linalg.norm(side[1] - side[0]) for side in sides) == pytest.approx(2 * 2 * (0.12 + 0.02))
+    welt, bag = pattern.piece("front_pocket_welt", ""), pattern.piece("front_pocket_bag", "")
+    assert (welt.quantity, bag.quantity) == (2, 4)
+    assert np.ptp(welt.outline, axis=0) == pytest.approx([0.14, 0.04])
+
+
+def test_hip_pocket_cuts_the_corner_off_and_puts_a_facing_in_its_place():
+    whole = skirt()
+    area = shapely.Polygon(whole.piece("front", "").outline).area
+    waist = Seam(
+        name="waist seam",
+        sides=((SeamSide(piece="back", edge="waist"),), (SeamSide(piece="front", edge="waist"),)),
+    )
+    whole = replace(whole, seams=[*whole.seams, waist])
+    pattern = add_pockets(whole, [Pocket(kind="hip", where="side left", width=0.05, height=0.14)])
+    drafted = draft_garment(pattern)
+    assert all(seam.matches for seam in drafted.seams if seam.name != "side right")
+    lost = area - shapely.Polygon(pattern.piece("front", "").outline).area
+    # On both sides, about a triangle each.
+    assert lost == pytest.approx(2 * 0.5 * 0.05 * 0.14, rel=0.1)
+    for side in ("", " 2"):
+        facing, bag = (pattern.piece(f"front_pocket_{what}{side}", "") for what in ("facing", "bag"))
+        corner = shapely.Polygon(facing.outline).area - shapely.Polygon(bag.outline).area
+        assert corner == pytest.approx(0.5 * lost, rel=0.02)
+    seams = {seam.name: seam for seam in pattern.seams}
+    assert {"pocket opening", "pocket bag"} <= seams.keys()
+    # Front and facing together are as long as before in the waist's seam.
+    parts = [pattern.piece(part.piece, "").edge(part.edge).length for part in seams["waist seam"].sides[1]]
+    assert len(parts) == 3
+    assert sum(parts) == pytest.approx(whole.piece("front", "").edge("waist").length, abs=1e-5)
+    with pytest.raises(InputError, match="'side middle'"):
+        add_pockets(whole, [Pocket(kind="hip", where="side middle", width=0.05, height=0.14)])
+    with pytest.raises(InputError, match="which is"):
+        add_pockets(whole, [Pocket(kind="hip", where="side left", width=0.05, height=0.7)])

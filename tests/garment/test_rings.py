@@ -12,7 +12,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.garment.girths import pattern_girths
 from warpflat.garment.rings import GarmentRing, measure_rings, rings_line
 from warpflat.mannequin.darts import FormDart
-from warpflat.mannequin.forms import FormResult, shipped_form
+from warpflat.mannequin.forms import Form, FormResult, PieceRecipe, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 
 
@@ -55,6 +55,23 @@ def test_what_passes_depends_on_how_the_garment_is_put_on(mannequin: Mannequin):
     assert skirt["waist"].girth == pytest.approx(0.96, abs=1e-3)
     sleeve = rings_of(mannequin, "tshirt")["biceps left"]
     assert (sleeve.over, sleeve.passes) == ("elbow left", True)
+
+
+def test_a_suit_with_legs_is_stepped_into(mannequin: Mannequin):
+    pieces = {
+        f"{face}_{side}": PieceRecipe(
+            bricks=(f"shoulder-hip/{face}-{side}-*", f"crotch-leg_ankle/leg-{side}-{face}"),
+            datum=f"princess {face} {side}",
+        )
+        for face in ("front", "back")
+        for side in ("left", "right")
+    }
+    form = mannequin.form(Form(name="suit", pieces=pieces))
+    placed = on_body(form)
+    girths = pattern_girths(mannequin, form, placed)
+    rings = {r.name: r for r in measure_rings(mannequin, form, placed, strain_limit=0.05, girths=girths)}
+    assert (rings["neck"].over, rings["waist"].over) == ("hip", "hip")
+    assert rings["neck"].passes is False
 
 
 def test_opening_that_is_needed_lets_the_ring_pass():

@@ -18,6 +18,7 @@ from warpflat.garment.strips import Strip, swept
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import Form, shipped_form
 from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.fitting import drawn_length
 from warpflat.pattern.pieces import Pattern
 from warpflat.pattern.sewing_order import notions, sewing_steps
 
@@ -57,7 +58,7 @@ def lengths(pattern: Pattern) -> Mapping[str, tuple[float, float]]:
 @pytest.mark.parametrize("even", [True, False])
 def test_curved_strip_has_the_length_of_its_edge_and_its_outer_edge_follows_from_the_turn(turn: float, even: bool):
     lower, upper = swept(Strip(length=0.4, height=0.04, turn=turn, even=even))
-    assert polyline_length(lower) == pytest.approx(0.4)
+    assert drawn_length(lower) == pytest.approx(0.4, abs=2e-5)
     assert polyline_length(upper) == pytest.approx(0.4 - 2.0 * turn * 0.04, rel=1e-3)
     assert np.linalg.norm(upper - lower, axis=1) == pytest.approx(0.04)
 
@@ -146,3 +147,21 @@ def test_casing_is_turned_in_and_has_an_elastic_of_the_body(half_skirt: Garment)
     assert any("elastic" in notion for notion in notions(drafted, ""))
     with pytest.raises(InputError, match="no free edge 'hip'"):
         finished(half_skirt, Finishing(kind="casing", edge="hip", width=0.03, elastic=0.9))
+
+
+def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
+    wish = Finishing(kind="ruffle", edge="knee", width=0.2, share=3.0, pleat=0.05)
+    pattern = finished(half_skirt, wish)
+    ruffle = pattern.piece("knee_ruffle", "")
+    whole = ruffle.edge("lower").length
+    folds = sorted(line[0, 0] for name, line in ruffle.internal_lines.items() if name.startswith("pleat fold"))
+    ends = sorted(line[0, 0] for name, line in ruffle.internal_lines.items() if name.startswith("pleat lies"))
+    # The first fold is the end of the strip.
+    count = len(ends)
+    assert count == len(folds) + 1 == round(whole / 3.0 / 0.05)
+    starts = np.array([0.0, *folds])
+    assert np.diff(starts) == pytest.approx(whole / count)
+    # A third of each stays visible.
+    assert np.array(ends) - starts == pytest.approx(2.0 / 3.0 * whole / count)
+    assert "Lay the pleats" in " ".join(sewing_steps(draft_garment(pattern), ""))
+    lengths(pattern)

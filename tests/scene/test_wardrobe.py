@@ -47,6 +47,9 @@ def test_every_option_makes_a_valid_scene_of_its_own(name: str):
         ("circle_skirt", {"skirt": "circle"}, {"front_hip_flounce", "back_hip_flounce", "waistband"}),
         ("pyjama_trousers", {"hem": "rib"}, {"ankle_band"}),
         ("shift_dress", {"hem": "ruffle", "collar": "flat"}, {"knee_ruffle", "collar", "armhole_binding"}),
+        ("polo", {}, {"neck_placket", "collar"}),
+        ("jeans", {}, {"front_left_pocket_facing", "front_left_pocket_bag", "back_left_pocket", "yoke_left"}),
+        ("leggings", {}, {"leg_left", "abdomen_band"}),
     ],
 )
 def test_garment_comes_out_whole(name: str, chosen: dict[str, str], pieces: set[str]):
@@ -73,8 +76,21 @@ def test_unknown_names_are_told_with_the_nearest():
 
 @pytest.mark.parametrize(
     "name",
-    ["shirt", "hoodie", "sweatshirt", "shirt_dress", "circle_dress", "circle_skirt", "pencil_skirt", "pyjama_trousers"],
+    [
+        *(
+            "shirt",
+            "hoodie",
+            "sweatshirt",
+            "shirt_dress",
+            "circle_dress",
+            "circle_skirt",
+            "pencil_skirt",
+            "pyjama_trousers",
+        ),
+    ],
 )
 def test_shipped_scene_is_what_the_command_writes(name: str):
-    written = scene_text(garment_offer(name), {"size": "EU 38"}, {}, file=f"scenes/{name}.toml")
+    written = scene_text(
+        garment_offer(name), {} if name == "tote" else {"size": "EU 38"}, {}, file=f"scenes/{name}.toml"
+    )
     assert (SCENES / f"{name}.toml").read_text(encoding="utf-8") == written

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -24,6 +24,9 @@ __all__ = ["new"]
 @click.option("--measure", "measures", multiple=True, metavar="NAME=METRES", help="A measurement, such as bust=0.88.")
 @click.option("--scan", type=click.Path(path_type=Path), metavar="FILE", help="The mesh of a standing body.")
 @click.option("--fabric", metavar="NAME", help="Another cloth than the garment's own.")
+@click.option(
+    "--card", type=click.Path(path_type=Path), metavar="FILE", help="Draw a measurement card, a PNG, and nothing else."
+)
 @click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="[default: GARMENT.toml]")
 def new(
     words: tuple[str, ...],
@@ -31,11 +34,13 @@ def new(
     measures: tuple[str, ...],
     scan: Path | None,
     fabric: str | None,
+    card: Path | None,
     out: Path | None,
 ) -> int:
     """Write the scene of a garment for a size, for measurements or for a body scan.
 
-    Without a garment the garments are listed. Without a body the choices of a garment are listed, and nothing is written.
+    Without a garment the garments are listed. Without a body the choices of a garment are listed, and nothing is written. Besides its
+    own choices each garment takes the style keys that make sense on it: a length, a neckline, flare, a closure, ease at a level.
 
     \b
     Examples:
@@ -43,18 +48,20 @@ def new(
       warpflat new shirt
       warpflat new shirt --size "EU 38" --collar stand --sleeve long --ease loose
       warpflat new shift_dress --size "EU 38" --measure waist=0.76 -o my_dress.toml
+      warpflat new shift_dress --size "EU 38" --length knee+6 --neck-depth 8 --ease-waist 12
       warpflat new hoodie --scan body.obj
+      warpflat new shirt --card shirt_card.png
     """
-    from warpflat.cli.mannequin import read_lengths
     from warpflat.core.output import atomic_path
     from warpflat.core.toml_file import check_table
     from warpflat.fabric.library import find_fabric, load_library
     from warpflat.mannequin.table import MannequinTable, mannequin_from_table
-    from warpflat.scene.wardrobe import garment_offer, offers, scene_text, taken_options
+    from warpflat.scene.style import STYLE_KEYS, style_options
+    from warpflat.scene.wardrobe import garment_offer, offer_tables, offers, scene_text, style_of, taken_options
 
     name, chosen = _read_choices(words)
     if name is None:
-        if chosen or size or measures or scan or fabric or out:
+        if chosen or size or measures or scan or fabric or card or out:
             raise InputError(f"name a garment: {', '.join(offers())}")
         width = max(map(len, offers()))
         for offer in offers().values():
@@ -62,29 +69,38 @@ def new(
         click.echo(f"{'':<{width}}  warpflat new GARMENT lists what can be chosen")
         return DONE
     offer = garment_offer(name)
-    taken = taken_options(offer, chosen)
+    taken = taken_options(offer, style_of(offer, chosen)[0])
+    tables = offer_tables(offer, chosen)
     if fabric is not None:
         find_fabric(fabric, load_library(()))
-    if size is None and not measures and scan is None:
-        if chosen or fabric or out:
+    if card is not None:
+        if not offer.on_body:
+            raise InputError(f"a {offer.name} lies on no body; leave out --card")
+        if out is not None or fabric is not None:
+            raise InputError("--card draws a measurement card and writes no scene; leave out --out and --fabric")
+        _write_card(card, offer.name, tables, _body_table(size, measures, scan, card))
+        click.echo(f"wrote {card}: what to measure for {offer.name.replace('_', ' ')}, and where")
+        return DONE
+    if size is None and not measures and scan is None and (offer.on_body or out is None):
+        if offer.on_body and (chosen or fabric or out):
             raise InputError('say whom it is for: --size "EU 38", --measure bust=0.90 or --scan body.obj')
         click.echo(f"{offer.name}: {offer.about}")
         _print_choices(offer, taken)
-        click.echo(f'write it with: warpflat new {offer.name} --size "EU 38"')
+        for key, values in style_options(tables).items() if offer.on_body else ():
+            click.echo(f"    --{key} ({values}): {STYLE_KEYS[key]}")
+        own = '--size "EU 38"' if offer.on_body or offer.of_body else f"-o {offer.name}.toml"
+        click.echo(f"write it with: warpflat new {offer.name} {own}")
         return DONE
     file = out or Path(f"{offer.name}.toml")
     if file.exists() or file.is_symlink():
         raise InputError(f"{file}: exists and is kept; name another file with -o")
-    table: dict[str, object] = {}
-    if size is not None:
-        table["size"] = size
-    if measures:
-        table["measurements"] = read_lengths(measures, "--measure")
-    if scan is not None:
-        # Scenes start from their own folder.
-        table["scan"] = Path(os.path.relpath(scan, file.parent)).as_posix()
-    body = check_table(MannequinTable, table, "command line")
-    if scan is None:
+    table = _body_table(size, measures, scan, file)
+    if not offer.on_body and (scan is not None or (table and not offer.of_body)):
+        raise InputError(f"a {offer.name} lies on no body; leave out {'--scan' if scan else '--size and --measure'}")
+    body = check_table(MannequinTable, table, "command line") if table else None
+    if body is None:
+        pass
+    elif scan is None:
         mannequin_from_table(body, path_of=Path)
     elif not scan.is_file():
         raise InputError(f"{scan}: no such file; give the mesh of a standing body, OBJ, PLY, STL, OFF or GLB")
@@ -96,6 +112,50 @@ def new(
     _print_choices(offer, taken)
     click.echo(f"make its pattern with: warpflat run {file}")
     return DONE
+
+
+def _body_table(size: str | None, measures: tuple[str, ...], scan: Path | None, file: Path) -> dict[str, Any]:
+    """Return the table of the body, as a scene in a file has it."""
+    from warpflat.cli.mannequin import read_lengths
+
+    table: dict[str, Any] = {}
+    if size is not None:
+        table["size"] = size
+    if measures:
+        table["measurements"] = read_lengths(measures, "--measure")
+    if scan is not None:
+        # Scenes start from their own folder.
+        table["scan"] = Path(os.path.relpath(scan, file.parent)).as_posix()
+    return table
+
+
+def _write_card(card: Path, garment: str, tables: Mapping[str, Any], table: Mapping[str, Any]) -> None:
+    """Draw the measurement card of a garment, with the values of a body that is given.
+
+    Raises:
+        InputError: the file exists or cannot be written, or there is no such body.
+    """
+    from warpflat.core.toml_file import check_table
+    from warpflat.mannequin.card import needed_measurements, write_measurement_card
+    from warpflat.mannequin.table import MannequinTable, mannequin_from_table
+    from warpflat.scene.style import covered_bands
+
+    if card.exists() or card.is_symlink():
+        raise InputError(f"{card}: exists and is kept; name another file")
+    if card.suffix.lower() != ".png":
+        raise InputError(f"{card}: a card is a picture; name it *.png")
+    if "scan" in table:
+        raise InputError("--card is for a tape measure; a scan is measured by itself: leave out --scan")
+    body = check_table(MannequinTable, {**(table or {"size": "EU 38"}), "resolution_mm": 12.0}, "command line")
+    mannequin = mannequin_from_table(body, path_of=Path)
+    hood = any(wish["kind"] == "hood" for wish in tables.get("finishing", ()))
+    given = set(table.get("measurements", ()))
+    guessed = {note.split(" = ")[0] for note in mannequin.notes} - given
+    card.parent.mkdir(parents=True, exist_ok=True)
+    write_measurement_card(
+        card, mannequin, needed_measurements(covered_bands(tables), hood=hood),
+        title=f"What to measure: {garment.replace('_', ' ')}", values=mannequin.lengths if table else None, guessed=guessed,
+    )  # fmt: skip
 
 
 def _read_choices(words: tuple[str, ...]) -> tuple[str | None, dict[str, str]]:

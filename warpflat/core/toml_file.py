@@ -22,7 +22,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Table", "check_table", "document_as_toml", "read_toml", "tables_as_toml"]
+__all__ = ["Table", "check_table", "document_as_toml", "laid_over", "read_toml", "tables_as_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -190,3 +190,21 @@ def _exact(value: Any) -> str:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return f"[{', '.join(map(_exact, value))}]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)
+
+
+def laid_over(base: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table with another one laid over it: tables are merged, lists of tables put together, other values replaced."""
+    found = dict(base)
+    for key, value in other.items():
+        own = found.get(key)
+        if isinstance(own, Mapping) and isinstance(value, Mapping):
+            found[key] = laid_over(own, value)
+        elif (
+            isinstance(own, list)
+            and isinstance(value, list)
+            and all(isinstance(each, Mapping) for each in (*own, *value))
+        ):
+            found[key] = [*own, *value]
+        else:
+            found[key] = value
+    return found

@@ -18,6 +18,7 @@ from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
 from warpflat.export.figure import DPI, GREY, MARGIN, PAGE_WIDTH, POINT, Pen, Pixels, new_figure, write_figure
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
+from warpflat.export.picture_drafted import DraftedOutline, DraftedRows
 from warpflat.export.picture_garment import Body, GarmentViews
 from warpflat.export.picture_page import CAPTIONS_ALONE, STRIP, Cell, draw_cell, draw_scale_bar, lay_out
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
@@ -70,6 +71,7 @@ def write_picture(
     quantity: str = "strain energy density",
     scale: float | None = None,
     body: Body | None = None,
+    drafted: Sequence[DraftedOutline] = (),
 ) -> None:
     """Draw every piece on the body and as pattern, at one scale of length and one of energy; atomically.
 
@@ -80,13 +82,14 @@ def write_picture(
         body: on which all pieces are shown together first, from the front, the side and the back. If not given, each piece is
             shown in space beside its pattern.
         scale: upper end of the colours [J/m2]; if not given, 98 % of the area of all pieces lies below it.
+        drafted: pieces without a surface, as collars and waistbands: their outlines stand below the others.
 
     Raises:
         InputError: the file cannot be written.
         ValueError: there is no piece.
     """
     report_activity(f"drawing {Path(path).name}")
-    write_figure(path, draw_figure(pieces, quantity=quantity, scale=scale, body=body))
+    write_figure(path, draw_figure(pieces, quantity=quantity, scale=scale, body=body, drafted=drafted))
 
 
 @all_letters()
@@ -96,6 +99,7 @@ def draw_figure(
     quantity: str = "strain energy density",
     scale: float | None = None,
     body: Body | None = None,
+    drafted: Sequence[DraftedOutline] = (),
 ) -> Any:
     """Return the Matplotlib figure that :func:`write_picture` saves; see there for the arguments.
 
@@ -130,7 +134,8 @@ def draw_figure(
         words + (MARGIN if _is_flat(scale, density) else 0.15 + _SHORTEST_BAR + _right_of_bar(scale, density))
     )
     width, height, page_scale = lay_out(pen, cells, worn, narrowest=narrowest)
-    height += STRIP
+    rows = DraftedRows(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else None
+    height += STRIP + (0.0 if rows is None else rows.height)
     figure.set_size_inches(width, height)
     pen.open_page()
     if not alone:
@@ -142,6 +147,8 @@ def draw_figure(
         worn.draw(pen, MARGIN, top, scale)
     for cell in cells:
         draw_cell(pen, cell, top, scale, page_scale)
+    if rows is not None:
+        rows.draw(pen, MARGIN, rows.height)
     return figure
 
 

@@ -32,6 +32,7 @@ from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.export.picture import PicturePiece
+    from warpflat.export.picture_drafted import DraftedOutline
     from warpflat.export.picture_garment import Body
 
 __all__ = ["Flattening", "run_metrics", "write_files"]
@@ -328,7 +329,13 @@ def run_metrics(
 
 
 def write_files(
-    results: Sequence[Flattening], folder: Path, *, picture: bool, frames: bool, body: Body | None = None
+    results: Sequence[Flattening],
+    folder: Path,
+    *,
+    picture: bool,
+    frames: bool,
+    body: Body | None = None,
+    drafted: Sequence[DraftedOutline] = (),
 ) -> list[str]:
     """Write the files of several pieces, but not `metrics.json`, and return their names; a picture or film that fails is left out.
 
@@ -338,6 +345,7 @@ def write_files(
         picture: whether to draw one.
         frames: whether to write a USD file with the development and the pattern.
         body: on which the picture shows them first; none if not given.
+        drafted: pieces without a surface that the picture shows, too.
 
     Raises:
         InputError: the folder cannot be written.
@@ -371,7 +379,7 @@ def write_files(
         with optional_file(folder / "picture.png", files) as path:
             from warpflat.export.picture import write_picture
 
-            write_picture(path, [result.picture_piece() for result in results], body=body)
+            write_picture(path, [result.picture_piece() for result in results], body=body, drafted=drafted)
     return files
 
 

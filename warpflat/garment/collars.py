@@ -16,14 +16,17 @@ from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_leng
 from warpflat.core.text import find_unused_name
 from warpflat.garment.button_stand import buttonhole
 from warpflat.garment.free_edges import (
+    OFF_END,
     Break,
     FreeChain,
     chain_length,
     free_chains,
     joined_line,
+    marks_of,
     split_edge,
 )
 from warpflat.garment.strips import Strip, strip_edges, swept
+from warpflat.pattern.fitting import drawn_length
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
@@ -45,8 +48,6 @@ _LEAN = 0.010
 _HOOD_HIGH, _HOOD_WIDE, _HOOD_TURN = 0.62, 0.44, 0.25
 # Hem of a hood's front edge, through which a cord may run [m].
 _HOOD_HEM = 0.030
-# A centre line ends on an edge, and off the ends of it, within these distances [m].
-_ON_EDGE, _OFF_END = 1e-3, 2e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +72,12 @@ class Collar:
 
 
 def with_collar(
-    pattern: Pattern, places: Sequence[tuple[str, str]], collar: Collar, *, gaps: Collection[str] = ()
+    pattern: Pattern,
+    places: Sequence[tuple[str, str]],
+    collar: Collar,
+    *,
+    gaps: Collection[str] = (),
+    breaks: Sequence[Break] = (),
 ) -> Pattern:
     """Return a pattern with a collar along its neckline: upper and under collar, or both layers of a stand.
 
@@ -80,20 +86,21 @@ def with_collar(
         places: pieces and edges of the neckline.
         collar: what it is like.
         gaps: names of seams that an opening leaves open there.
+        breaks: ends of edges at which a placket opens it.
 
     Raises:
         InputError: the neckline is closed or opens behind, where the collar needs an opening in front, or the collar cannot be drawn.
     """
-    closed = any(chain.closed for chain, _ in free_chains(pattern, places, gaps))
+    closed = any(chain.closed for chain, _ in free_chains(pattern, places, gaps, breaks))
     if closed and collar.style != "flat":
         raise InputError(
             f'a {collar.style} collar needs an opening in front, as [[openings]] kind = "buttons", seam = "centre front"; a neck '
             'that is closed can have style = "flat", or "turtleneck" in a knit'
         )
-    breaks: list[Break] = []
     if collar.style in ("flat", "convertible"):
         # It ends at the centre front: a button stand lies beyond it.
-        pattern, breaks, places = _parted_at(pattern, places, "centre front")
+        pattern, parted, places = _parted_at(pattern, places, "centre front")
+        breaks = [*breaks, *parted]
     chains = [chain for chain, _ in free_chains(pattern, places, gaps, breaks)]
     lengths = [chain_length(pattern, chain) for chain in chains]
     chains = [chain for chain, length in zip(chains, lengths, strict=True) if length > 0.5 * max(lengths)]
@@ -107,8 +114,7 @@ def with_collar(
             f'a {collar.style} collar opens in front, and this neckline behind; take style = "stand" or "flat"'
         )
     if collar.style == "flat":
-        line = {size: joined_line(pattern, chain, size, lapped=_LAPPED) for size in pattern.pieces}
-        edges = {size: _flat_edges(line[size], collar.width, _allowance(pattern, chain, size)) for size in line}
+        edges = {size: _flat_edges(pattern, chain, size, collar.width) for size in pattern.pieces}
         pattern, name = _add(pattern, "collar", edges, quantity=2)
     elif collar.style == "convertible":
         edges = {}
@@ -133,7 +139,7 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
     for size in pattern.pieces:
         length, high = chain_length(pattern, chain, size), collar.width
         allowance = _allowance(pattern, chain, size)
-        centres = _marks_of(pattern, chain, size, "centre front")
+        centres = marks_of(pattern, chain, size, "centre front")
         beyond = min((at for at in (*centres, *(length - c for c in centres)) if at < 0.25 * length), default=0.0)
         lower, upper = swept(Strip(length=length, height=high, turn=6.0 * collar.rise / length))
         # The fall ends at the centre front, the stand at the end of the button stand.
@@ -168,7 +174,7 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
                     f"the fall of a shirt collar hides the seam of its stand: fall_mm = {1e3 * collar.fall:g} must be at least "
                     f"{1e3 * _COVERS:g} more than width_mm = {1e3 * high:g}"
                 )
-            sewn = polyline_length(parts[1])
+            sewn = drawn_length(parts[1])
             back, grown = _rests_on(pattern, chain, size, covers)
             # The upper edge of the stand is shorter than the neckline there.
             middle = slice(*(round(count * (0.5 + sign * 0.5 * back / length)) for sign in (-1.0, 1.0)))
@@ -193,12 +199,7 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
 def _with_flat_halves(pattern: Pattern, chains: tuple[FreeChain, FreeChain], collar: Collar) -> Pattern:
     """Return a pattern with a flat collar in two halves, which meet in front and leave the back open."""
     first, second = chains
-    edges = {
-        size: _flat_edges(
-            joined_line(pattern, first, size, lapped=_LAPPED), collar.width, _allowance(pattern, first, size)
-        )
-        for size in pattern.pieces
-    }
+    edges = {size: _flat_edges(pattern, first, size, collar.width) for size in pattern.pieces}
     pattern, name = _add(pattern, "collar", edges, quantity=4, paired=True)
     pattern = _sewn_on(pattern, first, name, layers=("right end", "upper", "left end"))
     other = (SeamSide(piece=name, edge="lower", reversed=True, mirrored=True),)
@@ -255,7 +256,7 @@ def with_hood(
             Edge(name="crown", points=crown, allowance=allowance),
         ]
         if strip:
-            length = polyline_length(crown)
+            length = drawn_length(crown)
             corners = np.array([[0.0, 0.0], [strip, 0.0], [strip, length], [0.0, length]])
             names = ("neck", "right side", "front edge", "left side")
             crowns[size] = [
@@ -291,9 +292,9 @@ def _parted_at(
     breaks, now = list[Break](), list(places)
     for name, edge in places:
         side = FreeChain(sides=(SeamSide(piece=name, edge=edge),), closed=False)
-        at = {size: _marks_of(pattern, side, size, line) for size in pattern.pieces}
+        at = {size: marks_of(pattern, side, size, line) for size in pattern.pieces}
         lengths = {size: pattern.piece(name, size).edge(edge).length for size in pattern.pieces}
-        if any(len(row) != 1 or not _OFF_END < row[0] < lengths[size] - _OFF_END for size, row in at.items()):
+        if any(len(row) != 1 or not OFF_END < row[0] < lengths[size] - OFF_END for size, row in at.items()):
             continue
         known = {each.name for each in pattern.piece(name, pattern.sample).edges}
         pattern, broken = split_edge(pattern, (name, edge), {size: row[0] for size, row in at.items()})
@@ -302,29 +303,10 @@ def _parted_at(
     return pattern, breaks, now
 
 
-def _marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[float]:
-    """Return where along a chain a line of its pieces, inside or on their border, meets it [m]."""
-    import shapely
-
-    found, before = list[float](), 0.0
-    for side in chain.sides:
-        piece = pattern.piece(side.piece, size)
-        points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
-        drawn = shapely.LineString(points)
-        known = {**piece.internal_lines, **{each.name: each.points for each in piece.edges if each.name != side.edge}}
-        lines = [each for name, each in known.items() if name.rstrip(" 0123456789") == line]
-        for end in (shapely.Point(each[k]) for each in lines for k in (0, -1)):
-            at = before + float(drawn.project(end))
-            if drawn.distance(end) < _ON_EDGE and all(abs(at - other) > _OFF_END for other in found):
-                found.append(at)
-        before += polyline_length(points)
-    return sorted(found)
-
-
 def _ends_in_front(pattern: Pattern, chain: FreeChain) -> bool:
     """Return whether the centre front lies in the first or the last quarter of a chain, or at its ends."""
     length = chain_length(pattern, chain)
-    return any(min(at, length - at) < 0.25 * length for at in _marks_of(pattern, chain, pattern.sample, "centre front"))
+    return any(min(at, length - at) < 0.25 * length for at in marks_of(pattern, chain, pattern.sample, "centre front"))
 
 
 def _rests_on(pattern: Pattern, chain: FreeChain, size: str, below: float) -> tuple[float, float]:
@@ -344,12 +326,14 @@ def _rests_on(pattern: Pattern, chain: FreeChain, size: str, below: float) -> tu
     return polyline_length(back), float(offset.length)
 
 
-def _flat_edges(line: FloatArray, width: float, allowance: float) -> list[Edge]:
+def _flat_edges(pattern: Pattern, chain: FreeChain, size: str, width: float) -> list[Edge]:
     """Return the edges of a collar that lies flat around a neckline, with round corners."""
     import shapely
 
+    line, length = joined_line(pattern, chain, size, lapped=_LAPPED), chain_length(pattern, chain, size)
+    line = line * (length / drawn_length(line))
     outer = np.asarray(shapely.LineString(line).offset_curve(width).simplify(2e-5).coords)
-    return strip_edges(line, outer, rounded=_ROUND * width, allowance=_all_around(allowance))
+    return strip_edges(line, outer, rounded=_ROUND * width, allowance=_all_around(_allowance(pattern, chain, size)))
 
 
 def _all_around(allowance: float) -> dict[str, float]:

@@ -18,7 +18,7 @@ from warpflat.garment.fullness import FullEdge
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
     from warpflat.mannequin.pieces import FormPiece
-    from warpflat.pattern.pieces import Seam
+    from warpflat.pattern.pieces import Seam, SeamSide
 
 __all__ = ["CAP_PART", "SeamRatios", "SeamWish", "cap_wishes", "measure_ease", "seam_ratios"]
 
@@ -108,7 +108,9 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
                 continue  # as long as on the body: nothing to ease in
             here = form.seams[number]
             if wish.upper and name in caps and longer == 1 and not wish.gathered:
-                eased[name] = CAP_PART
+                eased[name] = _along_seam(
+                    caps[name].sides[1][0], _cap_part(form.pieces[here.pieces[side]], here.runs[0].edges[side])
+                )
                 # By what factors the mesh edges of each run of a cap's seam are longer than the armhole's, and where
                 # it is full.
                 factors, edges = list[FloatArray](), list[FullEdge]()
@@ -116,7 +118,7 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
                 for run in here.runs:
                     cap, row = piece.edges[run.edges[side]], run.vertices[side]
                     shares = _shares(piece, cap)
-                    part = _part(shares)
+                    part = _part(shares, _cap_part(piece, run.edges[side]))
                     place = dict(zip(cap.tolist(), shares.tolist(), strict=True))
                     share = np.array([place[vertex] for vertex in row.tolist()])
                     factors.append(_factors(share, wish.factor, part))
@@ -176,9 +178,23 @@ def _shares(piece: FormPiece, row: IntArray) -> FloatArray:
     return np.asarray(arc / arc[-1])
 
 
-def _part(shares: FloatArray) -> tuple[float, float]:
-    """Return the shares of the vertices of a cap that are nearest to `CAP_PART`: within a mesh edge the ease is even."""
-    first, last = (float(shares[np.abs(shares - share).argmin()]) for share in CAP_PART)
+def _cap_part(piece: FormPiece, edge: str) -> tuple[float, float]:
+    """Return the shares of a cap's length between which it is eased in; of one that is parted over the arm, those of its half."""
+    over = piece.edges.get(edge.replace("armhole", "overarm"))
+    if over is None:
+        return CAP_PART
+    at_end = piece.edges[edge][-1] in (over[0], over[-1])
+    return (2.0 * CAP_PART[0], 1.0) if at_end else (0.0, 1.0 - 2.0 * CAP_PART[0])
+
+
+def _along_seam(cap: SeamSide, part: tuple[float, float]) -> tuple[float, float]:
+    """Return shares along a cap as shares along its seam, which may run the other way."""
+    return (1.0 - part[1], 1.0 - part[0]) if cap.reversed else part
+
+
+def _part(shares: FloatArray, wanted: tuple[float, float]) -> tuple[float, float]:
+    """Return the shares of the vertices of a cap that are nearest to those wanted: within a mesh edge the ease is even."""
+    first, last = (float(shares[np.abs(shares - share).argmin()]) for share in wanted)
     return first, last
 
 
@@ -212,9 +228,12 @@ def measure_ease(
         (cap,) = seam.sides[1]
         row = form.pieces[cap.piece].edges[cap.edge]
         share = _shares(form.pieces[cap.piece], row)
-        part, lengths = _part(share), np.diff(arc_lengths(positions[cap.piece][row]))
+        part, lengths = (
+            _part(share, _cap_part(form.pieces[cap.piece], cap.edge)),
+            np.diff(arc_lengths(positions[cap.piece][row])),
+        )
         armhole = np.concatenate([[0.0], np.cumsum(lengths / _factors(share, 1.0 + wished.ease[seam.name], part))])
         first, last = np.interp(part, share, armhole / armhole[-1])
-        eased[seam.name] = float(first), float(last)
+        eased[seam.name] = _along_seam(cap, (float(first), float(last)))
         ease[seam.name] = float(lengths.sum() / armhole[-1] - 1.0)
     return ease, eased

@@ -14,12 +14,12 @@ from warpflat.garment.collars import Collar, with_collar, with_hood
 from warpflat.garment.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
 from warpflat.garment.flounces import with_flounce
 from warpflat.garment.free_edges import Break, FreeChain, chain_length, free_chains
-from warpflat.garment.plackets import with_slits
+from warpflat.garment.plackets import with_placket, with_slits
 from warpflat.garment.shaped_band import shortened, with_shaped_waistband
 from warpflat.garment.strips import Strip, strip_edges, swept
 from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamSide
 
-__all__ = ["FINISHES", "Finishing", "finish_edges"]
+__all__ = ["FINISHES", "Finishing", "finish_edges", "with_plackets"]
 
 #: By kind the width of a finishing piece [m]; of what is folded that of the finished piece, which is cut twice as wide.
 FINISHES = {
@@ -62,7 +62,8 @@ class Finishing:
         shaped: whether a waistband is cut from the upper strip of the pieces, as curved as they are, not straight.
         shorten: by how much the pieces end before the edge, since the strip takes the place [m].
         elastic: length of the elastic in a folded strip or casing, as a share of the body's girth there; 0 where there is none.
-        placket: length of a slit that opens the edge [m].
+        placket: length of a slit that opens the edge [m]; below a collar in the centre front.
+        pleat: visible width of a pleat of a ruffle that is laid in pleats, not gathered [m]; 0 for none.
         turns: how much of a circle a flounce is; more than one overlaps itself and is cut in pieces.
         collar: what a collar or hood is like.
     """
@@ -76,6 +77,7 @@ class Finishing:
     shorten: float = 0.0
     elastic: float = 0.0
     placket: float = 0.0
+    pleat: float = 0.0
     turns: float = 0.5
     collar: Collar | None = None
 
@@ -138,7 +140,11 @@ def finish_edges(
                 heads = {size: _girth_at(size, ["head"], girths or {}) for size in pattern.pieces}
                 pattern = with_hood(pattern, places, wish.collar, heads, gaps=gaps)
             elif wish.collar is not None and wish.collar.style != "turtleneck":
-                pattern = with_collar(pattern, places, wish.collar, gaps=gaps)
+                breaks: list[Break] = []
+                if wish.placket:
+                    pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
+                    pattern, places = _opened_up(pattern, wish.edge)
+                pattern = with_collar(pattern, places, wish.collar, gaps=gaps, breaks=breaks)
             elif wish.kind == "flounce":
                 for chain, _ in free_chains(pattern, places, gaps):
                     pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge)
@@ -147,7 +153,7 @@ def finish_edges(
             elif wish.shaped:
                 pattern = with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
             else:
-                breaks: list[Break] = []
+                breaks = []
                 if wish.placket:
                     pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
                     pattern, places = _opened_up(pattern, wish.edge)
@@ -156,6 +162,15 @@ def finish_edges(
         except InputError as error:
             raise InputError(f"finishing[{number}]: {error}") from None
     return pattern
+
+
+def with_plackets(opened: Mapping[str, float], finishing: Sequence[Finishing]) -> dict[str, float]:
+    """Return what openings add to rings [m], with both edges of the plackets below collars."""
+    found = dict(opened)
+    for wish in finishing:
+        if wish.kind == "collar" and wish.placket:
+            found[wish.edge] = found.get(wish.edge, 0.0) + 2.0 * wish.placket
+    return found
 
 
 def _opened_up(pattern: Pattern, called: str) -> tuple[Pattern, list[tuple[str, str]]]:
@@ -289,6 +304,17 @@ def _strip(
     edges = strip_edges(*swept(Strip(length=length, height=high)), overlap=wish.overlap, kinds=kinds, allowance=widths)
     middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if along[1] == 0.0 else high)
     lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
+    if wish.pleat:
+        # Knife pleats: each begins where it is folded, and is laid to the next line.
+        count = max(2, round(length / wish.share / wish.pleat))
+        for number in range(count):
+            start = number * length / count
+            for what, x in (
+                ("pleat fold", start),
+                ("pleat lies here", start + length / count * (1.0 - 1.0 / wish.share)),
+            ):
+                if x > 0.0:
+                    lines[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
     marks = {}
     if wish.kind == "cuff" and wish.overlap:
         # It buttons upon itself, in the middle of its outer half.

@@ -66,7 +66,7 @@ def with_flounce(pattern: Pattern, chain: FreeChain, width: float, turns: float,
         panels[name] = title, ends
         for size, row in pieces.items():
             piece = pattern.piece(name, size)
-            length = sum(piece.edge(side.edge).length for side in own)
+            length = chain_length(pattern, FreeChain(sides=tuple(own), closed=False), size)
             turn = 2.0 * np.pi * turns * length / chain_length(pattern, chain, size)
             folded = [piece.edge(each).kind == "fold" for each in beside]
             if turn * (1 + any(folded)) > _MOST_TURN:

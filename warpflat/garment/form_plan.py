@@ -287,7 +287,7 @@ def _plan_seams(
                 sides=sides,
                 ease=rules.ease.get(name, 0.0),
                 eased=rules.eased.get(name, (0.0, 1.0)),
-                notches=rules.eased.get(name),
+                notches=tuple(at for at in rules.eased[name] if 0.0 < at < 1.0) if name in rules.eased else None,
             )
     known = [seam.name for seam in seams.values()]
     for name in rules.ease:

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
 from warpflat.core.text import find_unused_name, other_side, without_side
+from warpflat.pattern.fitting import drawn_length
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = [
+    "OFF_END",
     "Break",
     "FreeChain",
     "chain_length",
@@ -20,6 +22,7 @@ __all__ = [
     "free_chains",
     "free_edges",
     "joined_line",
+    "marks_of",
     "neighbour",
     "split_edge",
 ]
@@ -31,6 +34,10 @@ Break = tuple[str, str, int]
 
 # Chains of both sides of the body whose lengths differ by no more [m] get one piece, cut twice.
 _ALIKE = 5e-4
+# A line ends on an edge within this distance [m].
+_ON_EDGE = 1e-3
+#: A line meets an edge inside it, not at its ends, beyond this distance [m].
+OFF_END = 2e-3
 # Directions at the ends of edges are those of their first or last so much [m].
 _NEAR_END = 0.004
 
@@ -125,9 +132,9 @@ def free_chains(
 
 
 def chain_length(pattern: Pattern, chain: FreeChain, size: str | None = None) -> float:
-    """Return the length of a chain in a size, or in the sample size [m]."""
+    """Return the length of a chain in a size, or in the sample size, along the curves as which its edges are drawn [m]."""
     size = pattern.sample if size is None else size
-    return sum(pattern.piece(side.piece, size).edge(side.edge).length for side in chain.sides)
+    return sum(drawn_length(pattern.piece(side.piece, size).edge(side.edge).points) for side in chain.sides)
 
 
 def _other_end(corner: _Corner) -> _Corner:
@@ -229,6 +236,25 @@ def split_edge(pattern: Pattern, place: tuple[str, str], at: Mapping[str, float]
             made.append(piece)
         pieces[size] = made
     return replace(pattern, pieces=pieces), (name, names[0], 1)
+
+
+def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[float]:
+    """Return where along a chain a line of its pieces, inside or on their border, meets it [m]."""
+    import shapely
+
+    found, before = list[float](), 0.0
+    for side in chain.sides:
+        piece = pattern.piece(side.piece, size)
+        points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
+        drawn = shapely.LineString(points)
+        known = {**piece.internal_lines, **{each.name: each.points for each in piece.edges if each.name != side.edge}}
+        lines = [each for name, each in known.items() if name.rstrip(" 0123456789") == line]
+        for end in (shapely.Point(each[k]) for each in lines for k in (0, -1)):
+            at = before + float(drawn.project(end))
+            if drawn.distance(end) < _ON_EDGE and all(abs(at - other) > OFF_END for other in found):
+                found.append(at)
+        before += polyline_length(points)
+    return sorted(found)
 
 
 def joined_line(pattern: Pattern, chain: FreeChain, size: str, *, lapped: float = 0.0) -> FloatArray:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Str
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
-from warpflat.garment.finishing import Finishing
+from warpflat.garment.finishing import Finishing, with_plackets
 from warpflat.garment.fullness import give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
 from warpflat.garment.openings import Opening, opened_rings
@@ -37,6 +37,9 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import BorderSeam
 from warpflat.surface.mirror import mirror_images
+
+if TYPE_CHECKING:
+    from warpflat.export.picture_drafted import DraftedOutline
 
 __all__ = ["Garment", "flatten_form"]
 
@@ -192,7 +195,9 @@ class Garment:
         return measure_rings(
             self.mannequin, self.form, positions, strain_limit=first.fabric.strain_limit,
             girths=pattern_girths(self.mannequin, self.form, positions),
-            opened=opened_rings(self.mannequin, self.form, positions, self.openings),
+            opened=with_plackets(
+                opened_rings(self.mannequin, self.form, positions, self.openings), self.finishing
+            ),
         )  # fmt: skip
 
     @cached_property
@@ -265,8 +270,13 @@ class Garment:
             write_report(to / "metrics.json", self.metrics(), name=self.name, files=files)
         return [*files, "metrics.json"]
 
-    def write_files(self, folder: Path, *, picture: bool) -> list[str]:
+    def write_files(self, folder: Path, *, picture: bool, drafted: Sequence[DraftedOutline] = ()) -> list[str]:
         """Write an OBJ per piece and `picture.png`, but not `metrics.json`, and return their names.
+
+        Args:
+            folder: an existing one.
+            picture: whether to draw one.
+            drafted: pieces without a surface that it shows, too, as collars and pockets.
 
         Raises:
             InputError: the folder cannot be written.
@@ -276,7 +286,7 @@ class Garment:
         body = None
         if self.mannequin is not None:
             body = Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
-        return write_files(list(self.parts.values()), folder, picture=picture, frames=False, body=body)
+        return write_files(list(self.parts.values()), folder, picture=picture, frames=False, body=body, drafted=drafted)
 
 
 def flatten_form(

@@ -92,7 +92,7 @@ def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) 
         if there.reversed != mirrored[0].reversed:
             sides = (_reversed_side(sides[0]), _reversed_side(sides[1]))
             first, last = 1.0 - last, 1.0 - first
-        notches = None if seam.notches is None else (first, last)
+        notches = None if seam.notches is None else tuple(at for at in (first, last) if 0.0 < at < 1.0)
         sewn.append(replace(seam, sides=sides, ease=ease, eased=(first, last), notches=notches))
     return tuple(sewn)
 

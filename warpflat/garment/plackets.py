@@ -1,4 +1,4 @@
-"""Plackets: slits that open an edge, each bound with a strip; in a sleeve behind, where the cuff is buttoned."""
+"""Plackets: slits that open an edge; in a sleeve behind, bound with one strip, in a neck in front, with two that button."""
 
 from __future__ import annotations
 
@@ -7,17 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name
-from warpflat.garment.free_edges import Break, split_edge
+from warpflat.garment.button_stand import buttonhole
+from warpflat.garment.free_edges import Break, free_chain, marks_of, split_edge
 from warpflat.garment.strips import Strip, strip_edges, swept
 from warpflat.pattern.pieces import Pattern, Piece
 
-__all__ = ["with_slits"]
+__all__ = ["with_placket", "with_slits"]
 
 # Finished width of the binding of a slit, and how much longer it is cut than both edges of the slit [m].
 _BINDING, _LONGER = 0.015, 0.020
+# Finished width of the strips of a neck's placket, and their least distance between buttons [m].
+_STRIP, _APART = 0.030, 0.045
 # The slit lies at this share of the edge from its middle to its back end.
 _BEHIND = 0.5
 
@@ -81,6 +85,85 @@ def with_slits(
     )  # fmt: skip
     pieces = {size: [*row, replace(binding, size=size)] for size, row in pattern.pieces.items()}
     return replace(pattern, pieces=pieces), breaks
+
+
+def with_placket(
+    pattern: Pattern, places: Sequence[tuple[str, str]], length: float, called: str
+) -> tuple[Pattern, list[Break]]:
+    """Return a pattern with a slit down from the centre front of an edge, a box around it, and the two strips that fill the box.
+
+    The strips lie on each other, and button; the chain of free edges is broken at the centre front.
+
+    Args:
+        pattern: with all its openings.
+        places: pieces and edges.
+        length: of the slit [m].
+        called: what the strips are named after.
+
+    Raises:
+        InputError: no edge crosses the centre front, or the slit does not lie within its piece.
+    """
+    import shapely
+
+    for place in places:
+        name, edge = place
+        chain = free_chain(pattern, [place])
+        at = {size: marks_of(pattern, chain, size, "centre front") for size in pattern.pieces}
+        if all(
+            len(row) == 1 and 1e-3 < row[0] < pattern.piece(name, size).edge(edge).length - 1e-3
+            for size, row in at.items()
+        ):
+            break
+    else:
+        raise InputError("a placket lies in the centre front, and no piece of this edge crosses it")
+    pieces = {}
+    for size, row in pattern.pieces.items():
+        piece = pattern.piece(name, size)
+        top = points_at_lengths(piece.edge(edge).points, at[size])[0]
+        grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
+        down = (grain[0] - grain[1]) / np.linalg.norm(grain[1] - grain[0])
+        across = np.array([-down[1], down[0]])
+        low, half = top + length * down, 0.5 * _STRIP
+        # The box reaches up to the edge.
+        uppers = [top + sign * half * across for sign in (1.0, -1.0)]
+        body = shapely.Polygon(piece.outline)
+        lines = {
+            f"slit {1e3 * length:.0f} mm": np.array([top, low]),
+            "placket": np.array([uppers[0], low + half * across]),
+            "placket 2": np.array([uppers[1], low - half * across]),
+            "placket 3": np.array([low + half * across, low - half * across]),
+        }
+        drawn = dict(piece.internal_lines)
+        for title, line in lines.items():
+            if not body.buffer(0.02).contains(shapely.LineString(line)):
+                raise InputError(f"a placket of {1e3 * length:.0f} mm does not lie within {name!r}")
+            inside = shapely.LineString(line).intersection(body.buffer(1e-6))
+            drawn[find_unused_name(title, drawn)] = np.asarray(inside.coords)
+        piece = replace(piece, internal_lines=drawn)
+        whole, high = length + _LONGER, 2.0 * _STRIP
+        names = ("lower", "right end", "upper", "left end")
+        edges = strip_edges(
+            *swept(Strip(length=whole, height=high)),
+            kinds=dict.fromkeys(names, "cut"),
+            allowance=dict.fromkeys(names, 0.010),
+        )
+        count = max(2, int((length - 0.02) / _APART))
+        marks, holes = dict[str, FloatArray](), dict[str, FloatArray]()
+        # The upper end lies on the left. Both strips are marked: one gets the buttons, the other one the buttonholes.
+        for number, x in enumerate(np.linspace(0.018, length - 0.030, count)):
+            marks[find_unused_name("button", marks)] = np.array([x, 0.5 * _STRIP])
+            for title, line in buttonhole(np.array([x, 0.5 * _STRIP]), np.array([1.0, 0.0])).items():
+                holes[f"{title} of {number + 1}"] = line
+        strip = Piece(
+            name=find_unused_name(f"{called}_placket", {each.name for each in row}), size=size, fabric=piece.fabric, quantity=2,
+            edges=edges, paired=False, role="strip", marks=marks,
+            internal_lines={"fold line": np.array([[0.0, _STRIP], [whole, _STRIP]]), **holes},
+            grain=np.array([[0.1 * whole, 0.5 * high], [0.9 * whole, 0.5 * high]]),
+        )  # fmt: skip
+        pieces[size] = [*(piece if each.name == name else each for each in row), strip]
+    pattern = replace(pattern, pieces=pieces)
+    pattern, broken = split_edge(pattern, place, {size: row[0] for size, row in at.items()})
+    return pattern, [broken]
 
 
 def _towards_back(pattern: Pattern, name: str, edge: str) -> float:

@@ -2,8 +2,9 @@
 
 A ring is an edge that is closed once the seams are sewn (neck, waist, hem, sleeve hem), or a level of the trunk within the
 pieces. A garment with a neck or armholes goes on over the head, so every ring of its trunk passes what the body has above
-it; any other one is stepped into, and its rings pass what the body has below them. A sleeve passes the hand and the arm
-below its hem, a leg the foot and the leg below its hem. The arms are raised on the way, so the bust stands for the shoulders.
+it; any other one, and a suit that has legs, is stepped into, and its rings pass what the body has below them. A sleeve passes
+the hand and the arm below its hem, a leg the foot and the leg below its hem. The arms are raised on the way, so the bust stands
+for the shoulders.
 """
 
 from __future__ import annotations
@@ -111,7 +112,10 @@ def measure_rings(
         # Two edges at one line are told apart: the first is the longer one.
         edges[find_unused_name(name, edges)] = length
     lengths = {name: girth["pattern_m"] for name, girth in girths.items()} | edges
-    over_head = any(_line_of(name).startswith(("neck", "armhole")) for name in edges)
+    limbs = {_line_of(name).partition(" ")[0] for name in edges if " " in _line_of(name)}
+    over_head = any(_line_of(name).startswith(("neck", "armhole")) for name in edges) and not limbs & set(
+        LEG_LINES.values()
+    )
     found = []
     for name, length in lengths.items():
         over, girth, source = _passes_over(mannequin, levels, _line_of(name), over_head=over_head)
@@ -203,7 +207,8 @@ def _passes_over(
     """Return the widest part of the body that must pass through a ring at a line, its girth [m] and the source."""
     limb, _, side = name.partition(" ")
     if name == "neck":
-        ends, between = "head", []
+        # A suit with legs is stepped into through its neck.
+        ends, between = ("head", []) if over_head else ("", list(RING_LEVELS[: RING_LEVELS.index("waist")]))
     elif limb in ARM_LEVELS:
         ends, between = f"hand {side}", [f"{level} {side}" for level in ARM_LEVELS[ARM_LEVELS.index(limb) + 1 :]]
     elif side and limb in LEG_LINES.values():

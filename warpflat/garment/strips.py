@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
+from warpflat.pattern.fitting import drawn_length
 from warpflat.pattern.piece_parts import Edge
 
 __all__ = ["Strip", "strip_edges", "swept"]
@@ -55,7 +56,9 @@ def swept(shape: Strip) -> tuple[FloatArray, FloatArray]:
     power = 1.0 if shape.even else 2.0
     angle = np.sign(middles) * shape.turn * np.abs(middles) ** power
     lower = np.vstack([[0.0, 0.0], np.cumsum(np.column_stack([np.cos(angle), np.sin(angle)]), axis=0)])
-    lower *= shape.length / polyline_length(lower)
+    # Another scale is drawn a little differently.
+    for _ in range(3):
+        lower *= shape.length / drawn_length(lower)
     angle = np.sign(share) * shape.turn * np.abs(share) ** power
     along, normal = np.column_stack([np.cos(angle), np.sin(angle)]), np.column_stack([-np.sin(angle), np.cos(angle)])
     near = np.clip((np.abs(share) - 1.0 + _TIP) / _TIP, 0.0, 1.0) ** 2

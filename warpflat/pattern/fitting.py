@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, turning_angles
+from warpflat.core.polyline import arc_lengths, polyline_length, turning_angles
 from warpflat.pattern.curves import TOLERANCE, Curve, chords, farthest, fit_curve
 from warpflat.pattern.piece_parts import SAME_POINT
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 
-__all__ = ["TOLERANCES", "EdgeKey", "fit_edges", "is_wavy", "smooth_line"]
+__all__ = ["TOLERANCES", "EdgeKey", "drawn_length", "fit_edges", "is_wavy", "smooth_line"]
 
 #: Names of a piece and of its edge.
 EdgeKey = tuple[str, str]
@@ -63,12 +64,7 @@ def fit_edges(
         for edge in piece.edges:
             line = lines[piece.name, edge.name]
             line = line[[0, -1]] if edge.kind == "fold" else line
-            # The least of `TOLERANCES` that makes the curve clean, or the largest.
-            for tried in TOLERANCES if tolerance is None else (tolerance,):
-                curve = fit_curve(line, tried)
-                if tolerance is not None or not _ragged(curve):
-                    break
-            fitted[piece.name, edge.name] = curve, tried
+            fitted[piece.name, edge.name] = _clean_curve(line, tolerance)
     if tolerance is None:
         # Edges that are sewn to one other edge, whether they run against each other, and the second's ease.
         pairs = list[tuple[EdgeKey, EdgeKey, bool, float]]()
@@ -113,6 +109,37 @@ def fit_edges(
             if not drawn[key].is_simple or any(drawn[key].crosses(drawn[other]) for other in keys if other != key):
                 fitted[key] = chords(lines[key]), fitted[key][1]
     return fitted
+
+
+def drawn_length(line: FloatArray) -> float:
+    """Return the length of an edge as it is drawn where no seam has a say: along its fitted curve [m].
+
+    A curve is longer than the chords of a mesh that it is drawn through. What is drafted for an edge is as long as its curve.
+
+    Args:
+        line: #P by 2 [m].
+    """
+    return _drawn_length(np.ascontiguousarray(line, dtype=np.float64).tobytes())
+
+
+@functools.lru_cache(maxsize=512)
+def _drawn_length(data: bytes) -> float:
+    line = np.frombuffer(data).reshape(-1, 2)
+    curve, within = _clean_curve(line, None)
+    if within == TOLERANCE and farthest(curve.sample(), line) > within:
+        curve = fit_curve(line, within, near=True)
+    return polyline_length(curve.sample())
+
+
+def _clean_curve(line: FloatArray, tolerance: float | None) -> tuple[Curve, float]:
+    """Return a curve of the tolerance; if that is None, of the least of `TOLERANCES` that makes it clean, or the largest; and which."""
+    if tolerance is not None:
+        return fit_curve(line, tolerance), tolerance
+    for tried in TOLERANCES:
+        curve = fit_curve(line, tried)
+        if not _ragged(curve):
+            break
+    return curve, tried
 
 
 def smooth_line(line: FloatArray) -> FloatArray:

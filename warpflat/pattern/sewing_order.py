@@ -26,6 +26,7 @@ __all__ = [
 
 #: Seams of the shell in the order in which they are closed, by words of their names; what has none of them comes with the panels.
 _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("Make the pockets", ("pocket",)),
     ("Join the panels", ("princess", "panel", "yoke", "centre")),
     ("Sew the shoulders", ("shoulder",)),
     ("Sew the inner leg seams", ("inseam",)),
@@ -204,7 +205,41 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
                 patches,
             )
         )
-    placket = [piece for piece in pieces if piece.name.endswith("_placket")]
+    welts = [piece for piece in pieces if "_pocket_welt" in piece.name]
+    if welts:
+        steps.append(
+            SewingStep.at(
+                translate(
+                    "Sew a folded welt and a bag to each marked place, cut between the seams, turn the bags in and close them: {pockets}.",
+                    pockets=called(welts),
+                ),
+                pieces=welts,
+            )
+        )
+    pleated = [piece for piece in pieces if any("pleat fold" in name for name in piece.piece.internal_lines)]
+    if pleated:
+        steps.append(
+            SewingStep.at(
+                translate(
+                    "Lay the pleats, each fold to the line beside it, press and baste them: {pieces}.",
+                    pieces=called(pleated),
+                ),
+                pieces=pleated,
+            )
+        )
+    buttoned = [piece for piece in pieces if "_placket" in piece.name and "button" in piece.piece.marks]
+    if buttoned:
+        steps.append(
+            SewingStep.at(
+                translate(
+                    "Sew a strip to each side of the marked box, cut the slit and into the corners, turn the strips in, fold them, lay the "
+                    "right one over the left and sew their lower ends down: {plackets}.",
+                    plackets=called(buttoned),
+                ),
+                pieces=buttoned,
+            )
+        )
+    placket = [piece for piece in pieces if "_placket" in piece.name and piece not in buttoned]
     if placket:
         steps.append(
             SewingStep.at(
@@ -477,6 +512,9 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
     """Return when a seam is sewn: by the roles of its pieces and, in the shell, by the words of its name, or with the panels."""
     words = seam.name.lower().replace("_", " ").split(" ")
     roles = {pieces[side.piece].role for row in seam.sides for side in row}
+    if "pocket" in roles:
+        # What of a pocket lies in another seam is sewn with that; its own seams come first.
+        roles = roles - {"pocket"} if words[0] != "pocket" else {"pocket"}
     if "facing" in words and "shoulder" in words:
         return len(_STAGES)
     for number, (_, known) in enumerate(_FINISHING):
@@ -485,9 +523,9 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
     if "facing" in words:
         return _ON_FACINGS
     for number, (_, keys) in reversed(list(enumerate(_STAGES))):
-        if any(key in words for key in keys) and not (number == 3 and "shoulder" in words):
+        if any(key in words for key in keys) and not (number == 4 and "shoulder" in words):
             return number
-    return 0
+    return 1
 
 
 def _letter(number: int) -> str:

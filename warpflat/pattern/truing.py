@@ -324,14 +324,20 @@ class _Stretch:
         return place, np.column_stack([-tangent[:, 1], tangent[:, 0]]), tangent
 
     def bend_back(self, slope: float) -> float:
-        """Return the bend back that keeps the length best, the least of those that keep it within 0.02 mm."""
+        """Return the least bend back that keeps the length, or the one that keeps it best."""
         u = np.linspace(0.0, 1.0, POINTS + 1)
         place, normal, _ = self._frame(u)
         move, _ = _move(slope, BENDS_BACK[:, None], self.reach, u)
         step = np.diff(place + move[..., None] * normal, axis=1)
-        change = np.sqrt((step**2).sum(axis=2)).cumsum(axis=1)[:, -1] - self.reach
-        kept = np.flatnonzero(np.abs(change) < 2e-5)
-        return float(BENDS_BACK[kept[0] if len(kept) else np.abs(change).argmin()])
+        # Without a turn all is as long as it was; what the points of the stretch lose by their chords is left out.
+        chords = np.linalg.norm(np.diff(place, axis=0), axis=1).sum()
+        change = np.sqrt((step**2).sum(axis=2)).sum(axis=1) - chords
+        crossed = np.flatnonzero(change[:-1] * change[1:] <= 0.0)
+        if not len(crossed):
+            return float(BENDS_BACK[np.abs(change).argmin()])
+        k = int(crossed[0])
+        share = change[k] / (change[k] - change[k + 1]) if change[k] != change[k + 1] else 0.0
+        return float(BENDS_BACK[k] + share * (BENDS_BACK[k + 1] - BENDS_BACK[k]))
 
 
 def _interpolated(at: FloatArray, arc: FloatArray, values: FloatArray) -> FloatArray:

@@ -89,6 +89,7 @@ def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
                 shorten=1e-3 * table.shorten_mm,
                 elastic=table.elastic,
                 placket=1e-3 * table.placket_mm,
+                pleat=1e-3 * table.pleat_mm,
                 turns=table.turns,
                 collar=collar,
             )
@@ -101,12 +102,13 @@ def scene_pockets(tables: Sequence[PocketTable]) -> list[Pocket]:
     return [
         Pocket(
             kind=table.kind,
-            where=table.piece if table.kind == "patch" else table.seam,
+            where=table.piece if table.kind in ("patch", "welt") else table.seam,
             width=1e-3 * table.width_mm,
             height=1e-3 * table.height_mm,
             line=table.line,
             below=1e-3 * table.below_mm,
             from_centre=1e-3 * table.from_centre_mm,
+            welt=1e-3 * table.welt_mm,
         )
         for table in tables
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.beside import Beside
+from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.core.output import (
     expect_files,
@@ -162,7 +163,7 @@ def _run(
             # What lies beside a seam that was found, such as a hem, is not a border that was forgotten.
             notes = unsewn_notes(garment) if getattr(plan, "found", None) is None else []
             fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))
-            pictures = Beside(partial(garment.write_files, folder, picture=output.picture), "drawing the pictures")
+            pictures = Beside(partial(_write_pictures, plan, garment, folder), "drawing the pictures")
             if vertices < _MANY:
                 beside.enter_context(pictures)
             graded = {
@@ -221,6 +222,27 @@ def _run(
         notes=(*notes, *fit_notes, *written.notes, *name_notes, *manifest_notes),
         size=size,
     )
+
+
+def _write_pictures(plan: MeshPlan | GarmentPlan, garment: Garment, folder: Path) -> list[str]:
+    """Write the pieces and their picture, with the outlines of those that finishing and pockets add."""
+    from warpflat.export.picture_drafted import DraftedOutline
+    from warpflat.garment.to_pattern import pattern_of_garment
+
+    drafted = list[DraftedOutline]()
+    if plan.scene.settings.output.picture and (garment.finishing or garment.pockets):
+        # What defeats the pattern is told where that is written.
+        with suppress(InputError):
+            pattern, _ = pattern_of_garment({"": garment}, name=garment.name, rules=plan.drawing.rules)
+            drafted = [
+                DraftedOutline(
+                    name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
+                    points=piece.outline,
+                )
+                for piece in pattern.pieces[""]
+                if piece.name not in garment.pieces
+            ]
+    return garment.write_files(folder, picture=plan.scene.settings.output.picture, drafted=drafted)
 
 
 def _measure_fit(

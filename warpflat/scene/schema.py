@@ -24,6 +24,7 @@ from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.file import FabricTable
 from warpflat.mannequin.table import MannequinTable
 from warpflat.solver.options import FORMER_SOLVERS, RelaxOptions, Solver
+from warpflat.surface.first_shapes import PIECES
 
 __all__ = [
     "AutoCutTable",
@@ -522,7 +523,8 @@ _OF_KINDS = {
     "shaped": ("waistband",),
     "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce"),
     "elastic": ("casing", "band", "waistband"),
-    "placket_mm": ("cuff",),
+    "placket_mm": ("cuff", "collar"),
+    "pleat_mm": ("ruffle",),
     "turns": ("flounce",),
     "style": ("collar",),
     "rise_mm": ("collar",),
@@ -536,6 +538,7 @@ _OF_STYLES = {
     "rise_mm": ("stand", "shirt"),
     "fall_mm": ("shirt",),
     "point_mm": ("shirt", "convertible"),
+    "placket_mm": ("stand", "shirt", "convertible", "flat"),
 }
 
 
@@ -561,7 +564,10 @@ class FinishingTable(Table):
     elastic: Annotated[float, Field(ge=0, le=1.5)] = 0.0
     """Length of an elastic that is threaded through it, as a share of the body's girth there; 0 for none."""
     placket_mm: Annotated[float, Field(ge=0, le=300)] = 0.0
-    """Length of a slit that opens the edge, behind in a sleeve, bound with a strip of its own."""
+    """Length of a slit that opens the edge: behind in a sleeve, bound with a strip of its own; in the centre front below a collar, with
+    two strips that button."""
+    pleat_mm: Annotated[float, Field(ge=0, le=300)] = 0.0
+    """Visible width of a pleat of a ruffle that is laid in pleats instead of gathered; with share = 3 they touch each other inside."""
     turns: Annotated[float, Field(ge=0.1, le=3)] = 0.5
     """How much of a circle a flounce is: 1 for a circle skirt, 0.5 for half of one."""
     style: Literal["stand", "shirt", "convertible", "flat", "turtleneck"] = "stand"
@@ -600,19 +606,25 @@ class FinishingTable(Table):
             )
         if self.kind == "casing" and not self.elastic:
             raise ValueError("elastic is missing: its length as a share of the body's girth there, as elastic = 0.95")
-        if self.placket_mm and not self.overlap_mm:
+        if self.pleat_mm and self.share < 1.5:
+            raise ValueError(
+                "a ruffle in pleats takes a share of at least 1.5; 3 for pleats that touch each other inside"
+            )
+        if self.kind == "cuff" and self.placket_mm and not self.overlap_mm:
             raise ValueError("a cuff with a placket needs an overlap for its button, overlap_mm = 25")
         return self
 
 
 class PocketTable(Table):
-    """A pocket: a `patch` on a piece, its place marked, or bags in a seam (`inseam`), on both sides of the body.
+    """A pocket on both sides of the body: a `patch` or a `welt` on a piece, its place marked, bags in a seam (`inseam`), or an opening
+    from the upper edge of a front to its seam (`hip`).
 
-    A patch lies `below_mm` under a line across its piece, its inner side `from_centre_mm` from the centre line. An opening begins
-    `below_mm` under the upper end of its seam, and is `height_mm` long.
+    A patch or welt lies `below_mm` under a line across its piece, its inner side `from_centre_mm` from the centre line; on a leg it lies
+    in the middle. An opening in a seam begins `below_mm` under the upper end of its seam, and is `height_mm` long. That of
+    a hip pocket runs from `width_mm` beside the seam, on the upper edge, to `height_mm` below it.
     """
 
-    kind: Literal["patch", "inseam"]
+    kind: Literal["patch", "welt", "inseam", "hip"]
     piece: Annotated[str, Field(max_length=100)] = ""
     line: Annotated[str, Field(max_length=100)] = "hip"
     seam: Annotated[str, Field(max_length=100)] = ""
@@ -620,13 +632,17 @@ class PocketTable(Table):
     height_mm: Annotated[float, Field(ge=30, le=400)] = 160.0
     below_mm: Annotated[float, Field(ge=-500, le=1000)] = 60.0
     from_centre_mm: Annotated[float, Field(ge=0, le=500)] = 70.0
+    welt_mm: Annotated[float, Field(ge=5, le=80)] = 15.0
+    """Height of a welt."""
 
     @model_validator(mode="after")
     def _has_its_place(self) -> PocketTable:
-        if self.kind == "patch" and not self.piece:
-            raise ValueError('a patch pocket needs its piece: piece = "front"')
-        if self.kind == "inseam" and (not self.seam or self.below_mm < 0):
-            raise ValueError('an inseam pocket needs its seam, seam = "side left", and below_mm from 0')
+        if self.kind in ("patch", "welt") and not self.piece:
+            raise ValueError(f'a {self.kind} pocket needs its piece: piece = "front"')
+        if self.kind in ("inseam", "hip") and (not self.seam or self.below_mm < 0):
+            raise ValueError(f'a pocket of kind {self.kind} needs its seam, seam = "side left", and below_mm from 0')
+        if self.kind != "welt" and "welt_mm" in self.model_fields_set:
+            raise ValueError(f"welt_mm belongs to a welt; leave it out for a pocket of kind {self.kind}")
         return self
 
 
@@ -786,6 +802,12 @@ class SceneTable(Table):
                         why = whole or 'component = "all"'
                         own = f", or give it to a piece: [pieces.NAME] {key}" if key in PieceTable.model_fields else ""
                         raise ValueError(f"{key} belongs to one piece; with {why} leave it out{own}")
+            elif isinstance(self.surface, ShapeSurface) and self.surface.shape in PIECES:
+                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "drape", "constraints"):
+                    if getattr(self, key):
+                        raise ValueError(
+                            f'{key} belongs to one surface; shape = "{self.surface.shape}" has several pieces: leave it out'
+                        )
             elif self.pieces and (self.find_seams is None or self.find_seams.find == "none"):
                 raise ValueError('[pieces] is for several pieces: of component = "all", or along seams that are found')
             for where, cuts in (

@@ -37,9 +37,12 @@ def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | 
     if table is None:
         raise InputError(f"{scene.where}: the scene has no [surface]; this needs one piece, not a garment")
     if isinstance(table, ShapeSurface):
+        from warpflat.surface.first_shapes import PIECES
         from warpflat.surface.shapes import make_shape
 
         with errors_named(f"{scene.where}: surface"):
+            if table.shape in PIECES:
+                raise InputError(f"{table.shape} has several pieces, and this needs one; take `warpflat run`")
             surface = make_shape(table.shape, **(table.model_extra or {}))
     else:
         path = _file(scene, table)
@@ -103,15 +106,19 @@ def _with_table_lines(
 
 
 def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
-    """Read all pieces of a scene whose `surface.component` is "all"; None for other scenes.
+    """Read or make all pieces of a scene whose `surface.component` is "all", or whose shape has several; None for other scenes.
 
     Raises:
-        InputError: the file is wrong, or an environment variable is not set.
+        InputError: the file or a parameter of the shape is wrong, or an environment variable is not set.
     """
+    from warpflat.surface.first_shapes import PIECES, make_pieces
     from warpflat.surface.io.read_pieces import read_pieces
     from warpflat.surface.repair.meet import MEET
 
     table = scene.settings.surface
+    if isinstance(table, ShapeSurface) and table.shape in PIECES:
+        with errors_named(f"{scene.where}: surface"):
+            return make_pieces(table.shape, **(table.model_extra or {}))
     if not isinstance(table, FileSurface) or table.component != "all":
         return None
     meet = MEET if table.meet_mm is None else 1e-3 * table.meet_mm

@@ -9,17 +9,32 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, is_number, nearest
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 
-__all__ = ["SHAPES", "bodice", "cone", "cylinder", "dome", "hemisphere", "make_shape", "saddle", "strip"]
+__all__ = [
+    "SHAPES",
+    "bodice",
+    "check_range",
+    "cone",
+    "cylinder",
+    "dome",
+    "grid_surface",
+    "hemisphere",
+    "make_named",
+    "make_shape",
+    "saddle",
+    "strip",
+]
+
+Made = TypeVar("Made")
 
 _MAX_RESOLUTION = 2048
 
@@ -33,13 +48,13 @@ def dome(*, size: float = 0.5, radius: float = 0.45, resolution: int = 33, trian
         resolution: vertices along each side.
         triangles: split each quad along the same diagonal.
     """
-    _check_range("dome", "size", size, 1e-3, 10.0)
+    check_range("dome", "size", size, 1e-3, 10.0)
     lowest = size / math.sqrt(2.0)
     if not lowest < radius <= 1e3:
         raise InputError(f"dome: radius = {radius:g} m; must lie between size / sqrt(2) = {lowest:.4g} and 1000 m")
     u, w = _parameters("dome", resolution)
     x, y = (u - 0.5) * size, (w - 0.5) * size
-    return _grid("dome", np.stack([x, y, np.sqrt(radius**2 - x**2 - y**2)], axis=-1), triangles)
+    return grid_surface("dome", np.stack([x, y, np.sqrt(radius**2 - x**2 - y**2)], axis=-1), triangles)
 
 
 def bodice(*, resolution: int = 65, triangles: bool = False) -> Surface:
@@ -55,7 +70,7 @@ def bodice(*, resolution: int = 65, triangles: bool = False) -> Surface:
     bust = sum(0.045 * np.exp(-(((t - t0) / 0.30) ** 2 + ((y - 0.28) / 0.055) ** 2)) for t0 in (-0.55, 0.55))
     x, z = (0.170 * waist + bust) * np.sin(t), (0.115 * waist + bust) * np.cos(t)
     row = round(0.28 / 0.45 * (resolution - 1))
-    return _grid("bodice", np.stack([x, y, z], axis=-1), triangles, rows={"bust": row})
+    return grid_surface("bodice", np.stack([x, y, z], axis=-1), triangles, rows={"bust": row})
 
 
 def cylinder(
@@ -70,13 +85,13 @@ def cylinder(
         resolution: vertices along each side.
         triangles: split each quad along the same diagonal.
     """
-    _check_range("cylinder", "radius", radius, 1e-3, 100.0)
-    _check_range("cylinder", "height", height, 1e-3, 100.0)
-    _check_range("cylinder", "angle", angle, 1.0, 359.0)
+    check_range("cylinder", "radius", radius, 1e-3, 100.0)
+    check_range("cylinder", "height", height, 1e-3, 100.0)
+    check_range("cylinder", "angle", angle, 1.0, 359.0)
     u, w = _parameters("cylinder", resolution)
     t = (u - 0.5) * math.radians(angle)
     points = np.stack([radius * np.sin(t), height * w, radius * np.cos(t)], axis=-1)
-    return _grid("cylinder", points, triangles)
+    return grid_surface("cylinder", points, triangles)
 
 
 def cone(
@@ -99,11 +114,11 @@ def cone(
         triangles: split each quad along the same diagonal.
     """
     for key, value in (("bottom", bottom), ("top", top), ("height", height)):
-        _check_range("cone", key, value, 1e-3, 100.0)
-    _check_range("cone", "angle", angle, 1.0, 359.0)
+        check_range("cone", key, value, 1e-3, 100.0)
+    check_range("cone", "angle", angle, 1.0, 359.0)
     u, w = _parameters("cone", resolution)
     t, r = (u - 0.5) * math.radians(angle), bottom + (top - bottom) * w
-    return _grid("cone", np.stack([r * np.sin(t), height * w, r * np.cos(t)], axis=-1), triangles)
+    return grid_surface("cone", np.stack([r * np.sin(t), height * w, r * np.cos(t)], axis=-1), triangles)
 
 
 def strip(
@@ -125,13 +140,13 @@ def strip(
         resolution: vertices along its length; a quarter as many, and three at least, across.
         triangles: split each quad along the same diagonal.
     """
-    _check_range("strip", "length", length, 1e-3, 100.0)
-    _check_range("strip", "width", width, 1e-3, 100.0)
-    _check_range("strip", "amplitude", amplitude, 0.0, length)
-    _check_range("strip", "waves", waves, 0.0, 16.0)
+    check_range("strip", "length", length, 1e-3, 100.0)
+    check_range("strip", "width", width, 1e-3, 100.0)
+    check_range("strip", "amplitude", amplitude, 0.0, length)
+    check_range("strip", "waves", waves, 0.0, 16.0)
     u, w = _parameters("strip", max(3, (resolution - 1) // 4 + 1) | 1, resolution)
     x, y = (u - 0.5) * width, (w - 0.5) * length
-    return _grid("strip", np.stack([x, y, amplitude * np.sin(2.0 * np.pi * waves * w)], axis=-1), triangles)
+    return grid_surface("strip", np.stack([x, y, amplitude * np.sin(2.0 * np.pi * waves * w)], axis=-1), triangles)
 
 
 def saddle(*, size: float = 0.4, curvature: float = 2.5, resolution: int = 33, triangles: bool = False) -> Surface:
@@ -143,11 +158,11 @@ def saddle(*, size: float = 0.4, curvature: float = 2.5, resolution: int = 33, t
         resolution: vertices along each side.
         triangles: split each quad along the same diagonal.
     """
-    _check_range("saddle", "size", size, 1e-3, 10.0)
-    _check_range("saddle", "curvature", curvature, 0.0, 4.0 / size)
+    check_range("saddle", "size", size, 1e-3, 10.0)
+    check_range("saddle", "curvature", curvature, 0.0, 4.0 / size)
     u, w = _parameters("saddle", resolution)
     x, y = (u - 0.5) * size, (w - 0.5) * size
-    return _grid("saddle", np.stack([x, y, 0.5 * curvature * (x**2 - y**2)], axis=-1), triangles)
+    return grid_surface("saddle", np.stack([x, y, 0.5 * curvature * (x**2 - y**2)], axis=-1), triangles)
 
 
 def hemisphere(*, radius: float = 0.2, opening: float = 80.0, resolution: int = 33, triangles: bool = False) -> Surface:
@@ -162,8 +177,8 @@ def hemisphere(*, radius: float = 0.2, opening: float = 80.0, resolution: int = 
         resolution: vertices along each side.
         triangles: split each quad along the same diagonal.
     """
-    _check_range("hemisphere", "radius", radius, 1e-3, 100.0)
-    _check_range("hemisphere", "opening", opening, 1.0, 120.0)
+    check_range("hemisphere", "radius", radius, 1e-3, 100.0)
+    check_range("hemisphere", "opening", opening, 1.0, 120.0)
     u, w = _parameters("hemisphere", resolution)
     a, b = 2.0 * u - 1.0, 2.0 * w - 1.0
     wide = np.abs(a) >= np.abs(b)
@@ -173,7 +188,7 @@ def hemisphere(*, radius: float = 0.2, opening: float = 80.0, resolution: int = 
     polar = np.abs(reach) * math.radians(opening)
     side = np.where(reach < 0.0, -1.0, 1.0)
     x, y = side * np.sin(polar) * np.cos(azimuth), side * np.sin(polar) * np.sin(azimuth)
-    return _grid("hemisphere", radius * np.stack([x, y, np.cos(polar)], axis=-1), triangles)
+    return grid_surface("hemisphere", radius * np.stack([x, y, np.cos(polar)], axis=-1), triangles)
 
 
 SHAPES: dict[str, Callable[..., Surface]] = {
@@ -200,7 +215,21 @@ def make_shape(name: str, **parameters: Any) -> Surface:
     """
     if name not in SHAPES:
         raise InputError(f"unknown shape {name!r}; {nearest(name, SHAPES)}")
-    known = inspect.signature(SHAPES[name]).parameters
+    return make_named(name, SHAPES[name], parameters)
+
+
+def make_named(name: str, make: Callable[..., Made], parameters: Mapping[str, Any]) -> Made:
+    """Return what a function makes of parameters from a file.
+
+    Args:
+        name: for messages.
+        make: whose keyword arguments have defaults.
+        parameters: by name.
+
+    Raises:
+        InputError: an unknown parameter (names the nearest), or one of the wrong kind or out of range.
+    """
+    known = inspect.signature(make).parameters
     for key, value in parameters.items():
         if key not in known:
             raise InputError(f"{key}: unknown key {key!r} for shape {name!r}; {nearest(key, known)}")
@@ -209,10 +238,15 @@ def make_shape(name: str, **parameters: Any) -> Surface:
         if not right:
             kind = {bool: "true or false", int: "a whole number", float: "a number"}[wanted]
             raise InputError(f"{key}: should be {kind}, such as {known[key].default}, got {value!r}")
-    return SHAPES[name](**parameters)
+    return make(**parameters)
 
 
-def _check_range(shape: str, key: str, value: float, lowest: float, highest: float) -> None:
+def check_range(shape: str, key: str, value: float, lowest: float, highest: float) -> None:
+    """Check a parameter.
+
+    Raises:
+        InputError: it is out of range.
+    """
     if not lowest <= value <= highest:
         raise InputError(f"{shape}: {key} = {value:g}; must lie between {lowest:g} and {highest:g}")
 
@@ -226,8 +260,15 @@ def _parameters(shape: str, across: int, up: int | None = None) -> tuple[FloatAr
     return u, w
 
 
-def _grid(name: str, points: FloatArray, triangles: bool, *, rows: dict[str, int] | None = None) -> Surface:
-    """Return the surface of `points` (rows by columns by 3); further lines along `rows`."""
+def grid_surface(
+    name: str,
+    points: FloatArray,
+    triangles: bool = False,
+    *,
+    rows: Mapping[str, int] | None = None,
+    lines: Mapping[str, IntArray] | None = None,
+) -> Surface:
+    """Return the surface of `points` (rows by columns by 3); further lines along `rows`, or through given vertices."""
     height, width = points.shape[:2]
     index = np.arange(height * width, dtype=np.int32).reshape(height, width)
     quads = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
@@ -235,12 +276,13 @@ def _grid(name: str, points: FloatArray, triangles: bool, *, rows: dict[str, int
     if triangles:
         pairs = np.stack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
         faces = np.column_stack([pairs, np.full(len(pairs), -1, dtype=np.int32)])
-    lines = {
+    own = {
         "centre": index[:, width // 2],
         "left": index[:, 0],
         "right": index[:, -1],
         "bottom": index[0],
         "top": index[-1],
         **{key: index[row] for key, row in (rows or {}).items()},
+        **(lines or {}),
     }
-    return make_surface(points.reshape(-1, 3), faces, lines=lines, name=name)
+    return make_surface(points.reshape(-1, 3), faces, lines=own, name=name)
