@@ -205,7 +205,7 @@ def test_placket_opens_the_neck_in_front_and_its_strips_fill_a_box(plain: Garmen
     low = front.internal_lines["placket 3"]
     assert np.linalg.norm(low[1] - low[0]) == pytest.approx(0.03)
     assert low.mean(axis=0) == pytest.approx(slit[1])
-    steps = " ".join(sewing_steps(draft_garment(pattern), ""))
+    steps = " ".join(step.words for step in sewing_steps(draft_garment(pattern), ""))
     assert "Sew a strip to each side of the marked box" in steps
     assert "bind both their edges" not in steps
     # Both edges of the slit widen the ring of the neck.

@@ -163,5 +163,5 @@ def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
     assert np.diff(starts) == pytest.approx(whole / count)
     # A third of each stays visible.
     assert np.array(ends) - starts == pytest.approx(2.0 / 3.0 * whole / count)
-    assert "Lay the pleats" in " ".join(sewing_steps(draft_garment(pattern), ""))
+    assert "Lay the pleats" in " ".join(step.words for step in sewing_steps(draft_garment(pattern), ""))
     lengths(pattern)
