@@ -34,7 +34,7 @@ ROOMS = {
     "mannequin": "core surface pattern export kernels",
     "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
     "draping": "core surface fabric model solver pattern export flattening mannequin garment kernels",
-    "seams": "core surface fabric model solver flattening cutting garment",
+    "seams": "core surface fabric model solver pattern flattening cutting garment",
     "review": "core surface export",
     "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review",
     "batch": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review scene",

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from warpflat.flattening.result import Flattening
-    from warpflat.seams.find import FoundSeam, FoundSeams
+    from warpflat.pattern.pieces import FoundSeam
+    from warpflat.seams.find import FoundSeams
     from warpflat.seams.layers import GarmentFile
     from warpflat.seams.options import SeamCut
     from warpflat.surface.io.file_seams import FileSeams
@@ -48,7 +49,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     Raises:
         InputError: the file is wrong.
     """
-    from warpflat.seams.body_lines import waist_of_body
+    from warpflat.scene.body_waist import waist_of_body
     from warpflat.seams.find import find_seams
     from warpflat.seams.layers import read_garment
     from warpflat.seams.options import SeamOptions

@@ -34,7 +34,7 @@ from warpflat.surface.paths.lines import line_from_curve, line_on_plane
 from warpflat.surface.paths.section import plane_sections
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["GRAIN", "FoundSeam", "FoundSeams", "find_seams", "seam_words"]
+__all__ = ["GRAIN", "FoundSeams", "find_seams", "seam_words"]
 
 Ids = NDArray[np.int64]
 

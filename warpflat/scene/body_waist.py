@@ -1,4 +1,4 @@
-"""Lines of a body that a garment may be cut along."""
+"""The waist of a body, at which a garment may be cut."""
 
 from __future__ import annotations
 
