@@ -274,11 +274,15 @@ def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict
         room = tiling.paper.step - size - 2 * NAME_INSIDE
         shares = [(0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0)]
         shares += [(x / 8, y / 12) for y in range(12, -1, -1) for x in range(9)]
-        places = [low + NAME_INSIDE + room * share for share in shares]
-        boxes = [shapely.box(*place, *(place + size)) for place in places]
-        nearest = np.array([float(shapely.distance(box, taken.geometries[taken.nearest(box)])) for box in boxes])
-        clear = np.flatnonzero(nearest > NAME_CLEAR)
-        found[tile] = places[int(clear[0]) if len(clear) else int(nearest.argmax())]
+        places = low + NAME_INSIDE + room * np.array(shares)
+        # A corner is clear nearly always.
+        for tried in (places[:4], places):
+            boxes = shapely.box(*tried.T, *(tried + size).T)
+            apart = shapely.distance(boxes, taken.geometries[taken.nearest(boxes)])
+            clear = np.flatnonzero(apart > NAME_CLEAR)
+            if len(clear):
+                break
+        found[tile] = tried[int(clear[0]) if len(clear) else int(apart.argmax())]
     return found
 
 
