@@ -1,6 +1,6 @@
 """Whole garments: what is found in them, how they are cut, how flat their pieces lie, and how near to the mesh they sew up.
 
-python benchmarks/garments.py [FILES or FOLDER ...] [--fabric woven] [--quick]
+python benchmarks/garments.py [FILES or FOLDER ...] [--fabric woven] [--most-pieces N] [--limit SHARE] [--quick]
 
 Default: $WARPFLAT_DATA/garments. A file in another unit than metres is given as FILE:SCALE, as suit.obj:0.1; a file whose size is
 that of a person in decimetres, centimetres or millimetres is scaled by itself.
@@ -161,11 +161,11 @@ def whole_command(layers: list[Surface], fabric: str) -> str:
         return f"{time.perf_counter() - begun:.1f} ({done.returncode})"
 
 
-def measure(path: str, fabric: str, *, quick: bool) -> list[str]:
+def measure(path: str, fabric: str, wanted: warpflat.SeamOptions, *, quick: bool) -> list[str]:
     """Return a row of the table."""
     layers = read(path)
     plain = sewn(warpflat.find_seams(layers), fabric)
-    found = warpflat.find_seams(layers, fabric=fabric)
+    found = warpflat.find_seams(layers, wanted, fabric=fabric)
     garment = sewn(found, fabric)
     by_name = {piece.name: piece.vertices for piece in found.pieces}
     pairs = meeting_borders({piece.name: piece for piece in found.pieces})
@@ -192,8 +192,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("paths", nargs="*", default=[f"{os.environ.get('WARPFLAT_DATA', '.')}/garments"])
     parser.add_argument("--fabric", default="woven")
+    parser.add_argument("--most-pieces", type=int, help="of each layer, as the command takes it")
+    parser.add_argument("--limit", type=float, default=warpflat.SeamOptions.limit, help="as the command takes it")
     parser.add_argument("--quick", action="store_true", help="no single piece, no whole command and no drape")
     options = parser.parse_args()
+    wanted = warpflat.SeamOptions(most_pieces=options.most_pieces, limit=options.limit)
     files = [
         str(file)
         for path in options.paths
@@ -207,7 +210,7 @@ def main() -> None:
     print(" | ".join(heads.split("|")), flush=True)
     for file in files:
         try:
-            row = measure(file, options.fabric, quick=options.quick)
+            row = measure(file, options.fabric, wanted, quick=options.quick)
         except warpflat.InputError as error:
             row = [Path(file).stem, f"refused: {error}"]
         print(" | ".join(row), flush=True)

@@ -75,6 +75,18 @@ def shoe_upper() -> Surface:
     return loft([((0.0, h, np.interp(h, y, z)), np.interp(h, y, wide), np.interp(h, y, deep)) for h in at.tolist()])
 
 
+def mug() -> Surface:
+    parts = [
+        solids.rod([0, 0, 0], [0, 0.1, 0], 0.04, 0.6),
+        solids.rod([0, 0.02, 0], [0.08, 0.02, 0], 0.012),
+        solids.rod([0.08, 0.02, 0], [0.08, 0.09, 0], 0.012),
+        solids.rod([0.08, 0.09, 0], [0, 0.09, 0], 0.012),
+    ]
+    return solids.skin(
+        solids.joined(parts, 0.004), [-0.06, -0.06, -0.05], [0.12, 0.16, 0.05], 0.012, [([0, 0.11, 0], [0, 1, 0])]
+    )
+
+
 def pouch() -> Surface:
     return loft([((0.0, y, 0.0), 0.11, 0.1) for y in np.linspace(0.3, 0.0, 12)], closed=True)
 
@@ -95,9 +107,21 @@ def anatomy_of(surface: Surface) -> Anatomy:
         ("sock", sock),
         ("glove", mitten),
         ("other", shoe_upper),
+        ("other", mug),
         ("other", pouch),
     ],
-    ids=["skirt", "pencil skirt", "tube top", "strapless dress", "beanie", "sock", "mitten", "shoe upper", "pouch"],
+    ids=[
+        "skirt",
+        "pencil skirt",
+        "tube top",
+        "strapless dress",
+        "beanie",
+        "sock",
+        "mitten",
+        "shoe upper",
+        "mug",
+        "pouch",
+    ],
 )
 def test_what_is_not_surely_something_is_called_other(kind: str, make: Callable[[], Surface]) -> None:
     assert describe(anatomy_of(make())) == kind

@@ -188,9 +188,9 @@ def _averaged(head: Piece, copies: Sequence[_Copy]) -> tuple[Piece, float]:
         edges.append(replace(edge, points=mean))
     if moved <= _SAME_LINE:
         return head, moved
-    for before, after in pairwise([*edges, edges[0]]):
+    for edge, following in pairwise([*edges, edges[0]]):
         # The corner of both is one point, bit for bit.
-        after.points[0] = before.points[-1]
+        following.points[0] = edge.points[-1]
     return replace(head, edges=edges), moved
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.seams.cloth import Cloth, section
 from warpflat.seams.fields import MirrorMap, Operators, mirror_map
-from warpflat.surface.connectivity import components
+from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 
 __all__ = ["AXES", "HOLE", "ROLES", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
 
@@ -502,8 +502,9 @@ def _around_the_trunk(cloth: Cloth, low: float, high: float, heights: FloatArray
 
 def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -> Kind:
     """Return what a thing with one border is: a hat, a sock or a glove if its size and its shape say so, else "other"."""
-    if border.length > 3.0 * size:
-        # A disk that is no deeper than a panel.
+    holes = len(border_loops(cloth.faces.astype(np.int32)))
+    if border.length > 3.0 * size or euler_characteristic(cloth.faces.astype(np.int32)) != 2 - holes:
+        # A disk that is no deeper than a panel, or a thing with a handle, as a mug.
         return "other"
     way = cloth.vertices - border.middle
     depth = way @ upward
@@ -530,7 +531,7 @@ def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -
     outer = outer - np.outer(outer @ along, along)
     axes = np.linalg.eigh(np.cov(outer.T))[1] if len(outer) > 3 else np.eye(3)
     thick, wide = np.ptp(outer @ axes[:, 1:], axis=0)
-    if thick < _FLAT_HAND * wide:
+    if thick < _FLAT_HAND * wide and reach.max() > 0.6 * girth:
         for part in np.linspace(0.3, 0.95, 14):
             above = reach[cloth.faces] > part * reach.max()
             crossed = cloth.faces[above.any(axis=1) & ~above.all(axis=1)].astype(np.int32)

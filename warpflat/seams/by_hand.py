@@ -289,7 +289,7 @@ def leave_to_hand(cloth: Cloth, options: SeamOptions) -> tuple[Cloth, list[str]]
     tree = cKDTree(ends[of, 0] + share[:, None] * (ends[of, 1] - ends[of, 0]))
     names = [name.removeprefix(HAND) for name in drawn]
     found = {name: edges for name, edges in cloth.seams.items() if name not in drawn}
-    pieces = replace(cloth, seams=found).parts()
+    pieces = replace(cloth, seams=found).parts
     for name in found:
         kept = []
         for line in edge_components(_without(found[name], every, len(cloth.vertices))):
@@ -320,7 +320,7 @@ def _parted_without(cloth: Cloth, name: str, line: Ids, pieces: Ids) -> bool:
     he, stride = cloth.half_edges, np.int64(len(cloth.vertices))
     on_line = np.isin(he.edges[:, 0] * stride + he.edges[:, 1], line[:, 0] * stride + line[:, 1])
     beside = np.unique(pieces[he.face[on_line[he.edge]]])
-    left = replace(cloth, seams={**cloth.seams, name: _without(cloth.seams[name], line, len(cloth.vertices))}).parts()
+    left = replace(cloth, seams={**cloth.seams, name: _without(cloth.seams[name], line, len(cloth.vertices))}).parts
     # Most of each piece goes on in one of those that are left.
     most = [int(np.bincount(left[pieces == one], cloth.face_areas[pieces == one]).argmax()) for one in beside]
     return len(set(most)) == len(most)

@@ -289,8 +289,9 @@ class Cloth:
         apart = (sides[one] != sides[other]) & within[one] & within[other]
         return he.edges[he.edge[order[apart, 0]]].astype(np.int64)
 
+    @cached_property
     def parts(self) -> NDArray[np.int64]:
-        """Return #F, the piece of each face that the seams leave."""
+        """#F, the piece of each face that the seams leave."""
         seam = self.seam_edges()
         return components(self.faces.astype(np.int32), barrier=seam.astype(np.int32)).astype(np.int64)
 
@@ -300,19 +301,16 @@ class Cloth:
         Args:
             among: #F, only those pieces that have some of these faces; all if not given.
         """
-        part, seam = self.parts(), self.seam_edges()
+        part, seam = self.parts, self.seam_edges()
         stride = np.int64(len(self.vertices))
-        cut = set((seam[:, 0] * stride + seam[:, 1]).tolist())
+        cut = seam[:, 0] * stride + seam[:, 1]
         for number in np.unique(part if among is None else part[among]).tolist():
             chosen = np.flatnonzero(part == number)
             faces = self.faces[chosen]
             # Corners at a vertex are one vertex where faces share an edge there that is not cut.
             he = half_edges(faces.astype(np.int32))
             keys = he.edges[:, 0].astype(np.int64) * stride + he.edges[:, 1]
-            opened = (
-                np.isin(keys, np.fromiter(cut, dtype=np.int64, count=len(cut))) if cut else np.zeros(len(keys), bool)
-            )
-            inner = np.flatnonzero((he.count[he.edge] == 2) & ~opened[he.edge])
+            inner = np.flatnonzero((he.count[he.edge] == 2) & ~np.isin(keys, cut)[he.edge])
             pair = inner[np.argsort(he.edge[inner], kind="stable")].reshape(-1, 2)
             a, b = pair.T
             fan = join_labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b]))

@@ -221,7 +221,7 @@ def cut_by_energy(
                 target = _mesh_at(made, worst.mesh)
                 made = (None if target is None else _cut(made, target, _mirrored(candidate, anatomy), _MATE)) or made
             # Where a twin is cut alike, it adds as many.
-            more = (int(made.parts().max()) + 1 - len(pieces)) * (1 if twin is None else 2)
+            more = (int(made.parts.max()) + 1 - len(pieces)) * (1 if twin is None else 2)
             if more and len(pieces) + more > most:
                 return None
             try:

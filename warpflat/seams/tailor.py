@@ -288,7 +288,7 @@ def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = Fal
         anatomy: of the garment.
         anywhere: whether a sleeve may begin elsewhere than near its armhole, and with some of the neck, as a raglan sleeve does.
     """
-    cloth, part = fields.cloth, fields.cloth.parts()
+    cloth, part = fields.cloth, fields.cloth.parts
     label = np.full(len(cloth.faces), -1, dtype=np.int64)
     for number, (name, limb) in enumerate(fields.sleeves.items()):
         own = np.isin(part, part[np.isin(cloth.faces, anatomy.borders[limb.border].vertices).any(axis=1)])

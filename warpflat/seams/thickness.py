@@ -34,7 +34,7 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
     """Return the cloth without what is turned inside at its openings, and a note if there was any."""
     size = float(np.sqrt(cloth.face_areas.sum()))
     drop = np.zeros(len(cloth.faces), dtype=bool)
-    openings, areas, part = 0, cloth.face_areas, cloth.parts()
+    openings, areas, part = 0, cloth.face_areas, cloth.parts
     piece = np.bincount(part, areas)
     for loop in cloth.borders():
         points = cloth.vertices[loop]
@@ -51,7 +51,7 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
         return cloth, []
     cloth, drop = even_line(cloth, drop, size)
     kept = replace(cloth, faces=cloth.faces[~drop])
-    part = replace(kept, seams={}).parts()
+    part = replace(kept, seams={}).parts
     kept = replace(kept, faces=kept.faces[part == np.bincount(part).argmax()])
     used, place = np.unique(kept.faces, return_inverse=True)
     area_out = 1e4 * float(cloth.face_areas[drop].sum())
