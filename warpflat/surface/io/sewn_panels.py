@@ -14,16 +14,18 @@ from warpflat.core.text import format_count
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.io.file_seams import MOST_ISLANDS, file_seams
-from warpflat.surface.io.read import METRES_PER_UNIT, POSSIBLE, RawMesh, read_mesh_file
+from warpflat.surface.io.read import METRES_PER_UNIT, POSSIBLE, RawMesh, check_size, read_mesh_file
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.repair.validate import make_surface, parts_of_faces
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["SewnPanel", "mesh_area", "read_sewn_panels", "sewn_panels"]
 
 # How far the area of the texture may differ from the cloth's, in all and for a panel that is more than the second share of it.
 _TRUE_SIZE, _COUNTED = 0.25, 0.01
+# No place of a texture lies farther out, in its own unit.
+_FARTHEST = 1e6
 # Panels may cover so much of each other, or of themselves.
 _OVERLAP = 1e-3
 _RIGHT = "--seams uv cuts along its islands and flattens them; --seams auto looks for seams"
@@ -82,6 +84,8 @@ def read_sewn_panels(
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
     known = tuple(dict.fromkeys(sources))
+    for panel in panels:
+        check_size(panel.surface, file, scale)
     found = [replace(panel, surface=replace(panel.surface, sources=known)) for panel in panels]
     first = found[0].surface
     return [replace(found[0], surface=replace(first, notes=(*raw.notes, *first.notes))), *found[1:]]
@@ -100,6 +104,7 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
     Raises:
         InputError: there is no texture, or it is no pattern: not of true size in any unit, or of panels that lie over each other.
     """
+    parts_of_faces(raw.vertices * scale, raw.polygons, weld=True)
     seams = file_seams(raw).get("uv")
     if seams is None or raw.texture is None:
         raise InputError(
@@ -113,6 +118,11 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
     if lacking:
         raise InputError(
             f"{format_count(lacking, 'face')} of {len(raw.polygons):,} have no texture coordinates; {_RIGHT}"
+        )
+    farthest = float(np.nanmax(np.abs(raw.texture)))
+    if farthest > _FARTHEST:
+        raise InputError(
+            f"its texture reaches out to {farthest:.3g}; a sewn pattern keeps within {_FARTHEST:g}; {_RIGHT}"
         )
     found = list[tuple[str, Surface, FloatArray]]()
     for number, title in enumerate(_titles(raw, seams.island, name)):
