@@ -524,6 +524,23 @@ class Drape(Entry):
     correction: Correction | None = None
 
 
+class PanelDistances(Entry):
+    """How far what flattening gives lies from a pattern that was taken as it is, laid on it, turned and moved."""
+
+    mean_mm: float
+    p95_mm: float
+
+
+class CutPattern(PanelDistances):
+    """A pattern that is a worn mesh's texture, and was taken as it is."""
+
+    unit: str
+    """Of the texture."""
+    area_ratio: float
+    """Its area over that of the worn cloth."""
+    pieces: dict[str, PanelDistances]
+
+
 class Metrics(Entry):
     """The whole file."""
 
@@ -536,6 +553,7 @@ class Metrics(Entry):
     mannequin: Body | None = None
     seams: list[Seam] | None = None
     pairs: list[list[str]] | None = None
+    pattern_of_file: CutPattern | None = None
     girths: dict[str, Girth] | None = None
     rings: list[Ring] | None = None
     constraints: list[Constraint] | None = None

@@ -69,6 +69,7 @@ def _save(case: Case, number: int) -> Path:
         "metrics": "metrics.json",
         "scan": "scan.obj",
         "fit": "fit.obj",
+        "sewn": "sewn.obj",
         "arguments": "arguments.json",
         "studio": "studio.json",
         **{kind: ending[1:] for ending, kind in FOREIGN_ENDINGS.items()},

@@ -313,8 +313,8 @@ def random_case(kind: str, random: Random) -> Case:
         content = damaged_json(random, seeds.METRICS)
     elif kind == "scan":
         content = damaged_bytes(random, random.choice(seeds.bodies()))
-    elif kind == "fit":
-        content = damaged_bytes(random, seeds.SKIRT)
+    elif kind in ("fit", "sewn"):
+        content = damaged_bytes(random, seeds.SKIRT if kind == "fit" else seeds.SEWN)
     elif kind == "gltf" and random.randrange(2):
         content = damaged_json(random, json.loads(seeds.meshes("gltf")[0]))
     else:
@@ -324,7 +324,8 @@ def random_case(kind: str, random: Random) -> Case:
 
 SHARES = {
     "obj": 9, "ply": 10, "stl": 6, "off": 7, "glb": 6, "gltf": 6, "usda": 6, "usdc": 7, "usdz": 3, "scene": 12, "fabric": 9, "pattern": 11,
-    "metrics": 4, "scan": 1, "fit": 4, "arguments": 12, "batch": 6, "result": 4, "folder": 6, **GEOMETRY_SHARES, **FOREIGN_SHARES,
+    "metrics": 4, "scan": 1, "fit": 4, "sewn": 4, "arguments": 12, "batch": 6, "result": 4, "folder": 6,
+    **GEOMETRY_SHARES, **FOREIGN_SHARES,
 }  # fmt: skip
 """How many of a hundred cases, or so, are of which kind: few where one takes seconds."""
 if find_spec("viser") is not None:  # the extra `studio`

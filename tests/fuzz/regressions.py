@@ -7,6 +7,7 @@ NAME.pattern.json                                                    exported in
 NAME.metrics.json                                                    in the folder of results before a run
 NAME.scan.obj                                                        made a mannequin
 NAME.fit.obj                                                         fitted to a size, and taken for a body
+NAME.sewn.obj                                                        taken as a sewn pattern by its texture
 NAME.dxf, .svg, .garmentcode.json                                    its edges listed by `drape --edges`; .rul too
 NAME.sewing.toml                                                     beside a DXF
 NAME.frames.usdc, .lift.obj, .runmetrics.json, .runpattern.json      in the folder of a run: reviewed, exported, draped
@@ -40,6 +41,7 @@ _TWO_ENDINGS = {
     ".metrics.json": "metrics",
     ".scan.obj": "scan",
     ".fit.obj": "fit",
+    ".sewn.obj": "sewn",
     ".arguments.json": "arguments",
     ".studio.json": "studio",
     **FOREIGN_ENDINGS,

@@ -17,7 +17,7 @@ from warpflat.core.output import seal_of
 
 from .promise import Case
 
-__all__ = ["COMMANDS", "FABRIC", "KINDS", "SCENES", "case_of_file", "meshes", "pattern"]
+__all__ = ["COMMANDS", "FABRIC", "KINDS", "SCENES", "SEWN", "case_of_file", "meshes", "pattern"]
 
 BARE = ("--frames", "0", "--no-picture", "--quiet")
 CLOTH = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
@@ -35,6 +35,26 @@ SKIRT = b"".join(
             % (12 * row + k + 1, 12 * row + (k + 1) % 12 + 1, 12 * row + (k + 1) % 12 + 13, 12 * row + k + 13)
             for row in range(7)
             for k in range(12)
+        ),
+    ]
+)
+# Two panels of 30 by 20 cm that are worn at right angles and sewn along one edge, with their pattern as texture, in centimetres.
+SEWN = b"".join(
+    [
+        *(
+            b"v %.2f %.2f %.2f\n" % ((0.1 * k, 0.1 * j, 0.0) if k < 4 else (0.3, 0.1 * j, 0.1 * (k - 3)))
+            for j in range(3)
+            for k in range(7)
+        ),
+        *(b"vt %d %d\n" % (10 * k + 5 * (k > 3), 10 * j) for j in range(3) for k in (0, 1, 2, 3, 3.5, 4.5, 5.5, 6.5)),
+        *(
+            b"f %s\n"
+            % b" ".join(
+                b"%d/%d" % (7 * (j + b) + k + a + 1, 8 * (j + b) + k + a + (k > 2) + 1)
+                for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))
+            )
+            for j in range(2)
+            for k in range(6)
         ),
     ]
 )
@@ -84,7 +104,7 @@ METRICS = {
     "files": {"cloth": {"cloth.obj": "0" * 64, "old.svg": "1" * 64}},
 }
 MESHES = ("obj", "ply", "stl", "off", "glb", "gltf", "usda", "usdc", "usdz")
-KINDS = (*MESHES, "scene", "fabric", "pattern", "metrics", "scan", "fit")
+KINDS = (*MESHES, "scene", "fabric", "pattern", "metrics", "scan", "fit", "sewn")
 COMMANDS = (
     ("flatten", "cloth.obj", "--units", "cm", "--fabric", "denim", "--out", "out", *BARE),
     ("flatten", "cloth.obj", "--units", "m", "--name", "front", "--datum", "0,3", "--model", "membrane", *BARE),
@@ -206,6 +226,13 @@ def case_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool 
         return [
             worn,
             case(("fit", "skirt.obj", *fit, "--from", f"{name}.obj"), body, leaves="out/fit.json", seconds=90.0),
+        ]
+    if kind == "sewn":
+        # A worn garment whose texture is its sewn pattern: taken as it is, and its edges listed.
+        file, flat = f"{name}.obj", ("--units", "m", "--pattern", "uv", "--out", "out", *BARE)
+        return [
+            case(("flatten", file, *flat), {file: content}, subject=file),
+            case(("drape", file, "--units", "m", "--edges"), {file: content}, leaves=None, subject=file),
         ]
     if kind == "arguments":
         arguments = tuple(json.loads(content))

@@ -22,6 +22,7 @@ Of a pattern the last two and metrics.json come out alone."""
 @click.option("--body", metavar="SIZE|SCAN", help='Of a pattern: a size, such as "EU 38", or a scan\'s file.')
 @click.option("--fabric", metavar="NAME", help="Of a pattern.  [default: its own, or woven]")
 @click.option("--seams", type=click.Path(path_type=Path), metavar="FILE", help="Of a pattern: TOML with its [[seams]].")
+@click.option("--units", metavar="UNIT", help="Of a mesh whose texture is its sewn pattern, unless the file says.")
 @click.option("--size", metavar="SIZE", help="Of a graded pattern.  [default: its sample size]")
 @click.option(
     "--correct",
@@ -43,12 +44,14 @@ def drape(
     body: str | None,
     fabric: str | None,
     seams: Path | None,
+    units: str | None,
     size: str | None,
     edges: bool,
     correct: bool,
     usd: bool,
 ) -> int:
-    """Put a sewn garment on its body: a scene's, a run's, or that of a pattern (pattern.json, GarmentCode, DXF or SVG).
+    """Put a sewn garment on its body: a scene's, a run's, or that of a pattern (pattern.json, GarmentCode, DXF, SVG, or a
+    mesh whose texture is its sewn pattern, as of CLO and Style3D).
 
     For a scene it is as if it had a [drape] table; the settings of one that it has hold. A pattern is placed by its seams. A DXF
     or an SVG of another program names none: they stand in a TOML file.
@@ -59,6 +62,7 @@ def drape(
       warpflat drape scenes/basic_block.toml --correct
       warpflat drape out/dress --fabric denim
       warpflat drape shirt_specification.json --body scan.obj
+      warpflat drape tshirt.usd --body avatar.usd
       warpflat drape shirt.dxf --edges
       warpflat drape shirt.dxf --seams shirt.toml --body "EU 38"
     """
@@ -72,10 +76,10 @@ def drape(
 
     if is_pattern_file(scene):
         if edges:
-            click.echo(edge_table(scene, sewing=seams))
+            click.echo(edge_table(scene, sewing=seams, units=units))
             return DONE
         start_warp_silently()
-        job = OutsideJob.read(scene, sewing=seams, body=body)
+        job = OutsideJob.read(scene, sewing=seams, body=body, units=units)
         folder = out if out is not None else Path("out") / f"{job.name}-draped"
         result = drape_outside(job, folder, fabric=fabric, size=size, device=device, usd=usd, correct=correct)
         warnings = warnings_of(result.metrics)
@@ -91,7 +95,14 @@ def drape(
                 click.echo(line)
             click.echo(f"files: {folder}: {', '.join(result.files)}")
         return NOT_CONVERGED if warnings else DONE
-    options = {"--body": body, "--fabric": fabric, "--seams": seams, "--size": size, "--edges": edges or None}
+    options = {
+        "--units": units,
+        "--body": body,
+        "--fabric": fabric,
+        "--seams": seams,
+        "--size": size,
+        "--edges": edges or None,
+    }
     for option, value in options.items():
         if value is not None:
             raise InputError(

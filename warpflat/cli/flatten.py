@@ -69,6 +69,12 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     metavar="MM",
     help="With --component all: sew borders that run along each other within so many millimetres.  [default: 1]",
 )
+@click.option(
+    "--pattern",
+    metavar="uv",
+    help="uv: the islands of the texture are the sewn pattern in true size, as of CLO, Style3D and GarmentCode: take it as it is, and "
+    "compare it with what flattening gives.",
+)
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
@@ -154,6 +160,7 @@ def flatten(
       warpflat flatten shirt.obj --units m --fabric woven --seams auto
       warpflat flatten shirt.obj --units m --keep waist --cut-seam "yoke=points:-0.2,1.4,-0.1 0,1.38,-0.12 0.2,1.4,-0.1"
       warpflat flatten leggings.ply --units m --seams none --cut-seam "plane:0,0,0 1,0,0"
+      warpflat flatten tshirt.usd --pattern uv
     """
     from warpflat.scene.load import make_scene
 
@@ -162,6 +169,7 @@ def flatten(
         "units": ("surface", "units"),
         "component": ("surface", "component"),
         "prim": ("surface", "prim"),
+        "pattern": ("surface", "pattern"),
         "meet": ("surface", "meet_mm"),
         "solver": ("relax", "solver"),
         "max_steps": ("relax", "max_steps"),

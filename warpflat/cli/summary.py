@@ -11,7 +11,7 @@ from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_wo
 from warpflat.flattening.progress import relaxation_words
 from warpflat.garment.rings import rings_line
 
-__all__ = ["notes_line", "summary_lines"]
+__all__ = ["cut_words", "notes_line", "summary_lines"]
 
 # Letters in the line of notes, at most.
 _NOTES_WIDTH = 100
@@ -21,6 +21,14 @@ _OPENED_FIRST = ("review.html", "pattern.pdf", "picture.png", "metrics.json")
 _MAIN_GIRTHS = ("bust", "waist", "hip")
 # A measurement that was completed from others.
 _COMPLETED = re.compile(r"\w+ = [\d.]+ c?m (?!instead of )")
+
+
+def cut_words(taken: Mapping[str, Any]) -> str:
+    """Return in words how a pattern that was taken as it is compares with what flattening gives: the entry `pattern_of_file`."""
+    return (
+        f"as the file's texture has it, in {taken['unit']}, {taken['area_ratio']:.3f} times the area of the worn cloth; flattening lies "
+        f"{taken['mean_mm']:.2f} mm from it on average, 95 % within {taken['p95_mm']:.2f} mm"
+    )
 
 
 def summary_lines(
@@ -51,6 +59,8 @@ def summary_lines(
         lines.append(_clipped(f"size: {size}", width))
     if relaxed := relaxation_words(piece["stages"] for piece in pieces.values()):
         lines.append(f"relaxed: {relaxed}")
+    if taken := metrics.get("pattern_of_file"):
+        lines.append(_clipped(f"pattern: {cut_words(taken)}", width))
     if girths := metrics.get("girths"):
         # The girths of the pattern, each with the ease that it has, and the one wanted where that is another.
         by_level: dict[str, str] = {}

@@ -32,6 +32,8 @@ __all__ = ["Placement", "drape_pattern", "place_pieces"]
 
 # The largest piece of a garment is between so short and so long [m].
 _SIZES = (0.05, 10.0)
+# A designed surface does not belong to a body where more than this share of it lies so deep [m] within.
+_WITHIN, _DEEP = 0.02, 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,12 +110,21 @@ def drape_pattern(
     start_warp()
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
-    lifted = set(meshes) <= set(lifts)
-    if lifted:
-        placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items()}
-    elif body is None:
+    surface = None if body is None else body.surface()
+    solid = None if surface is None else Body(surface.vertices, surface.faces, device=where)
+    # On another body than that of its designed surface a garment starts as one that has none.
+    placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
+    lifted = len(placed) == len(meshes)
+    if lifted and solid is not None:
+        deep = float((solid.gaps(np.concatenate(list(placed.values()))) < -_DEEP).mean())
+        if deep > _WITHIN:
+            lifted = False
+            notes.append(
+                f"{100 * deep:.0f} % of the designed surface lies in this body: the pieces are placed by their seams"
+            )
+    if not lifted and body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
-    else:
+    if not lifted and body is not None:
         placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
@@ -151,9 +162,8 @@ def drape_pattern(
         piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(meshes)},
         lines={**inner, **lines},
     )
-    surface = None if body is None else body.surface()
     designed = Body(cloth.designed, cloth.faces, device=where)
-    solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
+    solid = designed if solid is None else solid
     if not lifted:
         cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid))
     held, frames = held_vertices(cloth, placement.hold), list[NDArray[np.float32]]()

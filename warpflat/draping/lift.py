@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
 from warpflat.pattern.pieces import Piece
 from warpflat.pattern.whole_pieces import MIRRORED
 
-__all__ = ["Lift", "read_lift", "whole_lifts"]
+__all__ = ["Lift", "read_lift", "surface_lift", "whole_lifts"]
 
 #: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]).
 Lift = Callable[[FloatArray], FloatArray]
@@ -53,7 +53,23 @@ def read_lift(path: Path) -> Lift:
         surface, pattern = np.array(space)[triangles[:, :, 0]], np.array(flat)[triangles[:, :, 1]]
         if not (np.abs(surface).max() < FARTHEST and np.abs(pattern).max() < FARTHEST):
             raise InputError(f"a vertex lies farther than {FARTHEST:g} m off; run the scene again")
-        inverse = np.linalg.pinv(np.stack([pattern[:, 1] - pattern[:, 0], pattern[:, 2] - pattern[:, 0]], axis=-1))
+        return _lift(surface, pattern)
+
+
+def surface_lift(space: FloatArray, flat: FloatArray, triangles: IntArray) -> Lift:
+    """Return the map from a pattern to its surface.
+
+    Args:
+        space: #V by 3, the surface [m].
+        flat: #V by 2, the pattern [m].
+        triangles: #T by 3, of both.
+    """
+    return _lift(space[triangles], flat[triangles])
+
+
+def _lift(surface: FloatArray, pattern: FloatArray) -> Lift:
+    """Return the map of triangles in the pattern (#T by 3 by 2) to those in space (#T by 3 by 3)."""
+    inverse = np.linalg.pinv(np.stack([pattern[:, 1] - pattern[:, 0], pattern[:, 2] - pattern[:, 0]], axis=-1))
     tree = cKDTree(pattern.mean(axis=1))
 
     def lift(points: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from warpflat.core.errors import expect, expect_callback, expect_each
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.cutting.separate_pieces import separate
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
+from warpflat.flattening.as_cut import CutPattern
 from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
@@ -64,6 +65,7 @@ class Garment:
         pockets: in the pattern.
         curves: its borders as they are drawn; None if they are as the cloth rests.
         remarks: what could not be had of girths and curves, one sentence each.
+        as_cut: how a pattern that was taken as it is compares with what flattening gives; None if it was not.
     """
 
     name: str
@@ -79,6 +81,7 @@ class Garment:
     pockets: Sequence[Pocket] = ()
     curves: Curves | None = None
     remarks: tuple[str, ...] = ()
+    as_cut: CutPattern | None = None
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
@@ -230,6 +233,8 @@ class Garment:
                 "rings": [ring.as_dict() for ring in self.rings],
                 **({} if self.curves is None else {"curves": self.curves.as_dict()}),
             }
+        if self.as_cut is not None:
+            more = {"pattern_of_file": self.as_cut.as_dict()}
         device = next(iter(self.pieces.values())).network.device
         return run_metrics(pieces, device, {**more, **self.sewing_metrics()})
 
@@ -251,7 +256,8 @@ class Garment:
         if self.sewn is not None:
             held = [result.as_dict() for result in self.sewn.constraints]
             found = {"constraints": held, "sewing": self.sewn.as_dict()}
-        return {"seams": [seam.as_dict() for seam in self.seams], **found} if found or self.form is not None else {}
+        sewn = self.form is not None or self.stitching
+        return {"seams": [seam.as_dict() for seam in self.seams], **found} if found or sewn else {}
 
     def save(self, folder: str | Path, *, picture: bool = True) -> list[str]:
         """Write `metrics.json`, an OBJ per piece and `picture.png`, all of them or none, and return their names.

@@ -67,6 +67,7 @@ class PatternOptions:
         shrinkage: of the shell's cloth; its pieces are drawn larger.
         words: what is printed instead of English words and names.
         lining, interfacing: what these cloths are called; none without a name.
+        true: whether edges are made to run on smoothly across seams; not of a pattern that is taken as it is.
     """
 
     formats: Sequence[str] = _USUAL
@@ -82,6 +83,7 @@ class PatternOptions:
     words: Mapping[str, str] = field(default_factory=dict)
     lining: str = ""
     interfacing: str = ""
+    true: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,7 +268,9 @@ def _write_pattern(
             size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row)
             for size, row in pattern.pieces.items()
         }
-        drafted = draft_garment(replace(pattern, pieces=titled, words=options.words), tolerance=options.tolerance)
+        drafted = draft_garment(
+            replace(pattern, pieces=titled, words=options.words), tolerance=options.tolerance, true=options.true
+        )
     except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
         why = " ".join(str(error).split())
         return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})

@@ -280,7 +280,7 @@ def unsewn_notes(garment: Garment) -> list[str]:
     found = unsewn_borders({name: piece.network.surface for name, piece in garment.pieces.items()}, without=sewn)
     left = len(found) - _MOST_TOLD
     more = [f"{left} more stretches of border run along others and are not sewn"] if left > 0 else []
-    alone = len(garment.pieces) > 1 and garment.sewn is None
+    alone = len(garment.pieces) > 1 and not garment.stitching
     none = ["no borders meet in space, vertex by vertex: the pieces are not sewn to each other"] if alone else []
     return [*found[:_MOST_TOLD], *more, *none]
 

@@ -7,7 +7,7 @@ relaxed; the flat layouts give the shapes. Of a mesh the border is split at its 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
@@ -36,6 +36,7 @@ from warpflat.pattern.from_mesh import MeshFeatures, inner_stretches, line_label
 from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.placement import default_grain
+from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.surface.border_seams import SAME_PLACE
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.cut.dart import fish_eye_measure
@@ -61,7 +62,12 @@ BESIDE, ALIGNED = 0.05, 1e-3
 
 
 def pattern_of_garment(
-    garments: Mapping[str, Garment], *, name: str, rules: EdgeRules | None = None, sample_size: str | None = None
+    garments: Mapping[str, Garment],
+    *,
+    name: str,
+    rules: EdgeRules | None = None,
+    sample_size: str | None = None,
+    twice: bool = True,
 ) -> tuple[Pattern, tuple[str, ...]]:
     """Make the pattern of a garment; of one on a form in one or more sizes. For a mesh see :func:`pattern_of_surface`.
 
@@ -74,6 +80,7 @@ def pattern_of_garment(
         name: of the pattern.
         rules: exceptions for edges.
         sample_size: see :class:`Pattern`.
+        twice: whether of two mirror images of a mesh one is drawn, to be cut twice.
 
     Returns:
         The pattern, and what was chosen on the way, one sentence each.
@@ -87,7 +94,10 @@ def pattern_of_garment(
         pattern, notes = pattern_of_surface(
             list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams
         )
-        if len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
+        # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
+        stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
+        pattern = replace(pattern, seams=[_eased(seam, pattern, stretched) for seam in pattern.seams])
+        if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
             return pattern, notes
         pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
@@ -189,6 +199,20 @@ def pattern_of_garment(
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
     pattern = add_pockets(pattern, sample.pockets)
     return replace(pattern, worn=describe_worn(garments, pattern.sample)), notes
+
+
+def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
+    """Return a seam of pieces that are stretched to each other with its longer side last, eased to the other."""
+    if frozenset(side.piece for row in seam.sides for side in row) not in stretched:
+        return seam
+    first, second = sorted(
+        seam.sides,
+        key=lambda row: sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row),
+    )
+    one, other = (
+        sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row) for row in (first, second)
+    )
+    return replace(seam, sides=(first, second), ease=other / one - 1.0) if other - one > SEAM_TOLERANCE else seam
 
 
 def _drawn_once(

@@ -85,13 +85,16 @@ class OutsideJob:
     sources: tuple[Path, ...]
 
     @classmethod
-    def read(cls, path: Path, *, sewing: Path | None = None, body: str | None = None) -> OutsideJob:
+    def read(
+        cls, path: Path, *, sewing: Path | None = None, body: str | None = None, units: str | None = None
+    ) -> OutsideJob:
         """Read a pattern, and how it is sewn.
 
         Args:
-            path: a run's folder, its pattern.json, a DXF or an SVG.
+            path: a run's folder, its pattern.json, GarmentCode's JSON, a DXF, an SVG, or a mesh whose texture is its sewn pattern.
             sewing: a TOML file (see :class:`SewingTable`).
             body: a size or the file of a scan, before that of the sewing file and of the run.
+            units: of a mesh that does not say.
 
         Raises:
             InputError: a file cannot be read, a name is unknown, or there is no seam or no body.
@@ -102,7 +105,7 @@ class OutsideJob:
         sources: list[Path] = []
         with listening_to_reads(sources.append):
             table = SewingTable() if sewing is None else check_table(SewingTable, read_toml(sewing), str(sewing))
-            pattern, lifts, run_body = _read(path, table)
+            pattern, lifts, run_body = _read(path, table, units)
             with errors_named(str(sewing)):
                 # The pattern with the folds, quantities and seams of the sewing file, whose seams replace the
                 # pattern's.
@@ -135,13 +138,14 @@ class OutsideJob:
 
 
 def is_pattern_file(path: Path) -> bool:
-    """Return whether a path is that of a pattern rather than of a scene: a folder, or a JSON, DXF or SVG file."""
+    """Return whether a path is that of a pattern rather than of a scene: a folder, a JSON, DXF or SVG file, or a mesh."""
     from warpflat.export.read_pattern import PATTERN_ENDINGS
+    from warpflat.surface.io.read import SUFFIXES
 
-    return path.is_dir() or path.suffix.lower() in PATTERN_ENDINGS
+    return path.is_dir() or path.suffix.lower() in (*PATTERN_ENDINGS, *SUFFIXES)
 
 
-def edge_table(path: Path, *, sewing: Path | None = None) -> str:
+def edge_table(path: Path, *, sewing: Path | None = None, units: str | None = None) -> str:
     """Return every edge of a pattern's pieces with its length and ends, a line each.
 
     Raises:
@@ -149,7 +153,7 @@ def edge_table(path: Path, *, sewing: Path | None = None) -> str:
     """
     table = SewingTable() if sewing is None else check_table(SewingTable, read_toml(sewing), str(sewing))
     lines = []
-    pattern = _read(path, table)[0]
+    pattern = _read(path, table, units)[0]
     for piece in pattern.pieces[pattern.sample]:
         for edge in piece.edges:
             (x, y), (u, v) = 1e3 * edge.points[[0, -1]]
@@ -159,11 +163,19 @@ def edge_table(path: Path, *, sewing: Path | None = None) -> str:
     return "\n".join(lines)
 
 
-def _read(path: Path, table: SewingTable) -> tuple[Pattern, dict[str, Lift], dict[str, Any] | None]:
+def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, dict[str, Lift], dict[str, Any] | None]:
     """Return the pattern, the ways to its designed surface, and the run's table of its body."""
-    from warpflat.draping.lift import read_lift
+    from warpflat.draping.lift import read_lift, surface_lift
     from warpflat.export.read_pattern import read_pattern
+    from warpflat.surface.io.read import SUFFIXES
 
+    if path.suffix.lower() in SUFFIXES and not path.is_dir():
+        from warpflat.garment.as_cut import read_cut_pattern
+
+        worn = read_cut_pattern(path, units=units, name=make_file_name(path.stem))
+        return worn.pattern, {name: surface_lift(*each) for name, each in worn.surfaces.items()}, None
+    if units is not None:
+        raise InputError(f"--units: is for a mesh whose texture is its pattern; {path} says its own")
     allowance = None if table.allowance_mm is None else 1e-3 * table.allowance_mm
     folder = path if path.is_dir() else None
     pattern = read_pattern(path / "pattern.json" if folder else path, allowance=allowance)

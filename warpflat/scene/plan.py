@@ -18,6 +18,7 @@ from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
+from warpflat.garment.as_cut import garment_as_cut
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.drawn_curves import CURVES_MM
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
@@ -40,10 +41,11 @@ from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fab
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
-from warpflat.scene.surface import scene_pieces, scene_surface, with_piece_tables
+from warpflat.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
 from warpflat.seams.find import GRAIN, FoundSeams, seam_words
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import BorderSeam
+from warpflat.surface.io.sewn_panels import SewnPanel
 from warpflat.surface.mesh import Surface
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
@@ -59,6 +61,7 @@ class MeshPlan:
         sequences: the pieces, uncut, each with its cuts.
         seams: those that the scene names.
         found: seams that were found on a whole garment, which its pieces come from.
+        panels: of the sewn pattern that the file has, which is taken as it is.
         device: Warp device, before the scene's own.
     """
 
@@ -67,6 +70,7 @@ class MeshPlan:
     sequences: Sequence[CutSequence]
     seams: Sequence[BorderSeam] = ()
     found: FoundSeams | None = None
+    panels: Sequence[SewnPanel] = ()
     device: str | None = None
 
     @property
@@ -98,7 +102,7 @@ class MeshPlan:
         names, recorders = [surface.name for surface in self.surfaces], recorders or {}
         steps = {name: None if callback is None else partial(callback, name) for name in names}
         with errors_named(scene.where):
-            if len(names) == 1 and self.found is None and not tables:
+            if len(names) == 1 and self.found is None and not tables and not self.panels:
                 step = steps[names[0]]
                 pieces = [flatten_surface(scene, self.surfaces[0], relax, callback=step, device=self.device)]
             else:
@@ -137,12 +141,17 @@ class MeshPlan:
             lines = {piece.surface.name: piece.network.surface.lines for piece in pieces}
             constraints = scene_constraints(settings.constraints, lines)
             # Where nobody has said what meets what, a seam is eased as a tailor does it.
-            eased = self.found is not None
+            eased = self.found is not None or bool(self.panels)
             garment = sew_pieces(
                 pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased, bands=settings.bands,
                 shorter=settings.bands_shorter,
             )  # fmt: skip
-        if garment.sewn is not None:
+            if self.panels:
+                garment = garment_as_cut(
+                    self.panels, self.surfaces, fabric=scene_fabric(scene), name=scene.name, flattened=garment,
+                    device=self.device or settings.device,
+                )  # fmt: skip
+        if garment.sewn is not None or self.panels:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])
         found = () if self.found is None else (seam_words(self.found), *self.found.notes)
@@ -284,9 +293,14 @@ def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | No
     with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         seams = scene_surface_seams(settings.seams, scene.name)
-    surface = None if cuts is not None else plain_panel(scene)
-    found = None if cuts is not None or surface is not None else found_seams(scene)
-    parts = found.pieces if found is not None else None if cuts is not None else scene_pieces(scene)
+    panels = [] if cuts is not None else scene_sewn_panels(scene)
+    surface = None if cuts is not None or panels else plain_panel(scene)
+    found = None if cuts is not None or surface is not None or panels else found_seams(scene)
+    parts: Sequence[Surface] | None = [panel.surface for panel in panels] or None
+    if not panels and cuts is None:
+        parts = found.pieces if found is not None else scene_pieces(scene)
+    # A pattern that is taken as it is keeps its corners.
+    drawing = replace(drawing, true=drawing.true and not panels)
     if parts is None:
         sequences = [cuts or scene_cuts(scene, device=device, surface=surface)]
     else:
@@ -317,7 +331,9 @@ def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | No
         with errors_named(f"{scene.where}: pattern"):
             check_edge_names(surfaces, rules, cuts=[plan.name for sequence in sequences for plan in sequence.plans])
             check_names(drawing.names, {surface.name: None for surface in surfaces})
-    return MeshPlan(scene=scene, drawing=drawing, sequences=sequences, seams=seams, found=found, device=device)
+    return MeshPlan(
+        scene=scene, drawing=drawing, sequences=sequences, seams=seams, found=found, panels=panels, device=device
+    )
 
 
 def scene_cuts(scene: Scene, *, device: str | None = None, surface: Surface | None = None) -> CutSequence:

@@ -205,6 +205,8 @@ class FileSurface(Table):
     prim: str | None = None
     meet_mm: Annotated[float, Field(ge=0, le=10)] | None = None
     """With component = "all": borders that run along each other within this distance are sewn; 1 if not given."""
+    pattern: Literal["uv"] | None = None
+    """"uv": the islands of the texture are the sewn pattern, in true size; it is taken as it is and compared with what flattening gives."""
 
     @model_validator(mode="before")
     @classmethod
@@ -691,6 +693,13 @@ else:
     RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
 
 
+#: Keys of a scene that change the pattern of a mesh.
+_CHANGES_PATTERN = (
+    "lines", "cuts", "auto_cut", "pieces", "seams", "find_seams", "seams_cut", "constraints", "datum", "start", "grain_angle", "bands",
+    "bands_shorter", "wear", "drape",
+)  # fmt: skip
+
+
 class SceneTable(Table):
     """A scene file; `datum` names a line given here, one that the file or shape brings, or a side of the border."""
 
@@ -784,6 +793,16 @@ class SceneTable(Table):
                 raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
             if self.ease is not None:
                 raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
+            if isinstance(self.surface, FileSurface) and self.surface.pattern is not None:
+                for key in _CHANGES_PATTERN:
+                    if getattr(self, key) != type(self).model_fields[key].get_default(call_default_factory=True):
+                        name = {"find_seams": "seams"}.get(key, key)
+                        raise ValueError(
+                            f'{name} belongs to pieces that are flattened; with surface.pattern = "uv" the pattern is taken as it is: '
+                            "leave one of them out"
+                        )
+                if self.surface.component is not None:
+                    raise ValueError('surface.component: pattern = "uv" takes all islands of the texture; leave it out')
             found = None if self.find_seams is None or self.find_seams.find == "none" else self.find_seams.find
             whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
             if whole and not isinstance(self.surface, FileSurface):

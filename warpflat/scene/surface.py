@@ -17,11 +17,12 @@ from warpflat.scene.schema import (
     ShapeSurface,
 )
 from warpflat.surface.io.read import RawMesh, read_mesh_file, surface_of_file
+from warpflat.surface.io.sewn_panels import SewnPanel, read_sewn_panels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.border import SIDES, line_on_border
 from warpflat.surface.paths.lines import line_between, line_from_curve, line_from_indices, line_on_plane, with_lines
 
-__all__ = ["scene_pieces", "scene_surface", "with_piece_tables"]
+__all__ = ["scene_pieces", "scene_sewn_panels", "scene_surface", "with_piece_tables"]
 
 
 def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | None = None) -> Surface:
@@ -123,6 +124,18 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
         return None
     meet = MEET if table.meet_mm is None else 1e-3 * table.meet_mm
     return read_pieces(_file(scene, table), units=table.units, name=scene.name, meet=meet)
+
+
+def scene_sewn_panels(scene: Scene) -> list[SewnPanel]:
+    """Read the sewn panels of a scene whose `surface.pattern` is "uv"; none for other scenes.
+
+    Raises:
+        InputError: the file is wrong, or its texture is no pattern of true size.
+    """
+    table = scene.settings.surface
+    if not isinstance(table, FileSurface) or table.pattern is None:
+        return []
+    return read_sewn_panels(_file(scene, table), units=table.units, prim=table.prim, name=scene.name)
 
 
 def _file(scene: Scene, table: FileSurface) -> Path:

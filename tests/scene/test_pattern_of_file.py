@@ -1,0 +1,175 @@
+"""A worn garment whose texture is its sewn pattern: taken as it is, drafted, draped, and compared with what flattening gives."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import Command
+
+from warpflat.core.polyline import polyline_length
+from warpflat.export.read_pattern import read_pattern
+from warpflat.export.sewn_usd import write_sewn_usd
+from warpflat.garment.as_cut import read_cut_pattern
+from warpflat.pattern.pieces import Pattern
+from warpflat.scene.outside_pattern import OutsideJob
+from warpflat.surface.io.sewn_panels import read_sewn_panels
+
+ROWS, COLUMNS = 9, 13
+QUIET = ("--frames", "0", "--no-picture", "--quiet")
+
+
+def skirt(wide: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A tube of two halves: points [m], quads, patterns [m], quads of the patterns. The back is cut `wide` times as wide as it is worn."""
+    turn, height = np.linspace(0.0, np.pi, COLUMNS), np.linspace(0.0, 0.4, ROWS)
+    radius = 0.15 + 0.1 * (0.4 - height)
+    points, flat, quads, cut = [], [], [], []
+    grid = np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS)
+    faces = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    for half, start in enumerate((-0.5 * np.pi, 0.5 * np.pi)):
+        angle = start + turn
+        ring = np.stack([np.sin(angle), np.zeros(COLUMNS), np.cos(angle)], axis=1)
+        points.append((radius[:, None, None] * ring + np.array([0.0, 1.0, 0.0]) * height[:, None, None]).reshape(-1, 3))
+        # The arcs of a cone lie flat around its tip.
+        away, share = radius * np.hypot(1.0, 0.1) / 0.1, 0.1 / np.hypot(1.0, 0.1)
+        around = share * (turn - 0.5 * np.pi) * (wide if half else 1.0)
+        place = away[:, None, None] * np.stack([np.sin(around), -np.cos(around)], axis=1)
+        flat.append(place.reshape(-1, 2) + np.array([0.8 * half, 3.0]))
+        quads.append(faces + half * grid.size)
+        cut.append(faces + half * grid.size)
+    points = np.concatenate(points)
+    # Both halves share the points of their seams.
+    index = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
+    return points[index[1]], index[2].ravel()[np.concatenate(quads)], np.concatenate(flat), np.concatenate(cut)
+
+
+def write_obj(path: Path, unit: float = 0.01, *, wide: float = 1.0, change: Any = None) -> Path:
+    points, quads, flat, cut = skirt(wide)
+    places = flat / unit
+    places = places if change is None else change(places)
+    rows = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points] + [f"vt {u:.9g} {v:.9g}" for u, v in places]
+    for half in range(2):
+        rows.append(f"g {('front', 'back')[half]}")
+        both = zip(np.array_split(quads, 2)[half] + 1, np.array_split(cut, 2)[half] + 1, strict=True)
+        rows += ["f " + " ".join(f"{v}/{t}" for v, t in zip(face, corner, strict=True)) for face, corner in both]
+    path.write_text("\n".join([*rows, ""]))
+    return path
+
+
+def edge_lengths(pattern: Pattern) -> dict[str, list[float]]:
+    return {piece.name: sorted(1e3 * edge.length for edge in piece.edges) for piece in pattern.pieces[pattern.sample]}
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.01, 0.001])
+def test_a_pattern_that_is_the_texture_is_drafted_as_it_is_and_compared(command: Command, unit: float):
+    write_obj(Path("skirt.obj"), unit)
+    done = command("flatten", "skirt.obj", "--units", "m", "--pattern", "uv", "--out", "out", *QUIET[:-1])
+    assert done.code == 0
+    metrics = json.loads(Path("out/metrics.json").read_text())
+    taken = metrics["pattern_of_file"]
+    assert taken["unit"] == {1.0: "m", 0.01: "cm", 0.001: "mm"}[unit]
+    assert taken["area_ratio"] == pytest.approx(1.0, abs=0.01)
+    # A cone can lie flat: flattening meets its pattern as near as its chords are to their arcs.
+    assert 0.0 < taken["mean_mm"] < taken["p95_mm"] < 2.0
+    assert (
+        f"flattening lies {taken['mean_mm']:.2f} mm from it on average, 95 % within {taken['p95_mm']:.2f} mm"
+        in done.out
+    )
+    assert len(metrics["seams"]) == 2
+    flat = skirt()[2]
+    hem = 1e3 * polyline_length(flat[:COLUMNS])
+    for ending in ("pattern.json", "skirt.dxf", "skirt.svg"):
+        read = read_pattern(Path("out") / ending)
+        assert [piece.name for piece in read.pieces[read.sample]] == ["front"]  # which serves for the back, turned over
+        assert edge_lengths(read)["front"][-1] == pytest.approx(hem, abs=0.1)
+    assert Path("out/pattern.pdf").exists()
+
+
+def test_sides_that_were_cut_unlike_are_eased(tmp_path: Path):
+    long = write_obj(tmp_path / "skirt.obj", wide=1.1)
+    pattern = read_cut_pattern(long, units="m", name="skirt").pattern
+    assert {piece.name for piece in pattern.pieces[""]} == {"front", "back"}
+    assert [seam.ease for seam in pattern.seams] == [0.0, 0.0]
+    turned = write_obj(
+        tmp_path / "long.obj",
+        change=lambda places: np.where(np.arange(len(places))[:, None] < ROWS * COLUMNS, places, places * 1.03),
+    )
+    pattern = read_cut_pattern(turned, units="m", name="skirt").pattern
+    assert [seam.ease for seam in pattern.seams] == pytest.approx([0.03, 0.03], abs=1e-6)
+    assert {seam.sides[1][0].piece for seam in pattern.seams} == {"back"}
+
+
+def test_a_worn_mesh_is_draped_by_its_pattern_from_where_it_is_worn(command: Command):
+    write_obj(Path("skirt.obj"))
+    listed = command("drape", "skirt.obj", "--units", "m", "--edges")
+    assert listed.code == 0
+    assert "front.to back: " in listed.out
+    job = OutsideJob.read(Path("skirt.obj"), units="m", body="EU 38")
+    worn = skirt()[0]
+    for piece in job.pattern.pieces[""]:
+        places = job.lifts[piece.name](np.concatenate([edge.points for edge in piece.edges]))
+        assert max(np.linalg.norm(worn - place, axis=1).min() for place in places) < 1e-4
+
+
+def test_what_is_written_as_style3d_has_it_is_read_back(tmp_path: Path):
+    points, quads, flat, cut = skirt()
+    half = len(quads) // 2
+    pieces = {"front": slice(0, half), "back": slice(half, 2 * half)}
+    write_sewn_usd(tmp_path / "worn.usdc", points, quads.astype(np.int32), flat, cut.astype(np.int32), pieces)
+    pattern = read_cut_pattern(tmp_path / "worn.usdc", units=None, name="worn").pattern
+    source = read_cut_pattern(write_obj(tmp_path / "skirt.obj"), units="m", name="skirt").pattern
+    assert {seam.name for seam in pattern.seams} == {seam.name for seam in source.seams}
+    assert len(pattern.seams) == 2
+    for name, lengths in edge_lengths(source).items():
+        assert edge_lengths(pattern)[name] == pytest.approx(lengths, abs=0.01)
+
+
+REFUSED = {
+    "no texture": r"no texture coordinates",
+    "normalised": r"no pattern of true size: in \w+, the nearest unit, it has \d\.\d\d times the area",
+    "over each other": r"over each other with 50 % of their area, most of all 'front' and 'back'",
+    "over itself": r"island 'back' of its texture lies over itself",
+}
+
+
+@pytest.mark.parametrize(("kind", "message"), REFUSED.items(), ids=REFUSED)
+def test_a_texture_that_is_no_sewn_pattern_is_refused_in_one_line(command: Command, kind: str, message: str):
+    def laid(places: np.ndarray) -> np.ndarray:
+        if kind == "normalised":
+            return places * 0.0037
+        if kind == "over each other":
+            return np.where(np.arange(len(places))[:, None] < ROWS * COLUMNS, places, places - [80.0, 0.0])
+        if kind == "over itself":
+            folded = places.copy()
+            folded[ROWS * COLUMNS + 4 * COLUMNS + 6] += [7.0, 0.0]
+            return folded
+        return places
+
+    file = write_obj(Path("skirt.obj"), change=laid)
+    if kind == "no texture":
+        file.write_text(re.sub(r"/\d+", "", re.sub(r"(?m)^vt .*\n", "", file.read_text())))
+    told = command("flatten", "skirt.obj", "--units", "m", "--pattern", "uv", "--out", "out", *QUIET).refusal
+    assert told.startswith("skirt.obj: ")
+    assert re.search(message, told)
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [("--seams", "uv"), ("--component", "all"), ("--datum", "left"), ("--grain-angle", "45"), ("--bands", "straight")],
+)
+def test_a_pattern_as_it_is_is_not_changed(command: Command, more: tuple[str, ...]):
+    write_obj(Path("skirt.obj"))
+    told = command("flatten", "skirt.obj", "--units", "m", "--pattern", "uv", "--out", "out", *more, *QUIET).refusal
+    assert "leave" in told
+
+
+def test_names_of_islands_are_those_of_the_file(tmp_path: Path):
+    panels = read_sewn_panels(write_obj(tmp_path / "skirt.obj"), units="m")
+    assert [panel.surface.name for panel in panels] == ["front", "back"]
+    assert [panel.unit for panel in panels] == ["cm", "cm"]
+    np.testing.assert_allclose([panel.area / panel.worn_area for panel in panels], 1.0, atol=0.01)
