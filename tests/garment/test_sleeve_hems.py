@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bodies import body_of_size
 
-from warpflat.core.polyline import segment_lengths
+from warpflat.core.polyline import polyline_length, segment_lengths
 from warpflat.garment.constraints import Straight, straight_hems
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.mannequin.forms import FormResult, shipped_form
@@ -95,3 +95,19 @@ def test_short_sleeve_is_not_wrung_and_its_hem_is_straight(body: Mannequin) -> N
     cap = garment.pieces["sleeve_left"].positions[form.pieces["sleeve_left"].edges["armhole left"]]
     start, end = sorted((cap[0], cap[-1]), key=lambda p: p[0])
     assert abs(np.degrees(np.arctan2(end[1] - start[1], end[0] - start[0]))) < 3.5
+
+
+def test_a_loose_sleeve_hangs_from_the_armhole_without_a_saddle() -> None:
+    body = body_of_size(15.0)
+    form, _ = _sleeve(body)
+    garment = flatten_form(body, form, fabric="woven")
+    assert garment.pieces["sleeve_left"].measures["wear"]["outside"] < 0.004
+    # It is no wider at the biceps than asked for, but where it hangs.
+    layout = body.layout
+    row = layout.arms["left"][layout.arm_row["biceps"]]
+    ease = polyline_length(form.vertices[row], closed=True) - polyline_length(body.vertices[row], closed=True)
+    assert 0.08 <= ease < 0.087
+    # The underarm runs straight from the armhole to the biceps.
+    line = form.vertices[layout.arms["left"][: layout.arm_row["biceps"] + 1, 0]]
+    chord = np.linalg.norm(line[-1] - line[0])
+    assert polyline_length(line) < 1.001 * chord

@@ -352,3 +352,20 @@ def test_cloth_bridges_the_small_of_the_back_and_stays_where_it_stands_out() -> 
     kept = full.reshape(-1, 3).copy()
     bridge_rows(kept, grid, {"hip": 0, "waist": 4}, ("waist", "hip"))
     assert kept == pytest.approx(full.reshape(-1, 3), abs=1e-9)
+
+
+def test_a_skirt_hangs_straight_from_a_belly(body: Mannequin) -> None:
+    apple = Mannequin.from_measurements(bust=1.10, waist=1.14, hip=1.12, resolution_mm=15)
+    layout = apple.layout
+    rows = {level: layout.rings[layout.level_row[level]] for level in ("waist", "hip", "knee")}
+    form = apple.form("skirt")
+    # In front it stands no more than 20 mm behind the belly, down to the knee; the body's hip lies 60 mm behind.
+    ahead = {level: float(form.vertices[row[0], 2]) for level, row in rows.items()}
+    assert ahead["waist"] - float(apple.vertices[rows["hip"][0], 2]) > 0.06
+    assert all(ahead["waist"] - ahead[level] < 0.021 for level in ("hip", "knee"))
+    assert "hip" not in form.ease
+    # A body that only leans gets its ease.
+    form = body.form("skirt")
+    assert form.ease["hip"] == 3.0
+    girths = [convex_girth(vertices[rows["hip"]]) for vertices in (form.vertices, body.vertices)]
+    assert girths[0] - girths[1] == pytest.approx(0.03, abs=0.0015)

@@ -444,3 +444,29 @@ def test_tapes_that_noise_moves_say_that_they_are_guesses() -> None:
     # Others hold.
     assert not guesses & {"head", "thigh left", "thigh right", "biceps left"}
     assert any("noise of 1.8 mm moves it" in note for note in noisy.notes)
+
+
+def _elbow_degrees(body: Mannequin) -> float:
+    """Return by how much the left arm's middles bend from upper arm to forearm."""
+    grid, rows = body.layout.arms["left"], body.layout.arm_row
+    upper, lower = np.diff(
+        [body.vertices[grid[rows[name]]].mean(axis=0) for name in ("biceps", "elbow", "wrist")], axis=0
+    )
+    return float(np.degrees(np.arccos(upper @ lower / (np.linalg.norm(upper) * np.linalg.norm(lower)))))
+
+
+@needs_bodies
+def test_bent_elbows_hang_and_a_kept_pose_stays_bent() -> None:
+    hanging, kept = scanned_body("female"), on_scan(*scan("female"), keep_pose=True)
+    assert _elbow_degrees(hanging) < 12.0
+    assert any("hang nearly straight" in note for note in hanging.notes)
+    assert not any(dart.name.startswith("elbow") for dart in hanging.form("shirt").darts)
+    assert _elbow_degrees(kept) > 25.0
+    assert "the mannequin keeps the scan's pose" in kept.notes
+    # The legs stand as far apart as the scan's, and tapes read the same.
+    ankles = [
+        np.ptp([body.line(f"ankle {side}")[:, 0].mean() for side in ("left", "right")]) for body in (kept, hanging)
+    ]
+    assert ankles[0] > ankles[1] + 0.05
+    for name in ("bust", "waist", "hip", "wrist left"):
+        assert kept.measures[name].girth == pytest.approx(hanging.measures[name].girth, abs=1e-6)

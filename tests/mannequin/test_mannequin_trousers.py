@@ -106,3 +106,18 @@ def test_the_crotch_curve_moves_up_and_down_only(body: Mannequin) -> None:
     wide = form_from_mapping("wide", {"like": "trousers", "profiles": {"crotch": {"offset_cm": 4.0}}})
     with pytest.raises(InputError, match="profile crotch: it moves up or down only"):
         body.form(wide)
+
+
+@pytest.mark.parametrize("given", [{}, {"bust": 0.90, "waist": 0.76, "hip": 1.16}], ids=["EU 38", "pear"])
+def test_the_outseam_runs_into_the_straight_leg_without_a_corner(given: dict[str, float]) -> None:
+    body = (
+        Mannequin.from_size("EU 38", resolution_mm=15)
+        if not given
+        else Mannequin.from_measurements(resolution_mm=15, **given)
+    )
+    made, layout = body.form("trousers"), body.layout
+    rows, column = layout.leg_row, layout.to_outseam
+    ways = np.diff(made.vertices[layout.legs["left"][1 : rows["leg_knee"], column]], axis=0)
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    assert np.degrees(np.arccos((ways[1:] * ways[:-1]).sum(axis=1).min())) < 4.0
+    assert depth_inside(made, body) < 0.0001

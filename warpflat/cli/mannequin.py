@@ -29,6 +29,7 @@ __all__ = ["mannequin", "read_lengths"]
 @click.option("--facing", metavar="AXIS", help="Where the scan looks, such as +z.  [default: told from its shape]")
 @click.option("--up", metavar="AXIS", help="Where the scan's head is, such as +y.  [default: told from its shape]")
 @click.option("--landmark", "landmarks", multiple=True, metavar="NAME=METRES", help="A height known better.")
+@click.option("--keep-pose", is_flag=True, help="Keep the scan's arms and legs; else it stands as a tape asks.")
 @click.option("--keep-sides", is_flag=True, help="Keep the scan's left and right; else they are averaged.")
 @click.option(
     "--resolution", type=click.FloatRange(2, 40), metavar="MM", help="Wished edge of the quads.  [default: 10]"
@@ -74,6 +75,8 @@ def mannequin(
         raise InputError(f"command line: {of_scan[0]} is about a --scan; leave it out")
     if scan is not None and "table" in tables:
         raise InputError("command line: --table completes measurements; a scan has its own: leave it out")
+    if tables.pop("keep_pose", False):
+        tables["pose"] = "scan"
     if tables.pop("keep_sides", False):
         tables["symmetric"] = False
     if size is not None:

@@ -29,8 +29,14 @@ _LEAST_MITRE = 0.5
 _SHARED = 3.0
 # Standard deviation [m] along the arm of the mean that bows a sleeve around the elbow.
 _ELBOW_BOW = 0.03
+# Straight cloth hangs from a belly that stands out over the hip by more than this [m]: bodies lean as far without one.
+_BELLY = 0.02
 # The cloth of a straight leg hangs from the crotch curve down to this share of the way from thigh to knee.
 _HANGS = 0.8
+# Standard deviation [m] along the leg of the mean that rounds a straight leg where it leaves the thigh.
+_THIGH_BOW = 0.04
+# A loose sleeve that hangs from its armhole is wider at the biceps. So many times it gets so much less there: most of its girth hangs.
+_HANGING_ROUNDS, _HANGING_STEP = 3, 2.5
 # Parts of the body whose profiles can be mixed with each other.
 _PARTS = (RING_LEVELS, ARM_LEVELS[1:], LEG_LEVELS[1:])
 
@@ -163,6 +169,9 @@ def _move_rings(
 
     rows = np.array([layout.level_row[level] for level in RING_LEVELS])
     moves = _level_moves(body, layout.rings, layout.level_row, RING_LEVELS, changes, _ring_move)
+    for pair in ruled:
+        if set(pair) <= set(RING_LEVELS):
+            _hang_below_belly(moves, body, layout, sorted(map(RING_LEVELS.index, pair)))
     heights = [
         float(body[layout.rings[r[0]], 1].mean() + m[:, 1].mean()) for r, m in zip(rows[:, None], moves, strict=True)
     ]
@@ -180,6 +189,33 @@ def _move_rings(
     for pair in ruled:
         if not set(pair) & {*ARM_LEVELS, *LEG_LEVELS}:
             rule_rows(out, layout.rings, row_of, pair, body[solid])
+
+
+def _hang_below_belly(moves: list[FloatArray], body: FloatArray, layout: Layout, span: Sequence[int]) -> None:
+    """Move the levels up to the waist out to the belly, if it stands out over them: a skirt hangs straight from there.
+
+    Args:
+        moves: by level, #P by 3 [m], changed in place.
+        body: #V by 3 [m].
+        layout: the grid.
+        span: numbers of the lowest and the highest level of the straight cloth; those above, up to the waist, may be the belly's.
+    """
+    rows = [body[layout.rings[layout.level_row[level]]] + move for level, move in zip(RING_LEVELS, moves, strict=True)]
+    waist = RING_LEVELS.index("waist")
+    for level in range(span[0], waist):
+        middle = rows[level].mean(axis=0)[[0, 2]]
+
+        def polar(row: FloatArray, middle: FloatArray = middle) -> tuple[FloatArray, FloatArray]:
+            away = row[:, [0, 2]] - middle
+            return np.arctan2(away[:, 0], away[:, 1]), np.linalg.norm(away, axis=1)
+
+        angle, own = polar(rows[level])
+        reach = own.copy()
+        for above in range(max(level, span[1]) + 1, waist + 1):
+            at, radius = polar(rows[above])
+            order = np.argsort(at)
+            reach = np.maximum(reach, np.interp(angle, at[order], radius[order], period=2.0 * np.pi) - _BELLY)
+        moves[level][:, [0, 2]] += (reach / own - 1.0)[:, None] * (rows[level][:, [0, 2]] - middle)
 
 
 def _level_moves(
@@ -305,21 +341,31 @@ def _move_arms(
     from scipy.ndimage import gaussian_filter1d
 
     for grid in layout.arms.values():
-        at_levels = _level_moves(body, grid, layout.arm_row, ARM_LEVELS[1:], changes, _arm_move)
-        moves = [out[grid[0]] - body[grid[0]], *at_levels]
-        rows = np.array([layout.arm_row[level] for level in ARM_LEVELS])
-        out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
-        if changes.get("elbow", (None, 0.0))[1] > 0.0:
-            # The rows of a loose sleeve go around the elbow in a bow: cloth does not follow the crease of a bent arm.
-            first, elbow, last = (layout.arm_row[level] for level in ("biceps", "elbow", "wrist"))
-            bent = out[grid[first : last + 1]]
-            apart = np.linalg.norm(np.diff(bent.mean(axis=1), axis=0), axis=1)[: 2 * (elbow - first)].mean()
-            smooth = gaussian_filter1d(bent, _ELBOW_BOW / max(apart, 1e-9), axis=0, mode="nearest")
-            near = np.interp(np.arange(first, last + 1), [first, elbow, last], [0.0, 1.0, 0.0])[:, None, None]
-            out[grid[first : last + 1]] = bent + near * near * (3.0 - 2.0 * near) * (smooth - bent)
-        for pair in ruled:
-            if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
-                rule_rows(out, grid, layout.arm_row, pair, None)
+        own, biceps = dict(changes), grid[layout.arm_row["biceps"]]
+        change, ease_cm = changes.get("biceps", (Adjustment(), 0.0))
+        wished = 0.0
+        for _ in range(_HANGING_ROUNDS if ease_cm > 0.0 else 1):
+            at_levels = _level_moves(body, grid, layout.arm_row, ARM_LEVELS[1:], own, _arm_move)
+            moves = [out[grid[0]] - body[grid[0]], *at_levels]
+            rows = np.array([layout.arm_row[level] for level in ARM_LEVELS])
+            out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
+            if changes.get("elbow", (None, 0.0))[1] > 0.0:
+                # The rows of a loose sleeve go around the elbow in a bow: cloth does not follow the crease of a bent arm.
+                first, elbow, end = (layout.arm_row[level] for level in ("biceps", "elbow", "wrist"))
+                bent = out[grid[first : end + 1]]
+                apart = np.linalg.norm(np.diff(bent.mean(axis=1), axis=0), axis=1)[: 2 * (elbow - first)].mean()
+                smooth = gaussian_filter1d(bent, _ELBOW_BOW / max(apart, 1e-9), axis=0, mode="nearest")
+                near = np.interp(np.arange(first, end + 1), [first, elbow, end], [0.0, 1.0, 0.0])[:, None, None]
+                out[grid[first : end + 1]] = bent + near * near * (3.0 - 2.0 * near) * (smooth - bent)
+            for pair in ruled:
+                if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
+                    rule_rows(out, grid, layout.arm_row, pair, None)
+            if ease_cm > 0.0:
+                wished = wished or polyline_length(out[biceps], closed=True)
+                # Skin runs from the trunk into the arm on a saddle, and around the shoulder's muscle; cloth lies on neither.
+                _hang(out, layout, grid[: layout.arm_row["elbow"] + 1])
+                more = 100.0 * (polyline_length(out[biceps], closed=True) - wished)
+                own["biceps"] = (change, max(own["biceps"][1] - _HANGING_STEP * more, 0.0))
 
 
 def _move_legs(
@@ -362,24 +408,59 @@ def _move_legs(
 
 
 def _hang_fork(out: FloatArray, layout: Layout, grid: IntArray) -> None:
-    """Let the cloth of a straight leg hang from the crotch curve to the upper thigh, along the inseam and as far as it moves outward.
+    """Let the cloth of a straight leg hang from the crotch curve to the upper thigh, along the inseam.
 
     On the body the curve's square corner to the front becomes the thigh's round one within a few centimetres: cut like that,
-    the fork would end in a beak.
+    the fork would end in a beak. Around the thigh the rows run into the straight leg in a bow, or the outseam would have a corner.
     """
+    from scipy.ndimage import gaussian_filter1d
+
     thigh, knee = layout.leg_row["leg_thigh"], layout.leg_row["leg_knee"]
-    last, count = thigh + round(_HANGS * (knee - thigh)), grid.shape[1]
     ahead, behind = layout.crotch_point + layout.to_princess, len(layout.crotch) - 1 - layout.crotch_point
-    at = np.arange(count)
-    near = np.maximum(1.0 - at / ahead, 0.0) + np.maximum(1.0 - (count - at) / behind, 0.0)
-    weight = near * near * (3.0 - 2.0 * near)
-    rows = out[grid[: last + 1]]
+    at = np.arange(grid.shape[1])
+    near = np.maximum(1.0 - at / ahead, 0.0) + np.maximum(1.0 - (len(at) - at) / behind, 0.0)
+    _hang(out, layout, grid[: thigh + round(_HANGS * (knee - thigh)) + 1], near)
+    rows = out[grid[: knee + 1]]
+    apart = float(np.linalg.norm(np.diff(rows[thigh:].mean(axis=1), axis=0), axis=1).mean())
+    smooth = gaussian_filter1d(rows, _THIGH_BOW / max(apart, 1e-9), axis=0, mode="nearest")
+    ramp = np.interp(np.arange(knee + 1), [0, 0.5 * thigh, 0.5 * (thigh + knee), knee], [0.0, 1.0, 1.0, 0.0])
+    weight = (ramp * ramp * (3.0 - 2.0 * ramp))[:, None, None]
+    out[grid[1:knee]] += (weight * (smooth - rows))[1:knee]
+
+
+def _hang(out: FloatArray, layout: Layout, grid: IntArray, near: FloatArray | None = None) -> None:
+    """Let the columns of a limb hang straight over their hollows from the first row to the last, into which they run without a corner.
+
+    Args:
+        out: #V by 3 [m], changed in place.
+        layout: the grid.
+        grid: #rows by #columns.
+        near: #columns, from 0 where the columns stay to 1 where they hang; all hang without it.
+    """
+    rows = out[grid]
     arc = np.cumsum(np.linalg.norm(np.diff(rows, axis=0, prepend=rows[:1]), axis=2), axis=0)
+    chord = rows[-1] - rows[0]
+    along = chord / np.linalg.norm(chord, axis=1, keepdims=True)
+    outward = vertex_normals(out, layout.body_faces)[grid].mean(axis=0)
+    outward -= along * np.einsum("ck,ck->c", along, outward)[:, None]
+    way, height = (np.einsum("rck,ck->rc", rows - rows[0], axis) for axis in (along, outward))
+    hung = rows.copy()
+    for column in range(grid.shape[1]):
+        # The upper hull of the column's profile (Andrew's monotone chain).
+        touch: list[int] = []
+        profile = np.stack([way[:, column], height[:, column]], axis=1)
+        for row, point in enumerate(profile):
+            while len(touch) > 1:
+                (x0, y0), (x1, y1) = point - profile[touch[-2]], profile[touch[-1]] - profile[touch[-2]]
+                if x1 * y0 < x0 * y1:
+                    break
+                touch.pop()
+            touch.append(row)
+        for axis in range(3):
+            hung[:, column, axis] = np.interp(arc[:, column], arc[touch, column], rows[touch, column, axis])
     share = (arc / arc[-1])[..., None]
-    # It runs into the leg without a corner.
-    away = (1.0 - share * share) * (rows[0] + share * (rows[last] - rows[0]) - rows)
-    outward = np.einsum("rck,rck->rc", away, vertex_normals(out, layout.body_faces)[grid[: last + 1]])
-    out[grid[1:last]] += (weight * (outward > 0.0))[1:last, :, None] * away[1:last]
+    weight = 1.0 if near is None else (near * near * (3.0 - 2.0 * near))[:, None]
+    out[grid[1:-1]] += (weight * (1.0 - share**4) * (hung - rows))[1:-1]
 
 
 def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float) -> FloatArray:

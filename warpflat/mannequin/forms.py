@@ -25,6 +25,7 @@ from warpflat.mannequin.layout import RING_LEVELS
 from warpflat.mannequin.neckline import Neckline, widen_neck
 from warpflat.mannequin.outside import push_outside
 from warpflat.mannequin.pieces import FormPiece, cut_pieces
+from warpflat.mannequin.profiles import convex_girth
 
 if TYPE_CHECKING:
     from warpflat.mannequin.layout import Layout
@@ -35,6 +36,9 @@ else:
     import tomli as tomllib
 
 __all__ = ["Form", "FormResult", "PieceRecipe", "form_from_mapping", "form_names", "realise", "shipped_form"]
+
+# Cloth around a level that is this much [m] longer than asked for hangs from above.
+_HANGS = 0.002
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -261,10 +265,12 @@ def realise(
         {} if before is None else {name: before.pieces[name] for name in before.pieces if before.has_rows(name, rows)}
     )
     pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half, known=known)
-    # A level of the trunk with an outline of its own, neither ruled nor bridged, gets the ease that is asked of it.
+    # A level of the trunk with an outline of its own, neither ruled nor bridged, gets the ease that is asked of it; cloth that hangs
+    # from a belly has more.
     spans = [
         sorted(map(RING_LEVELS.index, pair)) for pair in (*form.ruled, *_bridged(form)) if set(pair) <= set(RING_LEVELS)
     ]
+    waist = RING_LEVELS.index("waist")
     alike = {level for level, change in form.profiles.items() if change.like is not None}
     ease = {
         level: cm
@@ -272,11 +278,22 @@ def realise(
         if level in RING_LEVELS
         and level not in alike
         and not any(low < RING_LEVELS.index(level) < high for low, high in spans)
+        and not (
+            any(low <= RING_LEVELS.index(level) and high < waist for low, high in spans)
+            and _hangs(layout, body, vertices, level, cm)
+        )
     }
     return FormResult(
         name=form.name, recipe=form, body=body, half=half,
         vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease,
     )  # fmt: skip
+
+
+def _hangs(layout: Layout, body: FloatArray, vertices: FloatArray, level: str, ease_cm: float) -> bool:
+    """Return whether the cloth at a level below the waist hangs farther out than its ease asks for."""
+    row = layout.rings[layout.level_row[level]]
+    below = RING_LEVELS.index(level) < RING_LEVELS.index("waist")
+    return below and convex_girth(vertices[row]) > convex_girth(body[row]) + 0.01 * ease_cm + _HANGS
 
 
 def _rows_of(placed: Sequence[PlacedDart]) -> dict[str, dict[str, IntArray]]:

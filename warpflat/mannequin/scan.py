@@ -72,7 +72,13 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     from scipy.spatial import QhullError
 
     scan, notes = turn_scan_upright(vertices, faces, options)
-    laid = stand_body(scan.vertices, scan.triangles, scan.scanned, faces_ahead=options.facing is not None)
+    laid = stand_body(
+        scan.vertices,
+        scan.triangles,
+        scan.scanned,
+        faces_ahead=options.facing is not None,
+        as_scanned=options.keep_pose,
+    )
     if laid.unsure is not None:
         raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
     if laid.turned:

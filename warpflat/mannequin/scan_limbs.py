@@ -24,7 +24,7 @@ _DROP, _SHOULDER_HEIGHT = 0.016, 0.075
 # Down to this far above the armpit the armhole is the body's own section.
 _SCOOP = 0.012
 # The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew.
-_SHORTEST_SLEEVE = 0.082
+_SHORTEST_SLEEVE = 0.087
 _HARMONICS = 5
 # Where an arm is sliced between biceps (0), elbow (1) and wrist (2): forearms swell below the elbow.
 _ARM_PLACES = (0.5, 1.25, 1.5, 1.75)

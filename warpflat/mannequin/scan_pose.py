@@ -49,6 +49,7 @@ class ScanOptions:
         up: axis that points to the head, as ``+y``.
         facing: axis towards which the body looks, as ``+z``.
         landmarks: known heights above the floor [m]: bust, waist, hip, armpit, ...
+        keep_pose: whether the mannequin keeps the scan's pose of arms and legs; else it stands as a tape asks.
         symmetric: whether the mannequin is the average of left and right; else each side is kept.
     """
 
@@ -56,6 +57,7 @@ class ScanOptions:
     up: str | None = None
     facing: str | None = None
     landmarks: Mapping[str, float] = field(default_factory=dict)
+    keep_pose: bool = False
     symmetric: bool = True
 
     def check(self) -> None:

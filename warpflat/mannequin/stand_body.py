@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.mannequin.body_landmarks import meeting, model_places, near_level, value_at
-from warpflat.mannequin.body_model import BodyModel, finer_body, rotation_vector
+from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation, rotation_vector
 from warpflat.mannequin.fit_body import FittedBody, Mesh, fit_body, vertex_normals
 
 __all__ = ["StandingBody", "lay_on_scan", "stand_body"]
@@ -37,6 +37,8 @@ _DETAIL = 30.0
 _RAISED, _FAR_BENT = np.radians(70.0), np.radians(40.0)
 # Then a standing body's joints are bent by no more than this [rad].
 _BENT = np.radians(8.0)
+# Elbows that are bent by more than this are straightened to it [rad]: a sleeve is cut for an arm that hangs.
+_ELBOW = np.radians(10.0)
 # Legs within this slope of the plumb line stand together [m per m]. Legs moved together stay so far off the midplane [m]. Below the
 # first of these heights on the mean body they do not join; above the second one, the hip's, nothing moves.
 _TOGETHER, _BETWEEN, _CROTCH, _HIP = 0.01, 0.001, 0.462, 0.505
@@ -182,7 +184,12 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
 
 
 def stand_body(
-    vertices: FloatArray, triangles: NDArray[np.int64], scanned: int, *, faces_ahead: bool = False
+    vertices: FloatArray,
+    triangles: NDArray[np.int64],
+    scanned: int,
+    *,
+    faces_ahead: bool = False,
+    as_scanned: bool = False,
 ) -> StandingBody:
     """Fit the model to an upright scan, lay it on the scan, and undo its pose where no tape is laid in it.
 
@@ -191,22 +198,43 @@ def stand_body(
         triangles: #T by 3, their normals all outward or all inward.
         scanned: triangles from this one on close holes.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
+        as_scanned: whether the mannequin keeps the scan's pose.
     """
     corners = vertices[triangles]
     if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
         triangles = triangles[:, ::-1]
-    found = _stand(fit_body(vertices, triangles), vertices, triangles, scanned)
+    found = _stand(fit_body(vertices, triangles), vertices, triangles, scanned, as_scanned)
     if found.unsure is not None and not faces_ahead:
         vertices = vertices * [-1.0, 1.0, -1.0]
         fit = fit_body(vertices, triangles)
         if fit.cost < found.fit.cost:
-            turned = _stand(fit, vertices, triangles, scanned)
+            turned = _stand(fit, vertices, triangles, scanned, as_scanned)
             if turned.unsure is None:
                 return replace(turned, turned=True)
     return found
 
 
-def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], scanned: int) -> StandingBody:
+def _arms_hanging(model: BodyModel, person: Person) -> tuple[Person, float]:
+    """Return the person with elbows that are bent hanging nearly straight, and by how much the more bent one was bent [rad]."""
+    rest, bend, most = model.shaped(person.shape), person.bend.copy(), 0.0
+    joints = rest[model.count :]
+    for side in "LR":
+        shoulder, elbow = (model.joints.index(f"{name}.{side}") for name in ("upperarm01", "lowerarm01"))
+        # Hands hang from the elbow, too.
+        forearm = (model.weights[:, elbow] > 0.9) & ~model.detail
+        upper = joints[elbow] - joints[shoulder]
+        lower = bend[elbow] @ (rest[: model.count][forearm].mean(axis=0) - joints[elbow])
+        about = np.cross(lower, upper)
+        size = float(np.linalg.norm(about))
+        angle = float(np.arctan2(size, lower @ upper))
+        most = max(most, angle)
+        bend[elbow] = rotation(max(angle - _ELBOW, 0.0) / max(size, 1e-12) * about[None])[0] @ bend[elbow]
+    return replace(person, bend=bend), most
+
+
+def _stand(
+    fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], scanned: int, as_scanned: bool
+) -> StandingBody:
     from scipy.ndimage import gaussian_filter1d
 
     model, (finer, faces), places = BodyModel.load(), finer_body(), model_places()
@@ -220,7 +248,8 @@ def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], 
         np.einsum("ta,ta->t", on.normals[shown], mesh.normals) > _ALIKE
     )
     shown = np.where(beside & (np.arange(len(triangles)) < scanned), shown, -1)
-    relaxed = fit.person.standing(_BENT)
+    relaxed, _ = _arms_hanging(model, fit.person.standing(_BENT))
+    hanging, elbows = _arms_hanging(model, fit.person)
     standing = model.rebend(fit.person, relaxed, finer, posed)
     unsure = _unsure(fit, mesh, model.vertices(fit.person), standing, finer @ model.weights, seen)
     armpits = {side: meeting(standing, places.mean, sign) for side, sign in (("left", 1.0), ("right", -1.0))}
@@ -238,7 +267,9 @@ def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], 
         if bend > _FAR_BENT and not name.startswith("upperarm")
     ]
     other, stands, together = fit.person, posed, None
-    if raised > _RAISED or bent:
+    if as_scanned:
+        notes.append("the mannequin keeps the scan's pose")
+    elif raised > _RAISED or bent:
         other, stands = relaxed, standing - [float(fit.person.place[0]), standing[seen, 1].min(), 0.0]
         why = (
             f"its arms are raised by {np.degrees(raised):.0f} degrees"
@@ -246,9 +277,12 @@ def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], 
             else f"bent: {', '.join(bent)}"
         )
         notes.append(f"the mannequin is that of the body standing, arms lowered and joints straight ({why})")
+    elif elbows > _ELBOW:
+        other, stands = hanging, model.rebend(fit.person, hanging, finer, posed)
+        notes.append(f"its elbows, bent by {np.degrees(elbows):.0f} degrees, hang nearly straight")
     # A tape around both legs of a scan measures how far apart the feet stand.
     apart = _legs_apart(stands)
-    if apart >= _TOGETHER:
+    if apart >= _TOGETHER and not as_scanned:
         joint, size = (
             model.joints_of(other)[[model.joints.index(f"upperleg01.{side}") for side in "LR"], 0],
             np.ptp(stands[:, 1]),

@@ -34,6 +34,7 @@ class MannequinTable(Table):
     up: str | None = None
     facing: str | None = None
     landmarks: dict[str, float] = Field(default_factory=dict)
+    pose: Literal["standing", "scan"] = "standing"
     symmetric: bool = True
     resolution_mm: Annotated[float, Field(ge=2.0, le=40.0)] = 10.0
 
@@ -47,6 +48,7 @@ class MannequinTable(Table):
         if self.scan is not None and self.table is not None:
             raise ValueError("table completes measurements; a scan has its own: leave it out")
         of_scan = [key for key in ("units", "up", "facing", "landmarks") if getattr(self, key)]
+        of_scan += ["pose"] if self.pose != "standing" else []
         of_scan += [] if self.symmetric else ["symmetric"]
         if self.scan is None and of_scan:
             body = "size" if self.size is not None else "measurements"
@@ -84,8 +86,9 @@ def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path
     if table.measurements is not None:
         return Mannequin.from_measurements(table=table.table, resolution_mm=table.resolution_mm, **given)
     options = ScanOptions(
-        unit=table.units, up=table.up, facing=table.facing, landmarks=table.landmarks, symmetric=table.symmetric
-    )
+        unit=table.units, up=table.up, facing=table.facing, landmarks=table.landmarks, keep_pose=table.pose == "scan",
+        symmetric=table.symmetric,
+    )  # fmt: skip
     return mannequin_from_scan_file(path_of(str(table.scan)), options=options, resolution_mm=table.resolution_mm)
 
 

@@ -28,9 +28,9 @@ _SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0), "children
 # Where the side line passes the bust: this share of the way back from where it passes the underbust to the widest points.
 _SIDE_BACK = 0.25
 _ARM_ANGLE = np.radians(40.0)
-# How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew. On a small child it is this
-# share of the arm.
-_SHORTEST_SLEEVE, _SHORT_SHARE = 0.092, 0.2
+# How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew. On a small child it is the
+# first of these shares of the arm, under a deep armhole the second one of the way to the elbow.
+_SHORTEST_SLEEVE, _SHORT_SHARE, _TO_ELBOW = 0.092, 0.2, 0.5
 # How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
 _NOTCH = 0.22
 
@@ -276,10 +276,11 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
         scale = girth / polyline_length(shape, closed=True)
         return middle + at * axis + forward * ahead + scale * shape
 
-    biceps_at = float((under - middle) @ axis) + min(_SHORTEST_SLEEVE, _SHORT_SHARE * length)
+    elbow_at, under_at = start + 0.575 * length, float((under - middle) @ axis)
+    biceps_at = under_at + min(_SHORTEST_SLEEVE, _SHORT_SHARE * length, _TO_ELBOW * (elbow_at - under_at))
     left = ArmCurves(
         biceps=ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
-        elbow=ring(start + 0.575 * length, m.lengths["elbow"], 1.0, 0.004),
+        elbow=ring(elbow_at, m.lengths["elbow"], 1.0, 0.004),
         wrist=ring(start + length, m.lengths["wrist"], 1.15, 0.030),
     )
     flip = np.array([-1.0, 1.0, 1.0])
