@@ -43,7 +43,8 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Join the linings", ({"lining"},)),
     ("Sew the lining to the facings", ({"facing", "lining"},)),
     ("Join the ends of bands and bindings", ({"strip"}, {"waistband"})),
-    ("Sew bands and bindings to their edges", ({"strip", "shell"}, {"waistband", "shell"}, {"strip", "waistband"})),
+    ("Sew bands and bindings to their edges", ({"strip", "shell"},)),
+    ("Sew the waistband on, turn it in and sew its inner edge down", ({"waistband", "shell"}, {"strip", "waistband"})),
     ("Sew the cuffs on, fold them right sides together, sew their ends and turn them", ({"cuff", "shell"}, {"cuff"})),
     ("Sew the hood's own seams", ({"hood"},)),
     ("Sew the hood on", ({"hood", "shell"},)),
@@ -51,7 +52,7 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Sew the collar on", ({"collar", "shell"},)),
 )
 # A seam of these stages is mentioned by others.
-_ON_FACINGS, _LININGS, _LAST = (len(_STAGES) + k for k in (1, 2, 5))
+_ON_FACINGS, _LININGS, *_ON_BANDS = (len(_STAGES) + k for k in (1, 2, 5, 6))
 
 
 #: A piece and an edge of it, by their names.
@@ -236,7 +237,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     bound = {
         without_side(edge)
         for seam in seams
-        if seam.stage == _LAST
+        if seam.stage in _ON_BANDS
         for piece, edge in seam.places
         if roles.get(piece) == "shell"
     }
@@ -244,10 +245,12 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     at_zip = [place for edge, row in inside.items() if edge in zipped for place in row]
     basted = {edge: row for edge, row in inside.items() if edge in bound and row}
     turned_in_at = max((each.stage for each in seams if each.stage in (_LININGS + 1, _ON_FACINGS)), default=None)
-    for stage in sorted({seam.stage for seam in seams}):
+    stages = sorted({seam.stage for seam in seams})
+    first_band = next((stage for stage in stages if stage in _ON_BANDS), None)
+    for stage in stages:
         what = translate([*_STAGES, *_FINISHING][stage][0])
         here = [seam for seam in seams if seam.stage == stage]
-        if stage == _LAST and basted:
+        if basted and stage == first_band:
             steps.append(
                 SewingStep.at(
                     translate(
