@@ -148,7 +148,7 @@ class Stage:
         low, high = self._boxes[1]
         x, y = low[0], low[1] - 0.075
         bar = np.array([[(x, y), (x + 0.1, y)], *([(at, y - 0.008), (at, y + 0.008)] for at in (x, x + 0.05, x + 0.1))])
-        self._segments("/pattern/bar", np.concatenate([bar, np.zeros((4, 2, 1))], axis=2), _INK, 2.0)
+        self._segments("/pattern/bar", np.concatenate([bar, np.zeros((4, 2, 1))], axis=2), _THIN, 2.0)
         node = "/pattern/name_bar"
         self._nodes[node] = self._scene.add_label(
             node, "10 cm", position=(x + 0.11, y, 0.0), anchor="center-left", font_screen_scale=0.9
