@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import without_side
 from warpflat.export.geometry import area_vectors, vertex_normals
@@ -28,7 +28,7 @@ __all__ = ["describe_worn"]
 # Lines are drawn to within this [m]; what covers less [m2] is a sliver of the projection.
 _WITHIN, _LEAST_AREA = 0.001, 1e-5
 # A face whose normal points away from the viewer by more than this cosine is on the far side.
-_NEAR_SIDE = -0.1
+_NEAR_SIDE, _EDGE_ON = -0.1, -0.6
 # Teeth of a zip are drawn so far apart [m].
 _TOOTH = 0.009
 
@@ -67,12 +67,12 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
     return Worn(views=views, measures=measures, needed=needed)
 
 
-def _near_side(garment: Garment, name: str, ids: IntArray, sign: float) -> BoolArray:
-    """Return which vertices of a piece are seen from the front (1) or the back (-1)."""
+def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatArray:
+    """Return the cosine of the angle by which each vertex of a piece faces the viewer in front (1) or behind (-1)."""
     surface = garment.pieces[name].surface
     triangles, _ = triangulate(surface.faces)
     normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
-    return np.asarray(sign * normals[ids, 2] > _NEAR_SIDE)
+    return np.asarray(sign * normals[ids, 2])
 
 
 def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
@@ -87,7 +87,7 @@ def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
             for edge, ids in piece.edges.items():
                 if without_side(edge).rstrip(" 0123456789") == wish.edge:
                     inside.append(float(piece.surface.vertices[:, 1].mean()))
-                    near = ids[_near_side(garment, name, ids, sign)]
+                    near = ids[_towards(garment, name, ids, sign) > _NEAR_SIDE]
                     seen += [piece.surface.vertices[near, :2] * [sign * side, 1.0] for side in sides]
         points = np.concatenate(seen) if seen else np.zeros((0, 2))
         if len(points) < 2:
@@ -112,7 +112,8 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
         for part in parts:
             arc = part.before + arc_lengths(garment.positions[part.piece][part.vertices])
             seen = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
-            if not _near_side(garment, part.piece, part.vertices, sign).all():
+            # A side seam is the outline of both views.
+            if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
                 continue
             teeth = np.arange(opening.start, end, _TOOTH) if opening.kind == "zip" else np.array([])
             for at, half in (*((tooth, _TOOTH / 3) for tooth in teeth.tolist()), (end, _TOOTH)):
