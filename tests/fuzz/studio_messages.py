@@ -33,6 +33,11 @@ CLICK = {
     "type": "ScenePointerMessage", "event_type": "click", "ray_origin": [0.0, 0.0, 2.0], "ray_direction": [0.1, 0.0, -1.0],
     "screen_pos": [[0.5, 0.5]], "modifier": None,
 }  # fmt: skip
+DRAG = {
+    "type": "SceneNodeDragMessage", "phase": "start", "name": "/pattern/handle0", "instance_index": None,
+    "start_position": [0.1, 0.0, 0.0], "start_screen_pos": [0.5, 0.5], "end_position": [0.1, 0.05, 0.0],
+    "end_screen_pos": [0.5, 0.4], "button": "left", "modifier": None, "owner": "",
+}  # fmt: skip
 CHANGES = {
     "cloth": "denim", "grain [°]": 30.0, "colours": "strain energy [J/m²]", "pick": "two points", "line": "(click a line)",
     "part [%]": [0, 50], "cut": "Leave it", "look from": "Back", "do": "Undo", "name": "trial", "Save and run": True,
@@ -59,6 +64,7 @@ ORIGINS = ("http://evil.com:@port@", "https://127.0.0.1:@port@", "null", "", "fi
 UPGRADE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
 SCENE = {
     "surface": {"shape": "dome", "resolution": 5},
+    "cuts": [{"name": "slit", "line": "centre", "part": [0.0, 0.5]}],  # its ends can be dragged
     "output": {"frames": 0, "picture": False},
     "pattern": {"formats": []},
 }
@@ -111,7 +117,8 @@ def _messages(random: Random) -> dict[str, Any]:
 
     label, value = random.choice(list(CHANGES.items()))
     change = {"type": "GuiUpdateMessage", "uuid": f"@part:{label}@", "updates": {"value": value}}
-    message = random.choice((CAMERA, CLICK, change, change, change, random.choice(OTHERS)))
+    drag = {**DRAG, "phase": random.choice(("start", "update", "end"))}
+    message = random.choice((CAMERA, CLICK, drag, drag, change, change, change, random.choice(OTHERS)))
     said: list[Any] = []
     for _ in range(random.choice((1, 1, 1, 3))):
         if random.randrange(4):

@@ -166,3 +166,37 @@ def test_nothing_ends_at_a_zip_that_is_not_there():
     facing = Finishing(kind="facing", edge="neck", width=0.05)
     pattern = finish_edges(top(SeamOpening(kind="buttons", length=0.2)), [facing], gaps=["centre back"])
     assert not any("zip" in step.words for step in sewing_steps(draft_garment(pattern), ""))
+
+
+@pytest.mark.parametrize(
+    ("openings", "expected"),
+    [
+        ((), ["Sew the side seams, notch to notch: A (side: front to back)."]),
+        (
+            (ZIP,),
+            [
+                "Sew the invisible zip of 30 cm to both edges of A (side left: front to back), from the upper edge down to its "
+                "notch, then close the seam below it.",
+                "Sew the side seams, notch to notch: A (side right: front to back).",
+            ],
+        ),
+    ],
+)
+def test_of_halves_on_the_fold_both_sides_are_sewn(openings: tuple[SeamOpening, ...], expected: list[str]):
+    corners = np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.5], [0.0, 0.5], [0.0, 0.0]])
+    kinds = {"hem": "hem", "side left": "seam", "waist": "cut", "centre": "fold"}
+
+    def half(name: str) -> Piece:
+        edges = [Edge(name=edge, points=corners[k : k + 2], kind=kind) for k, (edge, kind) in enumerate(kinds.items())]
+        return Piece(name=name, edges=edges)
+
+    sides = tuple((SeamSide(piece=name, edge="side left"),) for name in ("front", "back"))
+    seam = Seam(name="side left", sides=(sides[0], sides[1]), openings=openings)
+    drafted = draft_garment(Pattern(name="skirt", pieces={"": [half("front"), half("back")]}, seams=[seam]))
+    assert [step.words for step in sewing_steps(drafted, "")][: len(expected)] == expected
+
+
+def test_a_waistband_above_a_zip_has_a_hook():
+    band = Finishing(kind="waistband", edge="neck", width=0.03)
+    assert "1 hook and bar" in notions(draft_garment(finish_edges(top(ZIP), [band], gaps=["centre back"])), "")
+    assert "1 hook and bar" not in notions(draft_garment(finish_edges(top(), [band])), "")

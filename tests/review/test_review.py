@@ -68,7 +68,10 @@ def test_the_packed_film_is_the_film(run: Path) -> None:
     (piece,) = film["pieces"]
     whole = piece["topologies"][0]
     # The first frame lies behind the arrays of all topologies.
-    begin = sum(4 * 3 * t["triangles"] + 4 * 2 * t["edges"] + 2 * 3 * t["vertices"] for t in piece["topologies"])
+    maps = len(film["maps"])
+    begin = sum(
+        4 * 3 * t["triangles"] + 4 * 2 * t["edges"] + (2 * 3 + maps) * t["vertices"] for t in piece["topologies"]
+    )
     planes = np.frombuffer(data[begin : begin + 4 * whole["vertices"]], dtype=np.uint8).reshape(2, -1).astype(np.uint16)
     steps = (planes[0] + 256 * planes[1]).reshape(2, -1).T
     x, y, size = piece["box"]

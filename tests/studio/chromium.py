@@ -53,6 +53,12 @@ class Chromium:
         """Return what an expression gives."""
         return self.send("Runtime.evaluate", expression=script, returnByValue=True)["result"].get("value")
 
+    def run_async(self, script: str) -> Any:
+        """Return what the promise of an expression gives."""
+        return self.send("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)["result"][
+            "value"
+        ]
+
     def wait(self, script: str, seconds: float = 60.0) -> Any:
         """Return what an expression gives as soon as that counts as true."""
         end = time.monotonic() + seconds
@@ -68,6 +74,17 @@ class Chromium:
         for kind, button in (("mouseMoved", "none"), ("mousePressed", "left"), ("mouseReleased", "left")):
             self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
             time.sleep(0.1)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], parts: int = 6) -> None:
+        """Drag with the left button from a place to another [CSS pixels], in some parts."""
+        path = [tuple(a + (b - a) * k / parts for a, b in zip(start, end, strict=True)) for k in range(parts + 1)]
+        for kind, button, (x, y) in (
+            ("mouseMoved", "none", start), ("mousePressed", "left", start),
+            *(("mouseMoved", "left", place) for place in path[1:]), ("mouseReleased", "left", end),
+        ):  # fmt: skip
+            pressed = int(button == "left" and kind != "mouseReleased")
+            self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=pressed, clickCount=1)
+            time.sleep(0.15)
 
     def press(self, words: str) -> None:
         """Press the button with these words."""

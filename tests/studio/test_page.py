@@ -111,6 +111,71 @@ def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
         page.close()
 
 
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+def test_drag_a_dart_and_save(tmp_path: Path) -> None:
+    from chromium import chromium
+
+    from warpflat.studio.page import Page
+
+    scene = make_scene(
+        {**SCENE, "cuts": [{"line": "bust", "part": [0.0, 0.3]}], "pattern": {"formats": ["pdf"]},
+         "output": {"frames": 2, "picture": True}},
+        name="trial", folder=tmp_path, where="trial",
+    )  # fmt: skip
+    page = Page(scene, host="127.0.0.1", port=free_port(), out=tmp_path / "out")
+    head = "document.querySelector('#studio-head')?.innerText"
+    try:
+        with chromium(str(BROWSER), tmp_path / "profile", 900, 600) as browser:
+            browser.send("Page.navigate", url=page.url)
+            before = browser.wait(f"{head}?.includes('fits by its strain') && {head}")
+            whole = page.session.solution
+            assert whole is not None
+            client = wait_for(lambda: next(iter(page.server.get_clients().values()), None))
+            browser.run("document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())")
+            width, height = (
+                browser.run(f"document.querySelector('canvas').client{way}") for way in ("Width", "Height")
+            )
+            wait_for(lambda: abs(client.camera.aspect - width / height) < 0.01)
+            wait_for(lambda: np.allclose(client.camera.position[:2], 0.0) and client.camera.fov < 0.5)
+            wait_for(lambda: page.stage.handle_position("trial: tip of bust") is not None)
+            # A browser that draws in software may still be setting its camera, and a drag beside the tip turns the form: look from the
+            # front again, and drag where the tip is seen by then.
+            for _ in range(8):
+                browser.press("Front")
+                time.sleep(1.5)
+                tip, mouth = (
+                    page.stage.handle_position(f"trial: {name}") for name in ("tip of bust", "mouth of bust, left")
+                )
+                inwards = (tip - mouth) / np.linalg.norm(tip - mouth)
+                ends = [on_screen(client.camera, place, width, height) for place in (tip, tip + 0.05 * inwards)]
+                browser.drag(*ends)
+                with suppress(AssertionError):
+                    wait_for(lambda: page.session.can_undo and not page.session.activity, 8.0)
+                    break
+            assert page.session.can_undo == "trial: tip of bust"
+            (cut,) = page.session.scene.settings.cuts
+            assert cut.part is not None
+            assert cut.part[1] > 0.35
+            # The numbers follow, and a drag is one step back.
+            solution = wait_for(lambda: page.session.step.solution)
+            assert solution.strain_energy < whole.strain_energy
+            browser.wait(f"{head} !== {before!r} && {head}?.includes('fits by its strain')")
+            browser.press("Save and run")
+            links = browser.wait("document.querySelector('#studio-links')?.innerText")
+            assert "print · review" in links
+            assert load_scene(tmp_path / "trial.toml").settings.cuts[0].part == cut.part
+            pdf = browser.run_async(
+                "fetch(document.querySelector('#studio-links a').href).then(a => a.text()).then(t => t.slice(0, 4))"
+            )
+            assert pdf == "%PDF"
+            browser.press("Undo")
+            wait_for(lambda: not page.session.can_undo)
+            assert page.session.scene.settings.cuts[0].part == [0.0, 0.3]
+            assert browser.faults == []
+    finally:
+        page.close()
+
+
 def wait_for(what, seconds: float = 60.0):
     end = time.monotonic() + seconds
     while time.monotonic() < end:

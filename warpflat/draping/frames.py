@@ -17,7 +17,7 @@ from warpflat.draping.body import SKIN
 from warpflat.draping.result import Drape
 from warpflat.export.colours import energy_colours, linear_rgb
 from warpflat.export.figure import write_moving_picture
-from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.export.geometry import area_vectors, corner_mean, vertex_normals
 from warpflat.export.raster import Lighting, rasterise, shade
 from warpflat.export.usd_prims import (
     begin_stage,
@@ -25,6 +25,7 @@ from warpflat.export.usd_prims import (
     define_mesh,
     export_stage,
     last_values_as_defaults,
+    set_face_map,
     set_points,
     usd_errors,
 )
@@ -104,6 +105,14 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
             found = linear_rgb(energy_colours(drape.body.gaps(points), widest)).astype(np.float32)
             colours.GetAttr().Set(Vt.Vec3fArray.FromNumpy(found), Usd.TimeCode(time))
         last_values_as_defaults(stage, [cloth.GetPrim()])
+        # On the patterns the gap is now that of the worn cloth.
+        world = layer.GetPrimAtPath("/World").nameChildren
+        shown = {prim.GetInfo("displayName") or prim.name: prim for prim in world if "pattern" in prim.nameChildren}
+        for name in drape.cloth.piece_vertices:
+            faces = drape.cloth.flat_faces[drape.cloth.piece_faces[name]]
+            if name in shown:
+                gaps = corner_mean(drape.gap[drape.cloth.welded], faces)
+                set_face_map(layer, f"{shown[name].path}/pattern", "gap", gaps, unit="m", state="draped")
     export_stage(stage, path)
 
 

@@ -14,6 +14,7 @@ __all__ = [
     "Polylines",
     "area_vectors",
     "corner_average",
+    "corner_mean",
     "face_areas",
     "outline_edges",
     "polylines_of",
@@ -66,6 +67,12 @@ def vertex_normals(vectors: FloatArray, triangles: IntArray, count: int) -> Floa
     none = ~(lengths > 0.0)
     normals[none] = (0.0, 0.0, 1.0)
     return normals / np.where(none, 1.0, lengths)[:, None]
+
+
+def corner_mean(values: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the mean of the values (#V) at the corners of each face (#F by 4, -1 as the fourth of a triangle), #F."""
+    used = faces >= 0
+    return np.asarray(np.where(used, values[faces], 0.0).sum(axis=1) / used.sum(axis=1))
 
 
 def corner_average(

@@ -221,7 +221,7 @@ def _worn(page: _Page, worn: Worn, size: str, units: str) -> None:
                         if fill:
                             path.close()
                         page.canvas.drawPath(path, stroke=1, fill=fill)
-            page.y = top - high - 0.004
+            page.y = float(middle[1]) - scale * extent / 2 - 0.005
             page.text(float(middle[0]) - 0.010, translate(f"from the {side}"))
     page.y = top + 0.004
     left, page.left, page.width = page.left, page.left + 0.100, page.width - 0.100

@@ -39,6 +39,7 @@ from warpflat.export.usd_prims import (
     last_values_as_defaults,
     require_usd,
     rows_on_table,
+    set_face_map,
     set_points,
     usd_errors,
     valid_name,
@@ -290,6 +291,11 @@ class FrameWriter:
             to_surface=np.arange(len(surface.vertices), dtype=np.int32),
             lines=lines,
         )
+
+    def write_map(self, name: str, key: str, values: FloatArray, *, unit: str, state: str) -> None:
+        """Write a value per face of a piece's pattern, see :func:`warpflat.export.usd_prims.set_face_map`."""
+        mesh = f"{self._pieces[name].path}/pattern"
+        set_face_map(self._stage.GetRootLayer(), mesh, key, values, unit=unit, state=state)
 
     def refer_to_body(self, file: str, points: ArrayLike) -> None:
         """Show the mannequin of another file of the same folder under the pieces, by reference; its lines are guides.

@@ -41,6 +41,7 @@ __all__ = [
     "last_values_as_defaults",
     "require_usd",
     "rows_on_table",
+    "set_face_map",
     "set_points",
     "usd_errors",
     "valid_name",
@@ -186,6 +187,26 @@ def define_energy_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: 
     density.GetAttr().SetCustomDataByKey("unit", "J/m2")
     mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
     return mesh
+
+
+def set_face_map(layer: Any, mesh: str, key: str, values: FloatArray, *, unit: str, state: str) -> None:
+    """Author a value per face of a mesh that a layer has, as a primvar; one that is there is replaced.
+
+    Args:
+        layer: an `Sdf.Layer`.
+        mesh: path of the mesh.
+        key: name of the primvar.
+        values: #F.
+        unit: of the values.
+        state: of the cloth, in which they hold.
+    """
+    from pxr import Sdf, UsdGeom, Vt
+
+    prim, name = layer.GetPrimAtPath(mesh), f"primvars:{key}"
+    attribute = prim.attributes.get(name) or Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.FloatArray)
+    attribute.SetInfo("interpolation", UsdGeom.Tokens.uniform)
+    attribute.default = Vt.FloatArray.FromNumpy(values.astype(np.float32))
+    attribute.customData = {"unit": unit, "state": state}
 
 
 def bounding_box(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
@@ -354,8 +375,8 @@ def _label(prim: Any, label: str | None) -> None:
         prim.SetDisplayName(label)
 
 
-# A camera of 35 mm film and a long lens, so that patterns are hardly foreshortened.
-_APERTURE, _FOCAL = (36.0, 24.0), 70.0
+# A camera of the width of 35 mm film, 16:9 as most programs render, and a long lens, so that patterns are hardly foreshortened.
+_APERTURE, _FOCAL = (36.0, 20.25), 70.0
 _ROOM = 1.12  # what a camera sees, over what it looks at
 
 

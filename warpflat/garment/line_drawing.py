@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.polyline import arc_lengths
+from warpflat.core.text import without_side
+from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.garment.girths import pattern_girths
+from warpflat.garment.openings import place_opening
+from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES
 from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.surface.connectivity import border_loops
+from warpflat.surface.triangles import triangulate
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
@@ -21,7 +28,9 @@ __all__ = ["describe_worn"]
 # Lines are drawn to within this [m]; what covers less [m2] is a sliver of the projection.
 _WITHIN, _LEAST_AREA = 0.001, 1e-5
 # A face whose normal points away from the viewer by more than this cosine is on the far side.
-_NEAR_SIDE = -0.1
+_NEAR_SIDE, _EDGE_ON = -0.1, -0.6
+# Teeth of a zip are drawn so far apart [m].
+_TOOTH = 0.009
 
 
 def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
@@ -38,7 +47,8 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
         # What hangs nearer to the viewer hides what lies behind it: the inside of a back shows above the neck of a front.
         ordered = sorted(pieces, key=lambda flat: sign * float(flat.surface.vertices[:, 2].mean()))
         seen = [_view(flat, sign, half=half) for flat in ordered]
-        views[name] = tuple(piece for piece in seen if piece.outlines)
+        details = [] if garment.form is None else [*_bands(garment, sign), *_openings(garment, sign)]
+        views[name] = tuple(piece for piece in (*seen, *details) if piece.outlines or piece.lines)
     measures = {}
     for size, each in garments.items():
         if each.form is not None and each.mannequin is not None:
@@ -55,6 +65,63 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
     return Worn(views=views, measures=measures, needed=needed)
+
+
+def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatArray:
+    """Return the cosine of the angle by which each vertex of a piece faces the viewer in front (1) or behind (-1)."""
+    surface = garment.pieces[name].surface
+    triangles, _ = triangulate(surface.faces)
+    normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
+    return np.asarray(sign * normals[ids, 2])
+
+
+def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
+    """Yield waistbands, and bands around the trunk, as they are seen: above or below their edge, or on it where they take its place."""
+    form, sides = garment.form, (1.0, -1.0) if garment.form is not None and garment.form.half else (1.0,)
+    assert form is not None
+    for wish in garment.finishing:
+        if wish.kind not in ("waistband", "band") or wish.edge in (*ARM_LEVELS, *LEG_LINES.values()):
+            continue
+        seen, inside = list[FloatArray](), list[float]()
+        for name, piece in form.pieces.items():
+            for edge, ids in piece.edges.items():
+                if without_side(edge).rstrip(" 0123456789") == wish.edge:
+                    inside.append(float(piece.surface.vertices[:, 1].mean()))
+                    near = ids[_towards(garment, name, ids, sign) > _NEAR_SIDE]
+                    seen += [piece.surface.vertices[near, :2] * [sign * side, 1.0] for side in sides]
+        points = np.concatenate(seen) if seen else np.zeros((0, 2))
+        if len(points) < 2:
+            continue
+        # Pieces meet at their ends, and their points run on across the view.
+        points = points[np.argsort(points[:, 0], kind="stable")]
+        above = 1.0 if points[:, 1].mean() > np.mean(inside) else -1.0
+        shift = above * wish.width * (-1.0 if wish.shaped or wish.shorten > 0.0 else 1.0)
+        ring = np.concatenate([points, points[::-1] + np.array([0.0, shift])])
+        yield ViewedPiece(outlines=(ring,), lines=(np.concatenate([ring, ring[:1]]),))
+
+
+def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
+    """Yield zips, as a line with teeth and a bar at its lower end, and the upper end of slits and vents, as a bar."""
+    assert garment.form is not None
+    for opening in garment.openings:
+        if opening.kind not in ("zip", "slit", "vent"):
+            continue
+        parts = place_opening(garment.form, opening, garment.positions)
+        end = min(opening.start + opening.length, sum(part.whole for part in parts))
+        lines = list[FloatArray]()
+        for part in parts:
+            arc = part.before + arc_lengths(garment.positions[part.piece][part.vertices])
+            seen = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
+            # A side seam is the outline of both views.
+            if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
+                continue
+            teeth = np.arange(opening.start, end, _TOOTH) if opening.kind == "zip" else np.array([])
+            for at, half in (*((tooth, _TOOTH / 3) for tooth in teeth.tolist()), (end, _TOOTH)):
+                if arc[0] <= at <= arc[-1]:
+                    x, y = (float(np.interp(at, arc, seen[:, axis])) for axis in (0, 1))
+                    lines.append(np.array([[x - half, y], [x + half, y]]))
+        if lines:
+            yield ViewedPiece(outlines=(), lines=tuple(lines))
 
 
 def _view(flat: Flattening, sign: float, *, half: bool) -> ViewedPiece:

@@ -15,7 +15,7 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.layout import Layout
 
-__all__ = ["FormDart", "PlacedDart", "dart_along", "place_darts", "standard_darts", "usual_darts"]
+__all__ = ["FormDart", "PlacedDart", "dart_along", "dart_part", "place_darts", "standard_darts", "usual_darts"]
 
 #: Where darts end unless they say otherwise [mm]: before the bust point along the bust line; below the bust's level in the
 #: front; below it in the back, where it stands for the shoulder blades' level; below the waist in skirts. Aldrich, Metric
@@ -322,6 +322,23 @@ def dart_along(
                 share = round(float(arc[len(wanted) - 1] / arc[-1]), 3)
                 return FormDart(name=name, piece=piece, line=line, part=(end, abs(end - share)))
     return None
+
+
+def dart_part(layout: Layout, vertices: FloatArray, bricks: Sequence[str], dart: PlacedDart) -> tuple[float, float]:
+    """Return the shares of its line's length within the piece between which a dart lies; see `FormDart.part`.
+
+    Args:
+        layout, vertices: of the form, #V by 3 [m].
+        bricks: of the piece, both sides of the body.
+        dart: of that piece.
+    """
+    line, row = _grid_line(layout, dart.asked), dart.row.tolist()
+    if row[0] not in line:  # the mirror image of what was asked for
+        line = layout.mirror[line].tolist()
+    run = _longest_run(line, _cloth(layout, bricks))
+    arc = arc_lengths(vertices[run])
+    first, last = (float(arc[run.index(vertex)] / arc[-1]) for vertex in (row[0], row[-1]))
+    return first, last
 
 
 def usual_darts(layout: Layout, vertices: FloatArray, bricks: Mapping[str, Sequence[str]]) -> tuple[FormDart, ...]:

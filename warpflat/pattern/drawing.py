@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import polyline_length, resample
-from warpflat.core.text import name_without_number
+from warpflat.core.text import name_without_number, without_side
 from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
@@ -308,7 +308,8 @@ def _annotations(
         kind = (
             "hem" if name in hems and not {"vent", "slit"} & set(name.split(" ")) else name_without_number(name, called)
         )
-        text = translate_name(kind)
+        # One of a pair is neither left nor right, as in the sewing order.
+        text = translate_name(without_side(kind) if piece.piece.is_pair else kind)
         width = text_width(text, NAME)
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
             others = [*drawn[:index], *drawn[index + 1 :]]

@@ -13,7 +13,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
 from warpflat.core.short_repr import short_repr
-from warpflat.core.text import size_words
+from warpflat.core.text import size_words, without_side
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
 from warpflat.pattern.seam_difference import eased_length
@@ -100,9 +100,15 @@ class Piece:
         check_piece(where, edges=self.edges, darts=self.darts, holes=self.holes, lines=lines)
 
     @property
+    def is_pair(self) -> bool:
+        """Whether it stands for the left and the right one; a patch pocket is alike on both sides."""
+        return self.quantity % 2 == 0 and (self.role == "pocket" or (self.paired and not self.on_fold))
+
+    @property
     def printed_name(self) -> str:
-        """What stands on paper."""
-        return self.title or translate_name(self.name.replace("_", " "))
+        """What stands on paper; of a pair without its side."""
+        name = self.name.replace("_", " ")
+        return self.title or translate_name(without_side(name) if self.is_pair else name)
 
     @property
     def on_fold(self) -> bool:

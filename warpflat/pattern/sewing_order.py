@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from string import ascii_uppercase
 
 from warpflat.core.text import other_side, without_side
@@ -44,7 +44,8 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Join the linings", ({"lining"},)),
     ("Sew the lining to the facings", ({"facing", "lining"},)),
     ("Join the ends of bands and bindings", ({"strip"}, {"waistband"})),
-    ("Sew bands and bindings to their edges", ({"strip", "shell"}, {"waistband", "shell"}, {"strip", "waistband"})),
+    ("Sew bands and bindings to their edges", ({"strip", "shell"},)),
+    ("Sew the waistband on, turn it in and sew its inner edge down", ({"waistband", "shell"}, {"strip", "waistband"})),
     ("Sew the cuffs on, fold them right sides together, sew their ends and turn them", ({"cuff", "shell"}, {"cuff"})),
     ("Sew the hood's own seams", ({"hood"},)),
     ("Sew the hood on", ({"hood", "shell"},)),
@@ -52,7 +53,7 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Sew the collar on", ({"collar", "shell"},)),
 )
 # A seam of these stages is mentioned by others.
-_ON_FACINGS, _LININGS, _LAST = (len(_STAGES) + k for k in (1, 2, 5))
+_ON_FACINGS, _LININGS, *_ON_BANDS = (len(_STAGES) + k for k in (1, 2, 5, 6))
 
 
 #: A piece and an edge of it, by their names.
@@ -126,16 +127,12 @@ class SewnSeam:
 
 
 def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
-    """Return what each piece is called: one that is cut in pairs has no side."""
-    titles = {
-        piece.name: translate_name(without_side(piece.name))
-        if piece.paired and piece.quantity % 2 == 0 and not piece.on_fold and not piece.title
-        else piece.printed_name
-        for piece in pieces
+    """Return what each piece is called: as it is printed, with its side where two would be called alike."""
+    plain = [piece.printed_name for piece in pieces]
+    return {
+        piece.name: title if plain.count(title) == 1 or piece.title else translate_name(piece.name.replace("_", " "))
+        for piece, title in zip(pieces, plain, strict=True)
     }
-    plain = list(titles.values())
-    names = {piece.name: piece.printed_name for piece in pieces}
-    return {name: title if plain.count(title) == 1 else names[name] for name, title in titles.items()}
 
 
 def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
@@ -143,24 +140,35 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
     pieces = {piece.name: piece.piece for piece in garment.pieces[size]}
     titles = piece_titles(list(pieces.values()))
     lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
-    groups = _mirror_groups(garment.garment.seams, pieces)
-    found = []
+    groups, names = _mirror_groups(garment.garment.seams, pieces), {seam.name for seam in garment.garment.seams}
+    found = list[SewnSeam]()
     for number, group in enumerate(groups):
         seam = group[0]
+        # Of halves on the fold and of pairs the seam of one side stands for both, but for a zip, which is in one of them.
+        joined = [pieces[side.piece] for row in seam.sides for side in row]
+        other, both = other_side(seam.name), all(piece.on_fold or piece.is_pair for piece in joined)
+        stands_for_both = both and len(group) == 1 and other not in names and other != seam.name
+        sideless = len(group) > 1 or (stands_for_both and not seam.openings)
+        places = [(side.piece, side.edge) for each in group for row in each.sides for side in row]
+        if any(pieces[piece].quantity % 2 == 0 for piece, _ in places):
+            # What is cut twice is drawn for one side, and sewn to both.
+            places += [(piece, other_side(edge)) for piece, edge in places if pieces[piece].quantity == 1]
         found.append(
             SewnSeam(
                 letter=_letter(number),
-                name=translate_name(without_side(seam.name) if len(group) > 1 else seam.name),
+                name=translate_name(without_side(seam.name) if sideless else seam.name),
                 sides=(_words(seam.sides[0], titles), _words(seam.sides[1], titles)),
                 length_mm=lengths.get(seam.name, (0.0, 0.0)),
                 ease=seam.ease,
                 stretched=pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece].role == "strip",
                 stage=_stage(seam, pieces),
-                count=len(group),
+                count=2 if sideless else 1,
                 openings=seam.openings,
-                places=tuple((s.piece, s.edge) for each in group for row in each.sides for s in row),
+                places=tuple(places),
             )
         )
+        if stands_for_both and seam.openings:
+            found.append(replace(found[-1], name=translate_name(other), openings=()))
     return tuple(found)
 
 
@@ -264,7 +272,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     bound = {
         without_side(edge)
         for seam in seams
-        if seam.stage == _LAST
+        if seam.stage in _ON_BANDS
         for piece, edge in seam.places
         if roles.get(piece) == "shell"
     }
@@ -272,10 +280,12 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     at_zip = [place for edge, row in inside.items() if edge in zipped for place in row]
     basted = {edge: row for edge, row in inside.items() if edge in bound and row}
     turned_in_at = max((each.stage for each in seams if each.stage in (_LININGS + 1, _ON_FACINGS)), default=None)
-    for stage in sorted({seam.stage for seam in seams}):
+    stages = sorted({seam.stage for seam in seams})
+    first_band = next((stage for stage in stages if stage in _ON_BANDS), None)
+    for stage in stages:
         what = translate([*_STAGES, *_FINISHING][stage][0])
         here = [seam for seam in seams if seam.stage == stage]
-        if stage == _LAST and basted:
+        if basted and stage == first_band:
             steps.append(
                 SewingStep.at(
                     translate(
@@ -376,6 +386,14 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
                 pieces=ends,
             )
         )
+    hooked = _hooked(garment, size)
+    if hooked:
+        steps.append(
+            SewingStep.at(
+                translate("Sew a hook and bar to the ends above the zip: {pieces}.", pieces=called(hooked)),
+                pieces=hooked,
+            )
+        )
     return tuple(steps)
 
 
@@ -411,8 +429,16 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         *zips,
         *elastics,
         *(translate("{count} buttons", count=count) for count in buttons),
+        *(translate("1 hook and bar") for _ in _hooked(garment, size)),
         *([translate("{count} small buttons", count=small)] if small else []),
     )
+
+
+def _hooked(garment: DraftedGarment, size: str) -> list[DraftedPiece]:
+    """Return the waistbands that close above a zip without a button."""
+    zipped = any(_zips(seam) for seam in sewn_seams(garment, size))
+    bands = [piece for piece in garment.pieces[size] if piece.piece.role == "waistband"]
+    return [piece for piece in bands if zipped and not any(name.startswith("button") for name in piece.piece.marks)]
 
 
 def _buttons_at_one_end(piece: DraftedPiece) -> bool:

@@ -20,18 +20,24 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
+from warpflat.core.sums import weighted_percentile
 from warpflat.core.usd_process import UNREADABLE, read_apart
 from warpflat.export.colours import VertexColours, energy_colours
 from warpflat.export.geometry import face_areas, outline_edges
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
+__all__ = ["MAPS", "FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
 
 # Bytes of all layouts before compression; beyond, every second frame is left out, or every third ...
 _ROOM = 4_000_000
 # Bytes of a vertex in a layout: two coordinates of 16 bits, and a colour.
 _VERTEX = 5
 _COLOURS = 256
+#: Maps beside energy and strain, by the name of their primvar: unit on the page, how many of these the file's unit is, and the least
+#: upper end of a scale.
+MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, 10.0), "gap": ("mm", 1e3, 5.0)}
+# A scale holds this share of the cloth; no value of a map is larger.
+_SHARE, _MOST_OF_MAP = 0.98, 1e9
 # A body of more vertices than these is not shown.
 _MOST_OF_BODY = 100_000
 # Of zlib: the last level takes eight times as long as this one, and spares a twentieth of the bytes.
@@ -74,7 +80,15 @@ class FilmPiece:
         self.scale = float(colour.GetAttr().GetCustomData().get("rangeMax", 1.0))
         tags = prim.GetAttribute("warpflat:interpolated")
         self.computed = [time for time in self.times if not (tags and tags.Get(time))]
-        self._density = UsdGeom.PrimvarsAPI(self._pattern).GetPrimvar("strainEnergyDensity").GetAttr()
+        primvars = UsdGeom.PrimvarsAPI(self._pattern)
+        self._density = primvars.GetPrimvar("strainEnergyDensity").GetAttr()
+        #: Further maps, #F each: values, and in which state of the cloth they hold.
+        self.maps: dict[str, tuple[FloatArray, str]] = {}
+        for key in MAPS:
+            attribute = primvars.GetPrimvar(key).GetAttr()
+            if attribute and attribute.HasAuthoredValue():
+                state = str(attribute.GetCustomData().get("state", ""))
+                self.maps[key] = np.array(attribute.Get(), dtype=np.float64), state
 
     def shape(self, time: int) -> Shape:
         """Return the topology at a frame."""
@@ -157,6 +171,10 @@ def read_whole_film(path: Path) -> dict[str, Any] | None:
                     raise ValueError("a point that is no number")
                 if len(piece.density(time)) != len(shape.faces):
                     raise ValueError("energies of other faces")
+                if any(len(values) != len(shape.faces) for values, _ in piece.maps.values()):
+                    raise ValueError("a map of other faces")
+            if not all(np.abs(values).max(initial=0.0) < _MOST_OF_MAP for values, _ in piece.maps.values()):
+                raise ValueError("a value of a map that is no number")
         return pack_film(pieces)
     except InputError:
         raise
@@ -173,10 +191,11 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
     shown, stored = _choose_frames(pieces, shapes)
     if not shown:
         return None
+    maps = _scales(pieces, shapes)
     packer = zlib.compressobj(_LEVEL)
     parts, entries = list[bytes](), list[dict[str, Any]]()
     for piece in pieces:
-        entry, blocks = _packed(piece, shapes[piece.name], stored[piece.name])
+        entry, blocks = _packed(piece, shapes[piece.name], stored[piece.name], maps)
         entries.append(entry)
         parts += [packer.compress(block) for block in blocks]
     parts.append(packer.flush())
@@ -192,9 +211,25 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         "scale": first.scale,
         "colours": base64.b64encode(table.tobytes()).decode("ascii"),
         "pieces": entries,
+        "maps": maps,
         **({} if body is None else {"body": body}),
         "data": base64.b64encode(b"".join(parts)).decode("ascii"),
     }
+
+
+def _scales(pieces: Sequence[FilmPiece], shapes: Mapping[str, Sequence[Shape]]) -> dict[str, dict[str, Any]]:
+    """Return the maps that all pieces have, each with its unit on the page, its state, and the upper end of its scale there."""
+    found = {}
+    for key, (unit, factor, least) in MAPS.items():
+        if not all(key in piece.maps for piece in pieces):
+            continue
+        values = np.concatenate([piece.maps[key][0] for piece in pieces])
+        areas = np.concatenate(
+            [face_areas(shape.surface, shape.faces) for piece in pieces for shape in shapes[piece.name][:1]]
+        )
+        high = factor * weighted_percentile(np.maximum(values, 0.0), areas, _SHARE)
+        found[key] = {"unit": unit, "high": max(high, least), "state": pieces[0].maps[key][1]}
+    return found
 
 
 def _packed_body(stage: Any) -> dict[str, Any] | None:
@@ -257,9 +292,12 @@ def _stored_frames(keys: Sequence[int], shown: Sequence[int]) -> list[int]:
     return stored
 
 
-def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) -> tuple[dict[str, Any], list[bytes]]:
+def _packed(
+    piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int], maps: Mapping[str, Mapping[str, Any]]
+) -> tuple[dict[str, Any], list[bytes]]:
     """Return what the page must know of a piece, and its arrays."""
     space, blocks, topologies = _Box(shapes[0].surface), list[bytes](), list[dict[str, int]]()
+    painted = list[VertexColours]()
     for change, shape in zip(piece.changes, shapes, strict=True):
         triangles, _ = triangulate(shape.faces)
         edges = outline_edges(shape.faces)
@@ -273,15 +311,17 @@ def _packed(piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int]) ->
         )
         blocks += [_planes(triangles.astype(np.uint32)), _planes(edges.astype(np.uint32))]
         blocks.append(_planes(space.steps(shape.surface)))
+        paint = VertexColours(shape.faces, face_areas(shape.surface, shape.faces), len(shape.surface))
+        painted.append(paint)
+        for key, scale in maps.items():
+            values = MAPS[key][1] * piece.maps[key][0]
+            blocks.append(paint.levels(values, scale["high"], _COLOURS).astype(np.uint8).tobytes())
     layouts = []
     for time in stored:
         number, at = sum(change <= time for change in piece.changes) - 1, min(time, piece.times[-1])
         layouts.append((number, piece.positions(at, len(shapes[number].surface)), at))
     box = _Box(np.concatenate([positions for _, positions, _ in layouts]))
     before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
-    painted = [
-        VertexColours(shape.faces, face_areas(shape.surface, shape.faces), len(shape.surface)) for shape in shapes
-    ]
     for number, positions, time in layouts:
         steps, colours = box.steps(positions), piece.rows(time, painted[number])
         same = before is not None and before[0] == number

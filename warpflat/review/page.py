@@ -29,6 +29,9 @@ _POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-
 # Pictures come in this order, and others after them.
 _FIRST = ("picture.png", "drape.png", "wear.png", "walked.png")
 _QUALITY = 85  # of JPEG
+# What maps of the film are called, and the states of the cloth in which they hold.
+_MAPS = {"pressure": "pressure on the skin", "gap": "gap to the body"}
+_STATES = {"designed": ", as designed", "draped": ", draped"}
 # Cloth that is longer by more than this when worn is stretched on purpose, if it fits.
 STRETCHED = 0.02
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -154,6 +157,7 @@ def _page(
                     ("energy", "strain energy"),
                     ("warp", "strain along the warp"),
                     ("weft", "strain along the weft"),
+                    *((key, _MAPS[key] + _STATES.get(each["state"], "")) for key, each in packed["maps"].items()),
                 )
             )
             speeds = "".join(

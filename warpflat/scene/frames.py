@@ -14,13 +14,14 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import CannotWriteError, system_reason
 from warpflat.core.output import optional_file
-from warpflat.export.geometry import Polylines
+from warpflat.export.geometry import Polylines, corner_mean
 from warpflat.scene.schema import OutputTable
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
@@ -273,6 +274,7 @@ class Film:
     Attributes:
         files: after the block: the names of the files that it has written.
         recorders: of the pieces, by name.
+        worn: how the pieces lie at the end, by name; set within the block, for the maps of pressure and of the gap to the body.
     """
 
     def __init__(
@@ -286,6 +288,7 @@ class Film:
             mannequin: on which they lie; it is written as `mannequin.usdc`, to which the frames refer.
         """
         self.files: list[str] = []
+        self.worn: Mapping[str, Flattening] = {}
         self._mannequin = mannequin
         self._stack = ExitStack()
         self._folder, self._output = folder, output
@@ -340,6 +343,7 @@ class Film:
                     break
             with FrameWriter(path, scale=scale) as writer:
                 if self._mannequin is not None:
+                    from warpflat.draping.body import Body
                     from warpflat.mannequin.normals import vertex_normals
                     from warpflat.mannequin.usd import write_mannequin_usd
 
@@ -347,8 +351,15 @@ class Film:
                     layout = self._mannequin.layout
                     normals = vertex_normals(self._mannequin.vertices, layout.faces[layout.on_body])
                     writer.refer_to_body(MANNEQUIN, self._mannequin.vertices - _SHRUNK * normals)
+                    body = Body(self._mannequin.vertices, layout.faces[layout.on_body], device=wp.get_device("cpu"))
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
+                for name, piece in self.worn.items():
+                    # Worn values are of the pattern's faces, which are those of the surface in its order.
+                    writer.write_map(name, "pressure", piece.fit.pressure, unit="Pa", state="worn")
+                    if self._mannequin is not None:
+                        gaps = corner_mean(body.gaps(piece.surface.vertices), piece.surface.faces)
+                        writer.write_map(name, "gap", gaps, unit="m", state="designed")
                 pieces = {name: recorder.stages for name, recorder in self.recorders.items()}
                 for number in range(max(len(stages) for stages in pieces.values())):
                     shots = {name: self._shot(stages, number) for name, stages in pieces.items()}

@@ -160,6 +160,7 @@ def _run(
 
             garment = plan.flatten(callback=each_step, recorders=film.recorders)
             require_open_darts(scene, [garment])
+            film.worn = garment.pieces
             # What lies beside a seam that was found, such as a hem, is not a border that was forgotten.
             notes = unsewn_notes(garment) if getattr(plan, "found", None) is None else []
             fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))

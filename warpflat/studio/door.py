@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import hmac
 import logging
+import mimetypes
 import os
 import re
 import secrets
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from http import HTTPStatus
 from ipaddress import IPv4Address, IPv6Address, ip_address
+from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import viser
 import websockets.asyncio.server
@@ -95,7 +99,12 @@ class Door:
             )
 
     @contextmanager
-    def guard(self, read: Callable[[str | bytes], bytes], refuse: Callable[[str], None]) -> Iterator[None]:
+    def guard(
+        self,
+        read: Callable[[str | bytes], bytes],
+        refuse: Callable[[str], None],
+        saved_file: Callable[[str], Path | None],
+    ) -> Iterator[None]:
         """Let the viser server that is started meanwhile listen here, and hear only what may come in.
 
         viser leaves no way to look at a request before it is answered, so the function that it serves with is replaced.
@@ -103,6 +112,7 @@ class Door:
         Args:
             read: returns what the server is to read instead of a message; raises InputError if it is to read nothing.
             refuse: called with the reason, in one line, why a message of the page was not read.
+            saved_file: returns the file that "saved/NAME" means, None for none.
         """
 
         class Connection(ServerConnection):
@@ -127,7 +137,9 @@ class Door:
             def answer(connection: ServerConnection, request: Request) -> Response | None:
                 refusal = self._refusal(connection, request)
                 try:
-                    response = refusal or process_request(connection, request)
+                    response = (
+                        refusal or _saved(connection, request, saved_file) or process_request(connection, request)
+                    )
                 except Exception:  # whatever viser stumbles over in a request is the fault of who sent it
                     response = connection.respond(HTTPStatus.BAD_REQUEST, "no browser asks like this\n")
                 if response is not None:
@@ -169,6 +181,24 @@ class Door:
     def _is_own(self, authority: str, names: set[str | IPv4Address | IPv6Address]) -> bool:
         found = _AUTHORITY.fullmatch(authority)
         return found is not None and int(found[3] or 80) == self._port and _name(found[1] or found[2]) in names
+
+
+def _saved(connection: ServerConnection, request: Request, saved_file: Callable[[str], Path | None]) -> Response | None:
+    """Return the answer to a request for a file that was saved; None for any other request."""
+    if not request.path.startswith("/saved/"):
+        return None
+    path = saved_file(unquote(request.path.removeprefix("/saved/")))
+    try:
+        content = None if path is None else path.read_bytes()
+    except OSError:
+        content = None
+    if path is None or content is None:
+        return connection.respond(HTTPStatus.NOT_FOUND, "the run that was saved last has no such file\n")
+    response = connection.respond(HTTPStatus.OK, "")
+    kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+    del response.headers["Content-Type"], response.headers["Content-Length"]
+    response.headers.update({"Content-Type": kind, "Content-Length": str(len(content))})
+    return replace(response, body=content)
 
 
 def _name(host: str) -> str | IPv4Address | IPv6Address:

@@ -1,4 +1,4 @@
-"""What a page may say: it moves its camera, clicks into the scene, and changes a part of the panel."""
+"""What a page may say: it moves its camera, clicks into the scene, drags a handle, and changes a part of the panel."""
 
 from __future__ import annotations
 
@@ -51,6 +51,19 @@ class _Click(Struct, tag="ScenePointerMessage", tag_field="type", forbid_unknown
     modifier: _Word | None
 
 
+class _Drag(Struct, tag="SceneNodeDragMessage", tag_field="type", forbid_unknown_fields=True):
+    phase: Literal["start", "update", "end"]
+    name: Annotated[str, Meta(pattern=r"^/pattern/handle\d{1,4}$", max_length=100)]
+    instance_index: None
+    start_position: _Vector
+    start_screen_pos: tuple[_Number, _Number]
+    end_position: _Vector
+    end_screen_pos: tuple[_Number, _Number]
+    button: Literal["left"]
+    modifier: None
+    owner: Literal[""] = ""
+
+
 class _Update(Struct, forbid_unknown_fields=True):
     # No tuple of a fixed length beside bounds: with both in one union the garbage collector crashes (msgspec 0.22).
     value: bool | int | float | str | list[_Number]
@@ -61,7 +74,7 @@ class _Change(Struct, tag="GuiUpdateMessage", tag_field="type", forbid_unknown_f
     updates: _Update
 
 
-_DECODER = msgspec.msgpack.Decoder(_Camera | _Click | _Change)
+_DECODER = msgspec.msgpack.Decoder(_Camera | _Click | _Drag | _Change)
 
 
 def read_message(message: str | bytes, parts: Mapping[str, Any]) -> bytes:
@@ -86,7 +99,9 @@ def read_message(message: str | bytes, parts: Mapping[str, Any]) -> bytes:
             raise InputError("there is no such part of the panel, or it is gone")
         if not _can_have(part, said.updates.value):
             name = getattr(part, "label", "this part of the panel")
-            raise InputError(f"{name} cannot be {quote_value(said.updates.value)}")
+            low, high = getattr(part, "min", None), getattr(part, "max", None)
+            bounds = "" if low is None or high is None else f": {low:g} to {high:g} is possible"
+            raise InputError(f"{name} cannot be {quote_value(said.updates.value)}{bounds}")
     return msgspec.msgpack.encode(said)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from warpflat.core.arrays import IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.draping.result import Drape
 from warpflat.mannequin.mannequin import Mannequin
@@ -22,6 +22,7 @@ from warpflat.scene.load import Scene
 from warpflat.studio.cut_tables import cut_along, cut_between, cuttable_lines
 from warpflat.studio.door import Door
 from warpflat.studio.frame import PieceFrame
+from warpflat.studio.handles import Handle, pattern_handles
 from warpflat.studio.maps import Scale, drape_gaps, drape_scale, piece_scale
 from warpflat.studio.messages import read_message
 from warpflat.studio.panel import Actions, Panel
@@ -37,6 +38,8 @@ __all__ = ["Page"]
 # Seconds between two pictures: at most ten a second, and the newest wins. Words alone take no picture's turn, so that the first picture
 # of an edit comes as soon as there is one.
 _BETWEEN, _BETWEEN_WORDS = 0.1, 0.02
+# All is shown anew where form or pattern has grown or shrunk by more than this share.
+_REFIT = 0.02
 
 
 class Page:
@@ -59,13 +62,16 @@ class Page:
         # standard output, which is for results.
         with (
             contextlib.redirect_stdout(io.StringIO()),
-            self.door.guard(lambda said: read_message(said, server.gui._gui_input_handle_from_uuid), self.session.tell),
+            self.door.guard(
+                lambda said: read_message(said, server.gui._gui_input_handle_from_uuid),
+                self.session.tell,
+                self.session.saved_file,
+            ),
         ):
             server = viser.ViserServer(label="warpflat studio", verbose=False)
         # Each callback of viser goes through here.
         submit = server._thread_executor.submit
         server._thread_executor.submit = lambda act, *event: submit(self.session.attempt, lambda: act(*event))
-        server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(340)
         self.server, self.url = server, self.door.url
@@ -74,19 +80,30 @@ class Page:
         self.scale: Scale | None = None
         self._two_points, self._points = False, list[Hit]()
         self._picked: tuple[str, str] | None = None
+        self._marked_in: Step | None = None  # the step in which line and points were picked
+        self._handles: tuple[Solution | None, dict[str, Handle]] = (None, {})
+        self._held: Handle | None = None  # what is being dragged, as it was when that began
+        self._dragged_to: FloatArray | None = None  # where to, until that is being solved
+        self._goes_on = False  # whether the drag has changed the scene already
+        self._drag_lock = threading.Lock()
         self._frames: dict[str, PieceFrame] = {}
         self._drawn: tuple[object, ...] = ()
         self._body: Mannequin | None = None
         self._seen: tuple[str, ...] = ()  # the pieces that every camera has been set upon
+        self._shown_size = np.zeros(2)  # how wide and high form and pattern were then [m]
         self._lines: tuple[Solution | None, dict[str, dict[str, IntArray]]] = (None, {})
         self._dirty, self._closed, self._told, self._drawing = threading.Event(), False, True, False
         self.stage = Stage(self.server)
+        self._choose_theme(dark=False)
         actions = Actions(
             choose_map=self._choose_map,
             choose_line=self._choose_line,
             choose_mode=self._choose_mode,
             try_again=self._try_part,
             view=self.stage.show_all,
+            undo=lambda: self._go(self.session.undo),
+            redo=lambda: self._go(self.session.redo),
+            theme=self._choose_theme,
         )
         self._panel = Panel(self.server, self.session, actions, name=free_name(scene))
         self.server.on_client_connect(self._greet)
@@ -110,6 +127,7 @@ class Page:
     def _changed(self) -> None:
         if not self.session.activity:
             self._frames = {}
+            self._drag_on()
         self._told = True
         self._dirty.set()
 
@@ -146,7 +164,7 @@ class Page:
             self._kind = "energy"
             self._panel.set_map("energy")
         kind = self._kind if self._kind != "drape" or drape is not None else "energy"
-        state = (solution, kind, drape, *live.values())
+        state = (solution, kind, drape, self._held is None, *live.values())
         is_new = state != self._drawn
         if is_new:
             self._drawn = state
@@ -157,7 +175,8 @@ class Page:
                 frames = [piece.frame for piece in pieces.values()]
                 self.scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(kind, frames)
                 self._panel.show_scale(self.scale)
-            if at_rest:
+            # What is dragged stays below the pointer.
+            if at_rest and self._held is None:
                 self.stage.lay_out(pieces)
             self.stage.draw(pieces, self.scale, tentative=self.session.preview is not None)
             if not live and solution is not None:
@@ -168,10 +187,13 @@ class Page:
                 if body is not self._body or others:
                     self.stage.draw_body(None if body is None else body.surface())
                     self._body = body
-                if others:
-                    self._seen = tuple(solution.pieces)
+                size = np.array(self.stage.size)
+                grown = np.abs(size - self._shown_size).max() > _REFIT * self._shown_size.max()
+                if (others or grown) and self._held is None:
+                    self._seen, self._shown_size = tuple(solution.pieces), size
                     for client in self.server.get_clients().values():
                         self.stage.show_all(client)
+                self._show_handles(solution)
         if self._told:
             self._told = False
             self._update_panel()
@@ -204,8 +226,52 @@ class Page:
             }
         return {name: Shown.of_map(frame, kind, lines[name], angle) for name, frame in frames.items()}
 
+    def _show_handles(self, solution: Solution) -> None:
+        """Show what can be dragged in the pattern that is shown; nothing while a cut is only tried."""
+        if self.session.preview is not None:
+            self._handles = None, {}
+        elif self._handles[0] is not solution:
+            self._handles = solution, {f"{each.piece}: {each.name}": each for each in pattern_handles(solution)}
+        known = self._handles[1]
+        self.stage.show_handles({name: (each.piece, each.place) for name, each in known.items()}, self._drag)
+
+    async def _drag(self, name: str, event: viser.SceneNodeDragEvent[Any]) -> None:
+        """Take a handle where the pointer is; awaited by the server, so that the parts of a drag keep their order."""
+        if event.phase == "start":
+            # What a handle changes is told by the pattern that it was shown with.
+            known, handles = self._handles
+            self._held, self._goes_on = handles.get(name) if known is self.session.step.solution else None, False
+            if self._held is None:
+                self.session.tell("the pattern is not at rest yet; drag it when it is")
+        if self._held is not None:
+            self._dragged_to = self.stage.on_table(self._held.piece, event.end_position)
+            self._drag_on(last=event.phase == "end")
+            self._dirty.set()
+
+    def _drag_on(self, *, last: bool = False) -> None:
+        """Solve for the newest place of what is dragged, once what is being solved is done: so the numbers follow."""
+        with self._drag_lock:
+            handle, place = self._held, self._dragged_to
+            if last:
+                self._held = None
+            if handle is None or place is None or (self.session.activity and not last):
+                return
+            self._dragged_to = None
+        self.session.attempt(
+            lambda: self.session.change(f"{handle.piece}: {handle.name}", again=self._goes_on, **handle.change(place))
+        )
+        self._goes_on = True
+
+    def _go(self, undo_or_redo: Callable[[], None]) -> None:
+        """Undo or redo; what was picked is no longer of what is shown."""
+        self._picked, self._points = None, []
+        undo_or_redo()
+
     def _update_panel(self) -> None:
         solution = self.session.solution
+        if self._marked_in is not self.session.step:
+            # Another scene has other lines.
+            self._marked_in, self._picked, self._points = self.session.step, None, []
         known = self._cuttable(solution)
         lines = [(piece, line) for piece, cuttable in known.items() for line in cuttable]
         if self._picked not in lines:
@@ -228,6 +294,9 @@ class Page:
     def _greet(self, client: viser.ClientHandle) -> None:
         """Set the camera of a page that has been opened, and follow it; a window of another shape shows all again."""
         shape = [0.0]
+        if len(self.server.get_clients()) <= 1 and (self._picked is not None or self._points):
+            # A page that was loaded again begins without marks.
+            self._choose_line(None)
 
         def follow(camera: viser.CameraHandle) -> None:
             if abs(camera.aspect - shape[0]) > 0.01 * camera.aspect:
@@ -257,6 +326,9 @@ class Page:
                 self.session.tell('no line runs within 2 cm of the click; click nearer, or pick "two points"')
             else:
                 self._choose_line((hit.piece, line))
+
+    def _choose_theme(self, dark: bool) -> None:
+        self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False, dark_mode=dark)
 
     def _choose_mode(self, two_points: bool) -> None:
         self._two_points = two_points

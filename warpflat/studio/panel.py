@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -15,9 +16,11 @@ from warpflat.fabric.library import load_library
 from warpflat.flattening.progress import relaxation_words
 from warpflat.mannequin.ease import EASE_PRESETS
 from warpflat.mannequin.forms import form_names
-from warpflat.mannequin.measurements import size_names
+from warpflat.mannequin.measurements import size_names, size_tables
 from warpflat.studio.maps import MAPS, Scale
+from warpflat.studio.save import Saved
 from warpflat.studio.session import Preview, Session
+from warpflat.studio.solve import Solution
 
 __all__ = ["Actions", "Panel", "preview_words"]
 
@@ -39,6 +42,8 @@ class Actions:
         choose_mode: called with True if two points are to be clicked.
         try_again: called with the part of the line, in shares.
         view: called with the client and the side from which it looks at the form [degrees].
+        undo, redo: go through the changes.
+        theme: called with whether the page is dark.
     """
 
     choose_map: Callable[[str], None]
@@ -46,6 +51,9 @@ class Actions:
     choose_mode: Callable[[bool], None]
     try_again: Callable[[tuple[float, float]], None]
     view: Callable[[Any, float], None]
+    undo: Callable[[], None]
+    redo: Callable[[], None]
+    theme: Callable[[bool], None]
 
 
 class Panel:
@@ -58,8 +66,10 @@ class Panel:
         sides = {"Front": 0.0, "Left": 90.0, "Back": 180.0, "Right": 270.0}
         buttons = self._gui.add_button_group("look from", tuple(sides))
         buttons.on_click(lambda event: self._actions.view(event.client, sides[event.target.value]))
-        acts = {"Undo": session.undo, "Redo": session.redo, "Stop": session.stop, "Watch": self._watch}
+        acts = {"Undo": actions.undo, "Redo": actions.redo, "Stop": session.stop, "Watch": self._watch}
         _buttons(self._gui.add_button_group("do", tuple(acts)), acts)
+        theme = self._gui.add_dropdown("page", ("light", "dark"))
+        _chosen(theme, lambda value: self._actions.theme(value == "dark"))
         with self._gui.add_folder("Map"):
             self._kind = self._gui.add_dropdown("colours", tuple(MAPS.values()))
             self._legend = self._gui.add_html("")
@@ -91,9 +101,14 @@ class Panel:
                 self._shown_lengths: Mapping[str, float] = {}
                 self._size = self._gui.add_dropdown("size", (_OWN, *size_names()), initial_value=_OWN)
                 with self._gui.add_folder("Measures", expand_by_default=False):
+                    # As `[mannequin]` bounds them, in the unit that is shown.
+                    bounds = size_tables()["valid"]["range"]
                     self._measures = {
-                        key: self._gui.add_number(words, 0.0, min=0.0, max=260.0, step=0.5)
+                        key: self._gui.add_number(
+                            words, low, min=low, max=high, step=0.5, hint=f"{low:g} to {high:g} cm"
+                        )
                         for key, words in _MEASURES.items()
+                        for low, high in [map(float, bounds[key])]
                     }
                     take = self._gui.add_button("Take these measures")
                 self._form = self._gui.add_dropdown("form", (_OWN, *form_names()), initial_value=_OWN)
@@ -226,6 +241,7 @@ def _head(session: Session) -> str:
             rows = f"<table style='width:100%;line-height:1.15'>{cells}</table>"
     lines = [" · ".join(words), rows]
     if solution is not None:
+        lines.append(_fit_words(solution))
         lines.append(
             relaxation_words([stage.as_dict() for stage in piece.stages] for piece in solution.pieces.values())
         )
@@ -242,8 +258,32 @@ def _head(session: Session) -> str:
     if session.saved is not None and session.note:
         state = "at rest" if session.saved.at_rest else "NOT at rest"
         lines.append(f"run from scratch: strain energy <b>{energy_words(session.saved.strain_energy)}</b>, {state}")
+    if session.saved is not None:
+        lines.append(_links(session.saved))
     text = "".join(f"<div style='margin-bottom:0.2em'>{line}</div>" for line in lines if line)
     return f"<div id='studio-head' style='padding:0.3em 0.9em;font-size:0.9em;overflow-wrap:anywhere'>{text}</div>"
+
+
+def _fit_words(solution: Solution) -> str:
+    """Return whether the cloth fits by its strain, and where not; nothing while that is not known."""
+    fits = {name: piece.fit for name, piece in solution.pieces.items()}
+    area = {name: float(fit.area.sum()) for name, fit in fits.items()}
+    outside = sum(fit.outside * area[name] for name, fit in fits.items()) / max(sum(area.values()), 1e-12)
+    unfit = [name for name, fit in fits.items() if not fit.fits]
+    verdict = f"<b style='color:#b00020'>no</b>: {escape(', '.join(unfit))}" if unfit else "<b>yes</b>"
+    return f"fits by its strain: {verdict}; {100.0 * outside:.1f} % of the cloth beyond its limit"
+
+
+def _links(saved: Saved) -> str:
+    """Return links to what was saved last: to print, to review, to download."""
+
+    def link(file: str, words: str, how: str) -> str:
+        return f"<a href='saved/{quote(file)}' {how}>{escape(words)}</a>"
+
+    opened = [("pattern.pdf", "print"), ("review.html", "review")]
+    links = [link(file, words, "target='_blank'") for file, words in opened if file in saved.files]
+    links += [link(file, file, "download") for file in saved.files]
+    return f"<span id='studio-links'>{escape(saved.path.stem)}: {' · '.join(links)}</span>"
 
 
 def preview_words(preview: Preview) -> str:

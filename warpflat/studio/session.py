@@ -49,12 +49,14 @@ class Step:
         what: what was changed, in a word.
         scene: after the change.
         solution: None until it has been solved.
+        stand_in: what is shown until then, of the change that it takes the place of.
         drape: None until it has been asked for.
     """
 
     what: str
     scene: Scene
     solution: Solution | None = None
+    stand_in: Solution | None = None
     drape: Drape | None = None
 
 
@@ -130,8 +132,8 @@ class Session:
     def solution(self) -> Solution | None:
         """What the present scene gave, or the latest before it that gave anything."""
         with self._lock:
-            solved = [step.solution for step in self._steps[: self._at + 1] if step.solution is not None]
-            return solved[-1] if solved else None
+            steps = reversed(self._steps[: self._at + 1])
+            return next((found for step in steps if (found := step.solution or step.stand_in) is not None), None)
 
     @property
     def shown(self) -> Solution | None:
@@ -152,8 +154,14 @@ class Session:
         """Solve the scene as it is."""
         self._solve()
 
-    def change(self, what: str, **tables: Any) -> None:
-        """Replace tables of the scene, as `fabric="denim"`; None leaves one out. A second change of `what` replaces one not yet solved."""
+    def change(self, what: str, *, again: bool = False, **tables: Any) -> None:
+        """Replace tables of the scene, as `fabric="denim"`; None leaves one out. A second change of `what` replaces one not yet solved.
+
+        Args:
+            what: was changed, in a word.
+            again: the change goes on with the last one, if that was of `what` too: both are undone together.
+            tables: of the scene.
+        """
         with self._lock:
             self._clear()
             try:
@@ -165,8 +173,8 @@ class Session:
                 self._on_change()
                 return
             del self._steps[self._at + 1 :]
-            if self._at and self.step.what == what and self.step.solution is None:
-                self._steps[self._at] = Step(what=what, scene=scene)
+            if self._at and self.step.what == what and (again or self.step.solution is None):
+                self._steps[self._at] = Step(what=what, scene=scene, stand_in=self.step.solution or self.step.stand_in)
             else:
                 self._steps.append(Step(what=what, scene=scene))
                 self._at += 1
@@ -176,7 +184,8 @@ class Session:
         """Take another shipped form; cuts, seams and whatever names pieces of the one before are left out."""
         settings = self.scene.settings
         left_out = [key for key in _OF_ONE_FORM if getattr(settings, key)]
-        self.change("form", form=form, **dict.fromkeys(_OF_ONE_FORM))
+        tables: dict[str, Any] = {"form": form, **dict.fromkeys(_OF_ONE_FORM)}
+        self.change("form", **tables)
         if left_out and not self.error:
             self.note = f"left out, since they belong to the form before: {', '.join(left_out)}"
             self._on_change()
@@ -333,6 +342,11 @@ class Session:
             self.note = f"saved: {path}, and its run in {self.saved.folder}"
 
         self._run("saving", job, to_its_end=True)
+
+    def saved_file(self, name: str) -> Path | None:
+        """Return a file of the run that was saved last, by its name; None if that run has not written it."""
+        saved = self.saved
+        return saved.folder / name if saved is not None and name in saved.files else None
 
     def tell(self, error: str) -> None:
         """Show a mistake, in one line."""

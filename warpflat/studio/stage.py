@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,8 @@ __all__ = ["Shown", "Stage"]
 _INK, _THIN, _PICKED, _SKIN = (45, 45, 50), (110, 105, 105), (0, 90, 200), (205, 200, 194)
 # Between form and pattern, between pieces, and of lines above the cloth [m].
 _BETWEEN, _GAP, _ABOVE = 0.15, 0.07, 0.002
+# Radius of a point that can be dragged [m].
+_HANDLE = 0.009
 # So much of the body is shown beyond the garment, to the sides, up and down, and to the front and the back [m].
 _BEYOND = np.array([0.05, 0.12, 0.12])
 _FOV = 0.35  # radians: a long lens, so that the pattern is hardly foreshortened
@@ -72,6 +75,7 @@ class Stage:
         self._pieces: dict[str, Shown] = {}
         self._nodes: dict[str, Any] = {}
         self._sides: dict[int, float] = {}
+        self._handles: dict[str, Any] = {}
 
     @property
     def form_position(self) -> FloatArray:
@@ -144,7 +148,7 @@ class Stage:
         low, high = self._boxes[1]
         x, y = low[0], low[1] - 0.075
         bar = np.array([[(x, y), (x + 0.1, y)], *([(at, y - 0.008), (at, y + 0.008)] for at in (x, x + 0.05, x + 0.1))])
-        self._segments("/pattern/bar", np.concatenate([bar, np.zeros((4, 2, 1))], axis=2), _INK, 2.0)
+        self._segments("/pattern/bar", np.concatenate([bar, np.zeros((4, 2, 1))], axis=2), _THIN, 2.0)
         node = "/pattern/name_bar"
         self._nodes[node] = self._scene.add_label(
             node, "10 cm", position=(x + 0.11, y, 0.0), anchor="center-left", font_screen_scale=0.9
@@ -179,6 +183,38 @@ class Stage:
         for number, hit in enumerate(points):
             node = f"/form/point{number}"
             self._nodes[node] = self._scene.add_icosphere(node, radius=0.008, color=_PICKED, position=hit.point)
+
+    def show_handles(self, handles: Mapping[str, tuple[str, FloatArray]], on_drag: Callable[[str, Any], Any]) -> None:
+        """Show points that can be dragged; those of the same names only move, so that a drag goes on.
+
+        Args:
+            handles: by name, the piece and the place in its pattern, 2 [m].
+            on_drag: a coroutine function, called with the name and viser's event.
+        """
+        if list(handles) != list(self._handles):
+            for node in self._handles.values():
+                node.remove()
+            self._handles = {
+                name: self._scene.add_icosphere(
+                    f"/pattern/handle{number}", radius=_HANDLE, color=_PICKED, subdivisions=2
+                )
+                for number, name in enumerate(handles)
+            }
+            for name, node in self._handles.items():
+                node.on_drag(partial(on_drag, name))
+        for name, (piece, place) in handles.items():
+            self._handles[name].position = (*(place + self._corners[piece]).tolist(), _ABOVE)
+
+    def handle_position(self, name: str) -> FloatArray | None:
+        """Return where a point that can be dragged is seen, 3 [m]; None if there is none of that name."""
+        if name not in self._handles:
+            return None
+        return np.asarray(self._pattern.position) + self._turn @ np.asarray(self._handles[name].position)
+
+    def on_table(self, piece: str, point: Sequence[float]) -> FloatArray:
+        """Return where a point of the scene lies in a piece's pattern, 2 [m]."""
+        local = (np.asarray(point, dtype=float) - np.asarray(self._pattern.position)) @ self._turn
+        return np.asarray(local[:2] - self._corners[piece])
 
     def pick(self, origin: Sequence[float], direction: Sequence[float]) -> Hit | None:
         """Return the place of a piece that a ray from the eye meets, on the form or in the pattern."""
@@ -219,7 +255,7 @@ class Stage:
         """
         side = self._sides.setdefault(client.client_id, 0.0) if side is None else side
         self._sides[client.client_id] = side
-        width, height = self._size()
+        width, height = self.size
         aspect = client.camera.aspect or 1.5
         half = np.tan(0.5 * _FOV)
         away = _ROOM * max(0.5 * height / half, 0.5 * width / (half * aspect))
@@ -232,15 +268,16 @@ class Stage:
             client.camera.position = (away * np.sin(angle), 0.0, away * np.cos(angle))
             client.camera.look_at = (0.0, 0.0, 0.0)
 
-    def _size(self) -> tuple[float, float]:
-        """Return width and height of form and pattern together, however the form is turned [m]."""
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of form and pattern together, however the form is turned [m]."""
         form, pattern = np.ptp(self._boxes, axis=1)
         across = float(np.hypot(form[0], form[2]))
         return across + _BETWEEN + float(pattern[0]), max(float(form[1]), float(pattern[1]) + 0.1)
 
     def _place(self) -> None:
         """Set form and pattern beside each other, about the origin."""
-        width, _ = self._size()
+        width, _ = self.size
         middle, half = self._boxes.mean(axis=1), 0.5 * np.ptp(self._boxes, axis=1)
         right, up = self._turn[:, 0], self._turn[:, 1]
         pattern = float(half[1][0])

@@ -34,6 +34,11 @@
       shape.edge = interleaved(planes(2 * shape.edges, 4), 2);
       const steps = interleaved(planes(3 * shape.vertices, 2), 3);
       shape.surface = Float32Array.from(steps, (s, i) => piece.space[i % 3] + (s / 65535) * piece.space[3]);
+      shape.maps = {};
+      for (const key of Object.keys(film.maps)) {
+        shape.maps[key] = data.slice(at, at + shape.vertices);
+        at += shape.vertices;
+      }
       shape.normals = normalsOf(shape);
     }
     piece.layouts = [];
@@ -227,8 +232,10 @@
     }
     return (state[key] = sum.map((value, i) => value / (area[i] || 1)));
   }
-  const shadesOf = (piece, state) => map === "energy" ? state.colours
-    : Uint8Array.from(strains(piece, state, map), (e) => 127.5 + 127.5 * Math.min(1, Math.max(-1, e / strainScale)));
+  // Energies, pressures and gaps are bytes of their scale; strains go both ways.
+  const bytes = (state) => map === "energy" ? state.colours : state.shape.maps[map];
+  const shadesOf = (piece, state) => bytes(state)
+    || Uint8Array.from(strains(piece, state, map), (e) => 127.5 + 127.5 * Math.min(1, Math.max(-1, e / strainScale)));
   // The cloth under a place of the screen: piece, its value in the present map. The nearest triangle counts.
   function under(x, y) {
     const m = matrix(), px = (2 * x) / canvas.clientWidth - 1, py = 1 - (2 * y) / canvas.clientHeight;
@@ -254,7 +261,7 @@
           const z = sz[a] + f * (sz[b] - sz[a]) + g * (sz[c] - sz[a]);
           if (z >= depth) continue;
           depth = z;
-          const from = map === "energy" ? state.colours : strains(piece, state, map);
+          const from = bytes(state) || strains(piece, state, map);
           best = { piece, value: from[a] + f * (from[b] - from[a]) + g * (from[c] - from[a]) };
         }
       }
@@ -264,9 +271,9 @@
   const wordsOf = (found) => {
     if (!found) return "";
     const name = found.piece.name.replaceAll("_", " ");
-    if (map !== "energy") return `${name}: ${(100 * found.value).toFixed(1)} % along the ${map}`;
-    const energy = (found.value / 255) * film.scale;
-    return `${name}: ${found.value >= 254.5 ? "at least " : ""}${energy.toPrecision(3)} J/m²`;
+    if (map === "warp" || map === "weft") return `${name}: ${(100 * found.value).toFixed(1)} % along the ${map}`;
+    const { high, unit } = film.maps[map] || { high: film.scale, unit: "J/m²" };
+    return `${name}: ${found.value >= 254.5 ? "at least " : ""}${((found.value / 255) * high).toPrecision(3)} ${unit}`;
   };
 
   // --- camera
@@ -320,7 +327,7 @@
       const shape = state.shape, turned = camera.which === "all" && shape.turned;
       const shades = shadesOf(piece, state);
       gl.uniform1f(fadeAt, picked && picked !== piece ? 1 : 0);
-      gl.uniform1f(twoAt, map === "energy" ? 0 : 1);
+      gl.uniform1f(twoAt, bytes(state) ? 0 : 1);
       if (camera.which !== "pattern") drawMesh(shape, turned || shape.surface, turned ? shape.turnedNormals : shape.normals, shades, back);
       if (camera.which !== "surface") drawMesh(state.shape, state.points, null, shades, back);
     }
@@ -362,7 +369,9 @@
   chosen.addEventListener("change", () => {
     map = chosen.value;
     if (lowEnd) {
+      const of = film.maps[map];
       const ends = map === "energy" ? energyEnds
+        : of ? ["0", `${of.high.toPrecision(3)} ${of.unit}`, energyEnds[2]]
         : [`-${100 * strainScale} %`, `+${100 * strainScale} %, longer in space than flat`, "linear-gradient(90deg,#2166ac,#f7f7f7,#b2182b)"];
       [lowEnd.textContent, highEnd.textContent, bar.style.background] = ends;
     }
