@@ -7,18 +7,21 @@ Without names all scenes are run; scenes with real meshes need `WARPFLAT_DATA`. 
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 import subprocess
 import sys
 from pathlib import Path
 
-from PIL import Image
+from PIL import Image, ImageDraw
 
 DOCS = Path(__file__).resolve().parent
 SCENES = DOCS.parent / "scenes"
 OUT = DOCS.parent / "out" / "gallery"
 PICTURE_WIDTH = 720  # as wide as a page's text
+# Of a line drawing [pixels], and by how much finer it is drawn before it is made small.
+DRAWING_HEIGHT, DRAWING_MARGIN, FINER = 190, 12, 4
 
 
 def read_comment(scene: Path) -> tuple[list[str], list[str]]:
@@ -40,7 +43,8 @@ def gallery_page() -> str:
     """Return the page: each scene with its words, its command and its picture."""
     blocks = [
         "# Gallery",
-        "Every scene of `scenes/`, with the command that made its picture. Colours are strain energy density [J/m2].\n"
+        "Every scene of `scenes/`, with the command that made its picture: of a garment its line drawing, how it lies on the body, and its "
+        "pieces. Colours are strain energy density [J/m2].\n"
         "`python docs/make_gallery.py` runs the commands and makes this page.",
     ]
     for path in scene_files():
@@ -67,8 +71,42 @@ def make_picture(scene: Path) -> None:
     with Image.open(folder / "picture.png") as picture:
         height = round(picture.height * PICTURE_WIDTH / picture.width)
         small = picture.convert("RGB").resize((PICTURE_WIDTH, height), Image.Resampling.LANCZOS)
+    drawing = line_drawing(folder / "pattern.json")
+    if drawing is not None:
+        whole = Image.new("RGB", (PICTURE_WIDTH, drawing.height + small.height), "white")
+        whole.paste(drawing, ((PICTURE_WIDTH - drawing.width) // 2, 0))
+        whole.paste(small, (0, drawing.height))
+        small = whole
     (DOCS / "gallery").mkdir(exist_ok=True)
     small.save(DOCS / "gallery" / f"{scene.stem}.webp", quality=70, method=6)
+
+
+def line_drawing(pattern: Path) -> Image.Image | None:
+    """Return the line drawing of a garment, front and back, as its pattern's first page has it; None of what is worn on no body."""
+    worn = json.loads(pattern.read_text(encoding="utf-8")).get("worn") if pattern.exists() else None
+    if not worn or not worn["measures"] or not any(worn["views"].values()):
+        return None
+    rings = {side: [ring for piece in row for ring in piece["outlines"]] for side, row in worn["views"].items()}
+    points = [point for row in rings.values() for ring in row for point in ring]
+    (left, low), (right, high) = (tuple(map(end, zip(*points, strict=True))) for end in (min, max))
+    scale = FINER * DRAWING_HEIGHT / (high - low)
+    wide = round(scale * (right - left)) + 2 * FINER * DRAWING_MARGIN
+    image = Image.new("RGB", (wide * len(rings), round(scale * (high - low)) + 2 * FINER * DRAWING_MARGIN), "white")
+    pen = ImageDraw.Draw(image)
+    for number, row in enumerate(worn["views"].values()):
+
+        def place(point: list[float], number: int = number) -> tuple[float, float]:
+            return (
+                number * wide + FINER * DRAWING_MARGIN + scale * (point[0] - left),
+                FINER * DRAWING_MARGIN + scale * (high - point[1]),
+            )
+
+        for piece in row:
+            for ring in piece["outlines"]:
+                pen.polygon([place(point) for point in ring], fill="white", outline=(40, 44, 52), width=FINER + 2)
+            for line in piece["lines"]:
+                pen.line([place(point) for point in line], fill=(40, 44, 52), width=FINER + 2, joint="curve")
+    return image.resize((image.width // FINER, image.height // FINER), Image.Resampling.LANCZOS)
 
 
 def main(names: list[str]) -> None:

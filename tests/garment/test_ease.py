@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import body_of_size
@@ -15,7 +17,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.fullness import FullEdge, give_fullness, measure_fullness
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.to_pattern import pattern_of_garment
-from warpflat.mannequin.forms import FormResult
+from warpflat.mannequin.forms import FormResult, PieceRecipe, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.membrane import Model
 from warpflat.pattern.draft import draft_garment
@@ -63,6 +65,40 @@ def test_a_wish_finds_all_stretches_of_its_seam_and_the_longer_side(shirt: FormR
     assert seam_ratios(shirt, [SeamWish(name="back armhole left", factor=1.04)]).ease == {
         "armhole left": pytest.approx(0.04)
     }
+
+
+def test_cap_below_a_yoke_has_fullness_where_it_reaches_its_upper_part(mannequin: Mannequin):
+    shirt = shipped_form("shirt")
+    pieces = {
+        **shirt.pieces,
+        "back": PieceRecipe(bricks=("chest-hip/back-*",), datum="centre back"),
+        "yoke": PieceRecipe(bricks=("shoulder-chest/back-*",), datum="centre back"),
+    }
+    form = mannequin.form(replace(shirt, pieces=pieces))
+    full = seam_ratios(form, cap_wishes(form, find_fabric("woven"))).full
+    assert {"sleeve_left", "sleeve_right"} <= set(full)
+    # A single vertex is no stretch of an edge.
+    assert all(len(edge.vertices) > 1 for edges in full.values() for edge in edges)
+
+
+def test_cap_in_two_parts_is_eased_beside_the_seam_over_the_arm(mannequin: Mannequin):
+    shirt = shipped_form("shirt")
+    pieces = {name: recipe for name, recipe in shirt.pieces.items() if not name.startswith("sleeve")}
+    pieces |= {
+        f"sleeve_{face}_{side}": PieceRecipe(bricks=(f"armhole-wrist/arm-{side}-{face}",), datum=f"overarm {side}")
+        for side in ("left", "right")
+        for face in ("front", "back")
+    }
+    form = mannequin.form(replace(shirt, pieces=pieces))
+    wished = seam_ratios(form, cap_wishes(form, find_fabric("woven")))
+    assert set(wished.eased) == {f"{face} armhole {side}" for side in ("left", "right") for face in ("front", "back")}
+    for name, edges in wished.full.items():
+        piece = form.pieces[name]
+        over = piece.edges[f"overarm {name.rpartition('_')[2]}"]
+        # The fullness reaches up to the seam over the arm, and begins well above the underarm.
+        assert all({int(over[0]), int(over[-1])} & set(edge.vertices.tolist()) for edge in edges), name
+    for first, last in wished.eased.values():
+        assert (first, last) in ((0.0, pytest.approx(0.6)), (pytest.approx(0.4), 1.0))
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,9 @@ def test_neckline_ease_flare_and_closure():
     assert tables["ease"] == {"bust": 7, "waist": 12, "abdomen": 13, "hip": 5, "knee": 20}
     assert tables["openings"] == [{"kind": "zip", "seam": "side left", "length_mm": 180}]
     assert [each["kind"] for each in tables_of("pencil_skirt", closure="none")["openings"]] == ["vent"]
+    assert tables_of("jumpsuit", closure="buttons-front")["openings"] == [
+        {"kind": "buttons", "seam": "crotch front", "length_mm": 560}
+    ]
     assert tables_of("tshirt", sleeve_width="9")["ease"]["biceps"] == 9
     # The neckline of the form that it is like stays where nothing is said.
     assert tables_of("tshirt", neck_depth="9")["form"]["neckline"]["side_cm"] == 2

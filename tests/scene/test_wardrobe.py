@@ -87,6 +87,7 @@ def test_unknown_names_are_told_with_the_nearest():
             "pencil_skirt",
             "pyjama_trousers",
         ),
+        *("polo", "chinos", "jeans", "waistcoat", "jacket"),
     ],
 )
 def test_shipped_scene_is_what_the_command_writes(name: str):

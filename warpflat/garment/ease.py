@@ -123,9 +123,12 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
                     share = np.array([place[vertex] for vertex in row.tolist()])
                     factors.append(_factors(share, wish.factor, part))
                     upper = row[(share >= part[0]) & (share <= part[1])]
-                    edges.append(FullEdge(vertices=upper, factor=_upper_factor(wish.factor, part), gathered=False))
+                    # What of an armhole lies in a lower piece, below a yoke, may hardly reach there.
+                    if len(upper) > 1:
+                        edges.append(FullEdge(vertices=upper, factor=_upper_factor(wish.factor, part), gathered=False))
                 edge_ratios[number] = tuple(each if side == 0 else 1.0 / each for each in factors)
-                full.setdefault(here.pieces[side], []).extend(edges)
+                if edges:
+                    full.setdefault(here.pieces[side], []).extend(edges)
                 continue
             full.setdefault(here.pieces[side], []).extend(
                 FullEdge(vertices=run.vertices[side], factor=wish.factor, gathered=wish.gathered) for run in here.runs

@@ -294,8 +294,9 @@ def _with_closure(tables: dict[str, Any], text: str, garment: str) -> dict[str, 
     if text != "none":
         opening: dict[str, Any] = {"kind": kind, "seam": _LINES[_body_part(form)][where]}
         neck = _has_neck(form)
-        # In front, and where a garment ends above the hip, it opens all along.
-        if not (neck and (where == "front" or _hem(form, "trunk") in ("waist", "abdomen", "hip"))) and kind == "zip":
+        # In front, and where a garment ends above the hip, it opens all along; not down to the crotch of a suit.
+        above = where == "front" or _hem(form, "trunk") in ("waist", "abdomen", "hip")
+        if _body_part(form) == "leg" or (kind == "zip" and not (neck and above)):
             opening["length_mm"] = _LONG_ZIP if neck and where != "side" else _SHORT_ZIP
         kept.append(opening)
         if kind == "zip" and "length_mm" not in opening and where != "side":
