@@ -101,12 +101,12 @@ def test_a_loose_sleeve_hangs_from_the_armhole_without_a_saddle() -> None:
     body = body_of_size(15.0)
     form, _ = _sleeve(body)
     garment = flatten_form(body, form, fabric="woven")
-    assert garment.pieces["sleeve_left"].measures["wear"]["outside"] < 0.004
-    # It is no wider at the biceps than asked for, but where it hangs.
+    assert garment.pieces["sleeve_left"].measures["wear"]["outside"] < 0.006
+    # It is as wide at the biceps as asked for.
     layout = body.layout
     row = layout.arms["left"][layout.arm_row["biceps"]]
     ease = polyline_length(form.vertices[row], closed=True) - polyline_length(body.vertices[row], closed=True)
-    assert 0.08 <= ease < 0.087
+    assert ease == pytest.approx(0.08, abs=0.001)
     # The underarm runs straight from the armhole to the biceps.
     line = form.vertices[layout.arms["left"][: layout.arm_row["biceps"] + 1, 0]]
     chord = np.linalg.norm(line[-1] - line[0])

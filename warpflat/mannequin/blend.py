@@ -460,7 +460,7 @@ def _hang(out: FloatArray, layout: Layout, grid: IntArray, near: FloatArray | No
             hung[:, column, axis] = np.interp(arc[:, column], arc[touch, column], rows[touch, column, axis])
     share = (arc / arc[-1])[..., None]
     weight = 1.0 if near is None else (near * near * (3.0 - 2.0 * near))[:, None]
-    out[grid[1:-1]] += (weight * (1.0 - share**4) * (hung - rows))[1:-1]
+    out[grid[1:-1]] += (weight * (1.0 - share * share) * (hung - rows))[1:-1]
 
 
 def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float) -> FloatArray:
