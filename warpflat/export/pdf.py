@@ -157,11 +157,14 @@ def _pages(
         tiling, drawings: of the pieces (see :func:`draw_sheet`).
         guide: whether the legend and the guide come first.
     """
+    from reportlab import rl_config
     from reportlab.pdfbase import pdfmetrics
     from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
     kind, stream, chosen = tiling.paper, BytesIO(), tuple(whole.pieces)
+    # Streams in bytes: as text they are a quarter longer, and take as long to write as all strokes.
+    rl_config.useA85 = 0
     canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
     for name in (FONT, BOLD):
         pdfmetrics.registerFont(embedded_font(name))

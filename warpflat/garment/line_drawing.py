@@ -42,11 +42,12 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
     """
     garment = garments[sample]
     pieces, half = list(garment.pieces.values()), garment.form is not None and garment.form.half
+    # What hangs nearer to the viewer hides what lies behind it: the inside of a back shows above the neck of a front.
+    depth = np.array([flat.surface.vertices[:, 2].mean() for flat in pieces])
+    drawn = [_views(flat, half=half) for flat in pieces]
     views = {}
-    for name, sign in (("front", 1.0), ("back", -1.0)):
-        # What hangs nearer to the viewer hides what lies behind it: the inside of a back shows above the neck of a front.
-        ordered = sorted(pieces, key=lambda flat: sign * float(flat.surface.vertices[:, 2].mean()))
-        seen = [_view(flat, sign, half=half) for flat in ordered]
+    for index, (name, sign) in enumerate((("front", 1.0), ("back", -1.0))):
+        seen = [drawn[k][index] for k in np.argsort(sign * depth, kind="stable")]
         details = [] if garment.form is None else [*_bands(garment, sign), *_openings(garment, sign)]
         views[name] = tuple(piece for piece in (*seen, *details) if piece.outlines or piece.lines)
     measures = {}
@@ -124,38 +125,41 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
             yield ViewedPiece(outlines=(), lines=tuple(lines))
 
 
-def _view(flat: Flattening, sign: float, *, half: bool) -> ViewedPiece:
-    """Return a piece as it is seen from the front (1) or the back (-1); of a half garment with its mirror image."""
+def _views(flat: Flattening, *, half: bool) -> tuple[ViewedPiece, ViewedPiece]:
+    """Return a piece as it is seen from the front and from the back; of a half garment with its mirror image."""
     import shapely
 
     faces, space = flat.faces, flat.surface.vertices[flat.vertex_origin]
-    seen = space[:, :2] * [sign, 1.0]
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    mirrored = [seen, seen * [-1.0, 1.0]] if half else [seen]
+    mirrored = [space[:, :2], space[:, :2] * [-1.0, 1.0]] if half else [space[:, :2]]
     shown = np.concatenate([points[triangles] for points in mirrored])
+    # What it covers from the back is the mirror image of what it covers from the front.
     covered = shapely.union_all(shapely.polygons(shown), grid_size=1e-6).simplify(_WITHIN)
     parts = [part for part in shapely.get_parts(covered) if part.geom_type == "Polygon" and part.area > _LEAST_AREA]
+    outlines = [np.asarray(part.exterior.coords)[:-1] for part in parts]
     corners = space[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = sign * normals[:, 2] / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
-    near = {
-        (int(a), int(b)): bool(cosine > _NEAR_SIDE)
-        for triangle, cosine in zip(triangles, facing, strict=True)
-        for a, b in zip(triangle, np.roll(triangle, -1), strict=True)
-    }
-    if half:
-        # The fold is no line of the garment.
-        near = {pair: side and bool(np.abs(seen[list(pair), 0]).max() > _WITHIN) for pair, side in near.items()}
-    lines = []
-    for loop in border_loops(faces):
-        ends = list(zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True))
-        # Begun where the line turns to the far side, so that no visible stretch is split.
-        start = next((k for k, pair in enumerate(ends) if not near.get(pair, True)), 0)
-        for visible, stretch in groupby([*ends[start:], *ends[:start]], key=lambda pair: near.get(pair, True)):
-            if visible:
-                pairs = list(stretch)
-                ids = [pairs[0][0], *(pair[1] for pair in pairs)]
-                lines += [np.asarray(shapely.LineString(points[ids]).simplify(_WITHIN).coords) for points in mirrored]
-    return ViewedPiece(
-        outlines=tuple(np.asarray(part.exterior.coords)[:-1] for part in parts), lines=tuple(lines)
-    )  # fmt: skip
+    forward = np.repeat(normals[:, 2] / np.maximum(np.linalg.norm(normals, axis=1), 1e-30), 3)
+    sides = list(zip(triangles.ravel().tolist(), np.roll(triangles, -1, axis=1).ravel().tolist(), strict=True))
+    views = []
+    for sign in (1.0, -1.0):
+        near = dict(zip(sides, (sign * forward > _NEAR_SIDE).tolist(), strict=True))
+        lines = []
+        for loop in border_loops(faces):
+            ends = list(zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True))
+            # The fold of a half is no line of the garment.
+            shows = [
+                near.get(pair, True) and not (half and float(np.abs(space[list(pair), 0]).max()) <= _WITHIN)
+                for pair in ends
+            ]
+            # Begun where the line turns to the far side, so that no visible stretch is split.
+            start = next((k for k, show in enumerate(shows) if not show), 0)
+            around = [*zip(ends, shows, strict=True)]
+            for visible, stretch in groupby([*around[start:], *around[:start]], key=lambda each: each[1]):
+                if visible:
+                    pairs = [pair for pair, _ in stretch]
+                    ids = [pairs[0][0], *(pair[1] for pair in pairs)]
+                    drawn = (shapely.LineString(points[ids] * [sign, 1.0]) for points in mirrored)
+                    lines += [np.asarray(line.simplify(_WITHIN).coords) for line in drawn]
+        views.append(ViewedPiece(outlines=tuple(outline * [sign, 1.0] for outline in outlines), lines=tuple(lines)))
+    return views[0], views[1]
