@@ -69,13 +69,13 @@ def test_a_bag_becomes_panels_that_lie_flat() -> None:
         assert flat.fit.outside < 0.04
 
 
-def dented() -> Surface:
+def dented(depth: float = 0.08) -> Surface:
     """A skirt with a bump at either side of its back: a seat."""
     plain = solids.skirt(20, 56)
     vertices = plain.vertices.copy()
     for x in (0.1, -0.1):
         off = vertices - [x, 0.42, -0.12]
-        vertices += 0.08 * np.exp(-(off**2).sum(axis=1) / 0.06**2)[:, None] * [0.0, 0.0, -1.0]
+        vertices += depth * np.exp(-(off**2).sum(axis=1) / 0.06**2)[:, None] * [0.0, 0.0, -1.0]
     return warpflat.make_surface(vertices, plain.faces, name="skirt")
 
 
@@ -100,6 +100,15 @@ def test_darts_are_mirrored_and_release_what_they_say() -> None:
         surface, warpflat.SeamOptions(no=("dart", "yoke", "waist", "centre back", "princess", "panel")), fabric="woven"
     )
     assert {seam.name for seam in none.seams} == {seam.name for seam in plain.seams}
+
+
+def test_who_asks_for_less_beyond_the_limit_gets_darts_that_bring_less() -> None:
+    surface = dented(0.03)
+    names = [
+        {seam.name for seam in warpflat.find_seams(surface, warpflat.SeamOptions(limit=limit), fabric="woven").seams}
+        for limit in (0.02, 0.0005)
+    ]
+    assert names == [{"side left", "side right"}, {"side left", "side right", "dart left", "dart right"}]
 
 
 def write(surface: Surface, path: Path) -> Path:

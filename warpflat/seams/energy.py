@@ -185,7 +185,7 @@ def cut_by_energy(
             ),
             None,
         )
-        if worst is None and not parting and beyond > _PARTED * total:
+        if worst is None and not parting and beyond > min(_PARTED, options.limit) * total:
             # Darts alone do not do.
             parting = True
             exhausted.clear()
@@ -200,7 +200,9 @@ def cut_by_energy(
         twin, now = _twin(worst, pieces, anatomy), len(pieces)
         good = list[tuple[float, _Candidate, Cloth, list[_Measured]]]()
         cloth = _remembered(cloth, pieces)
-        least = max(_WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
+        # Who asks for less beyond the limit than is usual takes what brings less.
+        wished = min(options.limit / SeamOptions.limit, 1.0)
+        least = max(wished * _WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
         number = next(k for k, piece in enumerate(pieces) if piece is worst)
         candidates = [
             candidate
