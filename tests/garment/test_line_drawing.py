@@ -11,7 +11,7 @@ from bodies import body_of_size
 from warpflat.garment.finishing import Finishing
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.line_drawing import describe_worn
-from warpflat.garment.openings import Opening, part_at_centres
+from warpflat.garment.openings import Buttons, Opening, part_at_centres
 from warpflat.mannequin.forms import shipped_form
 
 
@@ -37,6 +37,17 @@ def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_si
         assert (sign * middles[:, 0] > 0.05).all()
         assert 0.15 < float(np.ptp(middles[:, 1])) < 0.21
         assert zipped.outlines == ()
+
+
+def test_every_button_is_drawn_in_front():
+    opening = Opening(kind="buttons", line="centre front", length=0.4, buttons=Buttons(count=5))
+    views = describe_worn({"": skirt(opening, half=False)}, "").views
+    (buttons,) = [piece for piece in views["front"] if not piece.outlines]
+    heights = [float(circle[:, 1].mean()) for circle in buttons.lines]
+    assert len(heights) == 5
+    assert heights == sorted(heights, reverse=True)
+    assert all(float(np.ptp(circle[:, 0])) == pytest.approx(0.018) for circle in buttons.lines)
+    assert all(piece.outlines for piece in views["back"])
 
 
 def test_a_zip_at_the_centre_back_is_not_seen_from_the_front():

@@ -12,8 +12,9 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import without_side
 from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.garment.button_stand import button_depths
 from warpflat.garment.girths import pattern_girths
-from warpflat.garment.openings import place_opening
+from warpflat.garment.openings import Buttons, place_opening
 from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES
 from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.surface.connectivity import border_loops
@@ -29,8 +30,10 @@ __all__ = ["describe_worn"]
 _WITHIN, _LEAST_AREA = 0.001, 1e-5
 # A face whose normal points away from the viewer by more than this cosine is on the far side.
 _NEAR_SIDE, _EDGE_ON = -0.1, -0.6
-# Teeth of a zip are drawn so far apart [m].
+# Teeth of a zip are drawn so far apart; the bar at its end, and a circle of radius 1 [m].
 _TOOTH = 0.009
+_BAR = np.array([[-0.009, 0.0], [0.009, 0.0]])
+_CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos, np.sin)])
 
 
 def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
@@ -102,10 +105,12 @@ def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
 
 
 def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
-    """Yield zips, as a line with teeth and a bar at its lower end, and the upper end of slits and vents, as a bar."""
+    """Yield zips, as teeth and a bar at the lower end, the upper end of slits and vents, as a bar, and buttons."""
     assert garment.form is not None
+    assert garment.mannequin is not None
+    bust = garment.mannequin.layout.lines["bust"]
     for opening in garment.openings:
-        if opening.kind not in ("zip", "slit", "vent"):
+        if opening.kind == "keyhole":
             continue
         parts = place_opening(garment.form, opening, garment.positions)
         end = min(opening.start + opening.length, sum(part.whole for part in parts))
@@ -116,11 +121,18 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
             # A side seam is the outline of both views.
             if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
                 continue
-            teeth = np.arange(opening.start, end, _TOOTH) if opening.kind == "zip" else np.array([])
-            for at, half in (*((tooth, _TOOTH / 3) for tooth in teeth.tolist()), (end, _TOOTH)):
+            # Where something lies, and its shape about there.
+            shapes = [(end, _BAR)]
+            if opening.kind == "zip":
+                shapes += [(float(tooth), _BAR / 3) for tooth in np.arange(opening.start, end, _TOOTH)]
+            if opening.kind == "buttons":
+                wanted, grid = opening.buttons or Buttons(), garment.form.pieces[part.piece].grid_vertices
+                at_bust = arc[np.isin(grid[part.vertices], bust)]
+                depths = button_depths(wanted, end, float(at_bust[0]) if len(at_bust) else None)
+                shapes = [(depth, 0.5 * wanted.diameter * _CIRCLE) for depth in depths.tolist()]
+            for at, shape in shapes:
                 if arc[0] <= at <= arc[-1]:
-                    x, y = (float(np.interp(at, arc, seen[:, axis])) for axis in (0, 1))
-                    lines.append(np.array([[x - half, y], [x + half, y]]))
+                    lines.append(shape + [np.interp(at, arc, seen[:, axis]) for axis in (0, 1)])
         if lines:
             yield ViewedPiece(outlines=(), lines=tuple(lines))
 

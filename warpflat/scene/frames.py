@@ -355,7 +355,9 @@ class Film:
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
                 for name, piece in self.worn.items():
-                    # Worn values are of the pattern's faces, which are those of the surface in its order.
+                    # Worn values are of the pattern's faces, which are those of the filmed surface in its order.
+                    if len(piece.faces) != len(self._surfaces[name].faces):
+                        continue
                     writer.write_map(name, "pressure", piece.fit.pressure, unit="Pa", state="worn")
                     if self._mannequin is not None:
                         gaps = corner_mean(body.gaps(piece.surface.vertices), piece.surface.faces)
