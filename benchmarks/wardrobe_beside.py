@@ -5,6 +5,11 @@
 FreeSewing's public designs `teagan` (T-shirt), `simon` (shirt) and `charlie` (trousers) 4.10.2 (MIT licence) drafted the others for the
 measurements of the package's own bodies, and for the ease of its garments where a design asks for that (`draft_wardrobe.mjs`;
 `--inputs` prints what it is given). They are drafts for men; of women they have no bust. All lengths are of the whole garment [mm].
+
+Differences of more than 15 mm in men 50 (`*`), as far as they are understood. Sleeves have 60 and 80 mm of ease at the biceps here,
+15 % of it there, 47 mm; with them go longer armholes. A woven cap has 5.5 % more than its armhole here, none there. A cuff is 85 % of
+a wrist with 70 mm of ease, and its overlap of 25 mm. Trousers end at the ankle here, at the floor there; they taper down to the hem
+here, from the knee on they are straight there. Not understood: the chest of the T-shirt, and the rest of the trousers' lengths.
 """
 
 from __future__ import annotations

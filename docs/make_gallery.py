@@ -89,7 +89,8 @@ def line_drawing(pattern: Path) -> Image.Image | None:
     rings = {side: [ring for piece in row for ring in piece["outlines"]] for side, row in worn["views"].items()}
     points = [point for row in rings.values() for ring in row for point in ring]
     (left, low), (right, high) = (tuple(map(end, zip(*points, strict=True))) for end in (min, max))
-    scale = FINER * DRAWING_HEIGHT / (high - low)
+    room = PICTURE_WIDTH / len(rings) - 2 * DRAWING_MARGIN
+    scale = FINER * min(DRAWING_HEIGHT / (high - low), room / (right - left))
     wide = round(scale * (right - left)) + 2 * FINER * DRAWING_MARGIN
     image = Image.new("RGB", (wide * len(rings), round(scale * (high - low)) + 2 * FINER * DRAWING_MARGIN), "white")
     pen = ImageDraw.Draw(image)

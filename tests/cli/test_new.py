@@ -85,10 +85,11 @@ def test_style_edits_are_listed_and_written(capsys: pytest.CaptureFixture[str], 
     assert "--length (" in out
     assert "--sleeve-length" not in out
     file = tmp_path / "dress.toml"
-    code, _, _ = run(capsys, "shift_dress", "--size", "EU 38", "--length", "ankle+3", "--ease-bust=9", "-o", str(file))
+    style = ["--length", "ankle+3", "--ease-bust=9", "--flare", "-4"]
+    code, _, _ = run(capsys, "shift_dress", "--size", "EU 38", *style, "-o", str(file))
     assert code == 0
     scene = load_scene(file)
-    assert scene.settings.ease["bust"] == 9
+    assert (scene.settings.ease["bust"], scene.settings.ease["ankle"]) == (9, -4)
     assert scene.settings.form["profiles"]["ankle"]["raise_cm"] == -3
 
 

@@ -87,7 +87,8 @@ def test_unknown_names_are_told_with_the_nearest():
             "pencil_skirt",
             "pyjama_trousers",
         ),
-        *("polo", "chinos", "jeans", "waistcoat", "jacket"),
+        *("polo", "chinos", "jeans", "waistcoat", "jacket", "leggings", "jumpsuit", "pleated_skirt"),
+        *("apron", "tote", "sun_hat"),
     ],
 )
 def test_shipped_scene_is_what_the_command_writes(name: str):

@@ -174,7 +174,8 @@ def _read_choices(words: tuple[str, ...]) -> tuple[str | None, dict[str, str]]:
             continue
         choice, equals, option = word.lstrip("-").partition("=")
         if not equals:
-            if not rest or rest[0].startswith("-"):
+            # A number may be negative.
+            if not rest or (rest[0].startswith("-") and not rest[0][1:2].isdigit()):
                 raise InputError(f"{word} needs an option, as --collar stand; warpflat new GARMENT lists them")
             option = rest.pop(0)
         if choice in chosen:
