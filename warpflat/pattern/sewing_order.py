@@ -162,7 +162,7 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
                 ease=seam.ease,
                 stretched=pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece].role == "strip",
                 stage=_stage(seam, pieces),
-                count=2 if sideless else 1,
+                count=max(len(group), 2 if sideless else 1),
                 openings=seam.openings,
                 places=tuple(places),
             )
