@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_turn
-from scans import needs_bodies, scan, scanned_body
+from scans import needs_bodies, scan, scanned_body, stood
 
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import flatten_form
@@ -15,7 +15,6 @@ from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.outside import BodySurface, push_outside
 from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
-from warpflat.mannequin.stand_body import stand_body
 
 BODIES = ["child", pytest.param("scan child", marks=needs_bodies)]
 
@@ -59,7 +58,7 @@ def test_armholes_have_no_horns_and_sleeves_can_be_sewn(name: str) -> None:
 @pytest.mark.parametrize("name", ["female", "male_heavy"])
 def test_scanned_armholes_end_below_the_armpit(name: str) -> None:
     slicer, _ = turn_scan_upright(*scan(name), ScanOptions())
-    laid = stand_body(slicer.vertices, slicer.triangles, slicer.scanned)
+    laid = stood(slicer.vertices, slicer.triangles, slicer.scanned)
     armpits = {side: laid.vertices[vertex] for side, vertex in laid.armpits.items()}
     body = scanned_body(name)
     for side in ("left", "right"):

@@ -123,8 +123,6 @@ def changed(points: np.ndarray, kind: str) -> np.ndarray:
         ahead = (v[:, 2] > middle) & trunk
         v[ahead, 2] = middle + (v[ahead, 2] - middle) * (1 + np.exp(-0.5 * ((y[ahead] - 0.6) / 0.07) ** 2))
         v[trunk, 0] *= 1 + 0.3 * np.exp(-0.5 * ((y[trunk] - 0.6) / 0.08) ** 2)
-    elif kind == "broad":
-        v *= [1.2, 1.0, 1.3]
     elif kind == "slim":
         v *= [0.88, 1.0, 0.85]
     elif kind == "stooped":
@@ -147,7 +145,7 @@ def noisy_body(sex: str) -> Mannequin:
     return on_scan(100.0 * noisy @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]), faces)
 
 
-OTHERS = {"female": ("broad", "stooped"), "male": ("belly", "slim", "tall")}
+OTHERS = {"female": ("stooped",), "male": ("belly", "slim", "tall")}
 
 
 @needs_bodies

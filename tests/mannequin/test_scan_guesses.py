@@ -22,10 +22,9 @@ def _between(points: np.ndarray, faces: np.ndarray, low: float, high: float) -> 
 
 
 @needs_bodies
-@pytest.mark.parametrize(("name", "high"), [("female", 0.86), ("male", 0.89)])
-def test_a_body_without_its_head_is_refused(name: str, high: float) -> None:
+def test_a_body_without_its_head_is_refused() -> None:
     with pytest.raises(InputError, match="the head is missing"):
-        Mannequin.from_scan(*_between(*scan(name), 0.0, high), resolution_mm=25.0)
+        Mannequin.from_scan(*_between(*scan("male"), 0.0, 0.89), resolution_mm=25.0)
 
 
 @needs_bodies
