@@ -87,7 +87,7 @@ def test_unknown_names_are_told_with_the_nearest():
             "pencil_skirt",
             "pyjama_trousers",
         ),
-        *("polo", "chinos", "jeans", "waistcoat", "jacket", "leggings", "jumpsuit", "pleated_skirt"),
+        *("polo", "chinos", "jeans", "waistcoat", "jacket", "leggings", "unitard", "jumpsuit", "pleated_skirt"),
         *("apron", "tote", "sun_hat"),
     ],
 )
