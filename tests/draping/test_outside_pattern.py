@@ -381,3 +381,30 @@ def test_a_pattern_from_outside_is_let_out_where_it_is_stretched_too_far():
         for e in ("e2", "e4")
     )
     assert left == pytest.approx(right, abs=0.01)
+
+
+def test_a_drawing_of_freesewing_is_read_by_its_sewing_lines(tmp_path: Path) -> None:
+    drawing = tmp_path / "aaron.svg"
+    drawing.write_text(
+        """<svg xmlns="http://www.w3.org/2000/svg" width="452mm" height="330mm" viewBox="0 0 452 330">
+        <defs><marker id="grainlineTo"><path class="note fill-note" d="M 0,4 L 12,8 L 12,0 z"/></marker></defs>
+        <g id="fs-container">
+        <g id="fs-stack-aaron.front" transform="translate(12,12)"><g id="fs-stack-aaron.front-part-aaron.front">
+        <path d="M 0,0 L 200,0 L 180,300 L 0,300 z" class="fabric"/>
+        <path d="M -10,-10 L 210,-10 L 190,310 L -10,310 z" class="fabric sa"/>
+        <path d="M 100,40 L 100,260" class="note" marker-end="url(#grainlineTo)"/>
+        <path d="M 40,100 L 90,100 L 90,150 L 40,150 z" class="various"/></g></g>
+        <g id="fs-stack-aaron.back" transform="translate(240,12)"><g id="fs-stack-aaron.back-part-aaron.back">
+        <path d="M 0,0 L 180,0 L 180,300 L 0,300 z" class="fabric"/>
+        <path d="M -10,-10 L 190,-10 L 190,310 L -10,310 z" class="fabric sa"/></g></g>
+        </g></svg>"""
+    )
+    front, back = read_svg(drawing).pieces[""]
+    assert (front.name, back.name) == ("front", "back")
+    assert [1e3 * edge.length for edge in back.edges] == pytest.approx([180.0, 300.0, 180.0, 300.0])
+    assert front.grain is not None
+    assert back.grain is None
+    np.testing.assert_allclose(front.grain, [[0.112, -0.052], [0.112, -0.272]])
+    drawing.write_text(drawing.read_text().replace("L 180,300 L 0,300 z", "L 180,300 L 0,300 L 0,10"))
+    with pytest.raises(InputError, match=r"open by 10\.0 mm"):
+        read_svg(drawing)

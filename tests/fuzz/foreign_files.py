@@ -113,6 +113,12 @@ _GARMENTCODE = {
     "properties": {"curvature_coords": "relative", "units_in_meter": 100, "normalize_panel_translation": False},
 }
 _RUL = b"ASTM/D13Proposal 1 Version: D 6673-04\nUNITS: METRIC\nGRADE RULE TABLE: a\nSIZE LIST: 36 38\nRULE: DELTA 1\n0.0,0.0 1.0,2.0\nEND\n"
+_FREESEWING = b"""<svg xmlns="http://www.w3.org/2000/svg" width="452mm" height="330mm" viewBox="0 0 452 330"><g id="fs-container">
+<g id="fs-stack-aaron.front" transform="translate(12,12)"><g id="fs-stack-aaron.front-part-aaron.front">
+<path d="M 0,0 L 200,0 C 200,100 190,200 180,300 L 0,300 z" class="fabric"/>
+<path d="M -10,-10 L 210,-10 L 190,310 L -10,310 z" class="fabric sa"/>
+<path d="M 100,40 L 100,260" class="note" marker-end="url(#grainlineTo)"/></g></g></g></svg>
+"""
 _SVG = b"""<?xml version="1.0"?>
 <!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "svg11.dtd" [<!ENTITY ns "http://www.w3.org/2000/svg">]>
 <svg xmlns="http://www.w3.org/2000/svg" width="400mm" height="300mm" viewBox="0 0 400 300">
@@ -193,7 +199,7 @@ def _seeds(kind: str) -> tuple[bytes, ...]:
     if kind in _MEMBERS:
         return (run_folder()[_MEMBERS[kind]],)
     if kind in ("dxf", "svg"):
-        return run_folder()[f"bodice.{kind}"], _dxf() if kind == "dxf" else _SVG, _dxf() if kind == "dxf" else _SVG
+        return run_folder()[f"bodice.{kind}"], *((_dxf(), _dxf()) if kind == "dxf" else (_SVG, _FREESEWING))
     return {"sewing": (_SEWING.encode(),), "garmentcode": (json.dumps(_GARMENTCODE).encode(),), "rul": (_RUL,)}[kind]
 
 

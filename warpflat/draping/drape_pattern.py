@@ -33,7 +33,7 @@ __all__ = ["Placement", "drape_pattern", "place_pieces"]
 # The largest piece of a garment is between so short and so long [m].
 _SIZES = (0.05, 10.0)
 # A designed surface does not belong to a body where more than this share of it lies so deep [m] within.
-_WITHIN, _DEEP = 0.02, 0.01
+_WITHIN, _DEEP = 0.05, 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,20 +112,26 @@ def drape_pattern(
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
     surface = None if body is None else body.surface()
     solid = None if surface is None else Body(surface.vertices, surface.faces, device=where)
-    # On another body than that of its designed surface a garment starts as one that has none.
+    # On another body than that of its designed surface a garment starts as one that has none, if it can.
     placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
     lifted = len(placed) == len(meshes)
+    deep = 0.0
     if lifted and solid is not None:
         deep = float((solid.gaps(np.concatenate(list(placed.values()))) < -_DEEP).mean())
-        if deep > _WITHIN:
-            lifted = False
-            notes.append(
-                f"{100 * deep:.0f} % of the designed surface lies in this body: the pieces are placed by their seams"
-            )
     if not lifted and body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
-    if not lifted and body is not None:
-        placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
+    if body is not None and (not lifted or deep > _WITHIN):
+        try:
+            placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
+        except InputError:
+            if not lifted:
+                raise
+        else:
+            if lifted:
+                notes.append(
+                    f"{100 * deep:.0f} % of the designed surface lies in this body: the pieces are placed by their seams"
+                )
+            lifted = False
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
-from warpflat.core.text import quote_value
+from warpflat.core.text import find_unused_name, quote_value
 from warpflat.export.read_dxf import MOST_POINTS, check_closed, outermost, read_quantity
 from warpflat.pattern.curves import as_cubic, cubic_weights
 from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
@@ -34,18 +34,22 @@ _KINDS = {"sew": "seam", "hem": "hem", "fold": "fold", "dart": "dart"}
 # Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
 _DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
 _TOO_MANY = f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern"
+# How FreeSewing calls the group of a piece, and the classes of its outlines.
+_STACK, _CLOTHS = "fs-stack-", {"fabric", "lining", "interfacing", "canvas", "contrast"}
 _LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 
 
 def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) -> Pattern:
     """Read the pieces of a drawing in true size; the seams too, where the file names them as the package does.
 
+    Of FreeSewing's drawings each stack is a piece of its name, by its sewing line, with its grain.
+
     In other files every closed path that lies in no other is a piece, called by its label or id. Its size is that of `width` and
     `viewBox`; a file without units has 96 units an inch.
 
     Args:
         path: of the file.
-        allowance: from the cutting line to the sewing line [m], of other files; none if not given.
+        allowance: from the cutting line to the sewing line [m], of other files; none if not given. FreeSewing's have a sewing line.
 
     Raises:
         InputError: the file cannot be read, has no piece, or an outline does not close.
@@ -105,6 +109,8 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
                 )
             )
         if not pieces:
+            pieces = _freesewing_pieces(root, page, str(path))
+        if not pieces:
             # A drawing of another program: every closed path that lies in no other one is a piece.
             found: dict[int, tuple[FloatArray, str]] = {}
             unclosed = list[FloatArray]()
@@ -133,6 +139,32 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         for piece in pieces:
             sizes.setdefault(piece.size, []).append(piece)
         return Pattern(name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])))
+
+
+def _freesewing_pieces(root: ET.Element, page: FloatArray, where: str) -> list[Piece]:
+    """Return the pieces of a drawing of FreeSewing, whose paths have the cloth as their class, "sa" along the seam allowance."""
+    pieces, taken = list[Piece](), set[str]()
+    for stack, matrix in _walk(root, page):
+        title = stack.get("id", "")
+        if not title.startswith(_STACK) or "-part-" in title:
+            continue
+        rings, unclosed, grain = list[FloatArray](), list[FloatArray](), None
+        for child in stack:
+            for element, placed in _walk(child, matrix):
+                kinds = element.get("class", "").split()
+                for points, closed in _lines(element, placed):
+                    if "sa" not in kinds and not _CLOTHS.isdisjoint(kinds):
+                        (rings if closed else unclosed).append(points)
+                    elif "grainline" in element.get("marker-start", "") + element.get("marker-end", ""):
+                        grain = points[[0, -1]]
+        check_closed(unclosed, rings, 1.0, where)
+        # A stack is called after its design and its part, "aaron.front".
+        own = title.removeprefix(_STACK).rpartition(".")[2] or "piece"
+        for ring in outermost(rings) if rings else []:
+            name = find_unused_name(own, taken)
+            taken.add(name)
+            pieces.append(Piece(name=name, edges=split_outline(ring), grain=grain))
+    return pieces
 
 
 def _parse(path: Path) -> ET.Element:
