@@ -94,6 +94,8 @@ class Chromium:
         """Choose a value of the list with this label."""
         box = _BOX % json.dumps(label)
         self.wait(f"!!{box}")
+        # The list of a box that is scrolled out of sight is hidden.
+        self.run(f"{box}.scrollIntoView({{block: 'center'}})")
         self.run(f"{box}.click()")
         self.wait(_VISIBLE % ("[role=option]", json.dumps(value)) + " != null")
         self.run(_VISIBLE % ("[role=option]", json.dumps(value)) + ".click()")

@@ -205,3 +205,32 @@ def shows_the_scale(browser, page, client) -> bool:
     seen = right[np.abs(right - 255.0).max(axis=1) > 3.0]
     near = np.abs(seen[:, None] - expected).max(axis=2).min(axis=1) < 6.0
     return bool(near.mean() > 0.7)
+
+
+def test_marks_vanish_with_undo_and_the_view_follows_the_size(tmp_path: Path) -> None:
+    from warpflat.studio.page import Page
+
+    settings = {
+        "mannequin": {"size": "EU 38", "resolution_mm": 30.0}, "form": "skirt", "fabric": "woven", "curves_mm": 0.0,
+        "output": {"frames": 0, "picture": False}, "pattern": {"formats": []},
+    }  # fmt: skip
+    page = Page(
+        make_scene(settings, name="trial", folder=tmp_path, where="trial"), host="127.0.0.1", port=0, out=tmp_path
+    )
+    try:
+        wait_for(lambda: page.is_idle and page._shown_size.any())
+        before = page._shown_size
+        page.session.change_body("EU 46")
+        wait_for(lambda: page.is_idle and (page._shown_size != before).any())
+        np.testing.assert_allclose(page._shown_size, page.stage.size)
+        assert page._shown_size[0] > before[0]
+        page._choose_line(("front", "princess front left"))
+        wait_for(lambda: page.session.preview is not None and page._picked is not None, 20.0)
+        page._go(page.session.undo)  # the cut that was only tried
+        wait_for(lambda: page.is_idle and page.session.preview is None)
+        assert page._picked is None
+        assert page.session.can_undo == "size"
+        # A measure is bounded in the unit that is shown.
+        assert page._panel._measures["waist"].min > 10.0
+    finally:
+        page.close()

@@ -68,8 +68,6 @@ class Panel:
         buttons.on_click(lambda event: self._actions.view(event.client, sides[event.target.value]))
         acts = {"Undo": actions.undo, "Redo": actions.redo, "Stop": session.stop, "Watch": self._watch}
         _buttons(self._gui.add_button_group("do", tuple(acts)), acts)
-        theme = self._gui.add_dropdown("page", ("light", "dark"))
-        _chosen(theme, lambda value: self._actions.theme(value == "dark"))
         with self._gui.add_folder("Map"):
             self._kind = self._gui.add_dropdown("colours", tuple(MAPS.values()))
             self._legend = self._gui.add_html("")
@@ -130,6 +128,8 @@ class Panel:
         with self._gui.add_folder("Save"):
             self._name = self._gui.add_text("name", name)
             save = self._gui.add_button("Save and run", icon="device-floppy")
+        theme = self._gui.add_dropdown("page", ("light", "dark"))
+        _chosen(theme, lambda value: self._actions.theme(value == "dark"))
 
         @save.on_click
         def _(_: Any) -> None:
