@@ -109,6 +109,30 @@ def test_no_label_of_a_nest_is_cut_at_the_edge_of_a_sheet(nest: Path, dress: Dra
             assert shapely.distance(shapely.box(*place, *(place + np.array([0.012, 0.0065]))), lines).min() > 0.0
 
 
+def test_a_sheet_without_a_clear_place_has_its_name_where_most_room_is(
+    dress: DraftedGarment, monkeypatch: pytest.MonkeyPatch
+):
+    tiling, drawings = draw_sheet(halved(dress), "A4")
+    lines = shapely.union_all(
+        [
+            shapely.LineString(placed.on_sheet(stroke.points))
+            for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True)
+            for drawing in sizes
+            for stroke in drawing.strokes
+            if not stroke.hidden
+        ]
+    )
+
+    def room(place: np.ndarray) -> float:
+        return float(shapely.distance(shapely.box(*place, *(place + np.array([0.012, 0.0065]))), lines))
+
+    clear = {tile: room(place) for tile, place in sheet_names(tiling, drawings).items()}
+    monkeypatch.setattr("warpflat.export.pdf.NAME_CLEAR", 10.0)
+    most = {tile: room(place) for tile, place in sheet_names(tiling, drawings).items()}
+    assert all(most[tile] > 0.9 * clear[tile] for tile in clear)
+    assert sum(most.values()) > 1.5 * sum(clear.values())
+
+
 def test_the_scene_sets_allowances(nest: Path):
     pieces = json.loads((nest / "pattern.json").read_text())["sizes"]["EU 38"]
     widths = {(name, e["name"]): e["allowance"] for name, piece in pieces.items() for e in piece["edges"]}
