@@ -35,11 +35,11 @@ def scan(name: str) -> tuple[np.ndarray, np.ndarray]:
 _stood: dict[object, StandingBody] = {}
 
 
-def stood(vertices: np.ndarray, triangles: np.ndarray, scanned: int, *, faces_ahead: bool = False) -> StandingBody:
+def stood(vertices: np.ndarray, triangles: np.ndarray, scanned: int, **asked: bool) -> StandingBody:
     """The body that is fitted to a scan: one fit for all that asks other things of the same scan; in place of `stand_body`."""
-    key = (vertices.tobytes(), triangles.tobytes(), scanned, faces_ahead)
+    key = (vertices.tobytes(), triangles.tobytes(), scanned, tuple(sorted(asked.items())))
     if key not in _stood:
-        _stood[key] = stand_body(vertices, triangles, scanned, faces_ahead=faces_ahead)
+        _stood[key] = stand_body(vertices, triangles, scanned, **asked)
     return _stood[key]
 
 

@@ -115,6 +115,8 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
     Returns:
         The tiling, and what is drawn of each `Placed` of its sheet, in the coordinates of its pieces.
     """
+    import shapely
+
     sheet, tiling = _arranged(nests(printed), PAPERS[paper])
     # Labels move to where no joint of two sheets crosses them, where there is room for that.
     placed = []
@@ -125,10 +127,12 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
             pieces = place.pieces
         placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
     tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
-    return tiling, [
-        draw_nest(place.pieces, OnPaper(joints=[place.on_piece(joint) for joint in tiling.joints], letters=letters))
-        for place in placed
-    ]
+    drawings = []
+    for place in placed:
+        joints = [place.on_piece(joint) for joint in tiling.joints]
+        outside = shapely.transform(tiling.outside, place.on_piece)
+        drawings.append(draw_nest(place.pieces, OnPaper(joints=joints, outside=outside, letters=letters)))
+    return tiling, drawings
 
 
 def too_many_sheets(garment: DraftedGarment, paper: str) -> str:

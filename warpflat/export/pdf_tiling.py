@@ -12,7 +12,7 @@ from warpflat.pattern.draft import nest_label
 from warpflat.pattern.layout import Sheet
 
 if TYPE_CHECKING:
-    from shapely import Polygon
+    from shapely import Geometry, Polygon
 
 __all__ = ["LEGEND_SIZE", "SIZE_COLOURS", "SIZE_DASHES", "Paper", "Tiling", "make_tiling"]
 
@@ -96,6 +96,15 @@ class Tiling:
         across = [np.array([[k * step[0], 0.0], [k * step[0], height]]) for k in range(self.columns + 1)]
         down = [np.array([[0.0, height - k * step[1]], [width, height - k * step[1]]]) for k in range(self.rows + 1)]
         return across + down
+
+    @property
+    def outside(self) -> Geometry:
+        """What no sheet shows, around all that is shown."""
+        import shapely
+
+        corners = [self.corner(*tile) for tile in self.tiles]
+        shown = shapely.union_all([shapely.box(*at, *(at + self.paper.step + self.paper.overlap)) for at in corners])
+        return shown.buffer(0.1, join_style="mitre").difference(shown)
 
     def name(self, row: int, column: int) -> str:
         """Return the name of a tile, such as "B3" for the second row and the third column."""

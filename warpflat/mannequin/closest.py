@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.surface.closest import nearest_on_triangles
 
 __all__ = ["Closest"]
 
@@ -59,46 +60,10 @@ class Closest:
         self, points: FloatArray, owner: NDArray[np.int64], triangles: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Return the nearest triangle of each point, among pairs of a point and a triangle that are sorted by point."""
-        weights = _barycentric(self.corners[triangles], points[owner])
+        weights = nearest_on_triangles(self.corners[triangles], points[owner])
         place = np.einsum("nk,nkd->nd", weights, self.corners[triangles])
         distance = np.linalg.norm(place - points[owner], axis=1)
         order = np.lexsort((triangles, distance, owner))
         _, first = np.unique(owner[order], return_index=True)
         chosen = order[first]
         return triangles[chosen], weights[chosen], distance[chosen]
-
-
-def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Return weights of the nearest point of each triangle, #N by 3.
-
-    Source: Ericson, Real-Time Collision Detection, 5.1.5, by regions of the triangle's plane.
-    """
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    ab, ac, ap, bp, cp = b - a, c - a, points - a, points - b, points - c
-
-    def dot(u: FloatArray, v: FloatArray) -> FloatArray:
-        return np.asarray(np.einsum("ij,ij->i", u, v))
-
-    d1, d2, d3, d4, d5, d6 = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
-    vc, vb, va = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
-
-    def ratio(top: FloatArray, bottom: FloatArray) -> FloatArray:
-        return np.clip(
-            np.where(np.abs(bottom) > 1e-300, top / np.where(np.abs(bottom) > 1e-300, bottom, 1.0), 0.0), 0.0, 1.0
-        )
-
-    zero, one = np.zeros(len(a)), np.ones(len(a))
-    t_ab, t_ac, t_bc = ratio(d1, d1 - d3), ratio(d2, d2 - d6), ratio(d4 - d3, (d4 - d3) + (d5 - d6))
-    total = va + vb + vc
-    inside_v, inside_w = ratio(vb, total), ratio(vc, total)
-    regions = [
-        ((d1 <= 0) & (d2 <= 0), (one, zero, zero)),
-        ((d3 >= 0) & (d4 <= d3), (zero, one, zero)),
-        ((vc <= 0) & (d1 >= 0) & (d3 <= 0), (1 - t_ab, t_ab, zero)),
-        ((d6 >= 0) & (d5 <= d6), (zero, zero, one)),
-        ((vb <= 0) & (d2 >= 0) & (d6 <= 0), (1 - t_ac, zero, t_ac)),
-        ((va <= 0) & (d4 >= d3) & (d5 >= d6), (zero, 1 - t_bc, t_bc)),
-    ]
-    conditions = [r[0] for r in regions]
-    inside = (1 - inside_v - inside_w, inside_v, inside_w)
-    return np.column_stack([np.select(conditions, [r[1][k] for r in regions], inside[k]) for k in range(3)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import TAILS, Label, Words, text_width
 from warpflat.pattern.placement import LabelRoom, Spot, spots_along
 from warpflat.pattern.words import translate, translate_name
+
+if TYPE_CHECKING:
+    from shapely import Geometry
 
 __all__ = ["Drawing", "OnPaper", "Stroke", "draw_nest", "draw_piece", "grain_strokes"]
 
@@ -69,10 +72,12 @@ class OnPaper:
 
     Attributes:
         joints: lines (2 by 2 [m]) where sheets of paper meet or end.
+        outside: what no sheet shows.
         letters: of seams, by their names.
     """
 
     joints: Sequence[FloatArray] = ()
+    outside: Geometry | None = None
     letters: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -276,6 +281,8 @@ def _annotations(
         strokes.append(Stroke(role="leader", name="", points=label.leader))
     for joint in () if paper is None else paper.joints:
         room.take(shapely.LineString(joint))
+    if paper is not None and paper.outside is not None:
+        room.take(paper.outside)
     for hole in piece.drill_holes:
         room.take(shapely.Point(hole.at).buffer(2 * DRILL))
     for cutout in piece.cutouts.values():

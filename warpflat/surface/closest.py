@@ -13,8 +13,8 @@ def nearest_on_triangles(corners: FloatArray, points: FloatArray) -> FloatArray:
     """Return barycentric coordinates of the nearest place of each triangle to its point, #T by 3 (Ericson 2005, 5.1.5).
 
     Args:
-        corners: #T by 3 by 3 [m].
-        points: #T by 3 [m].
+        corners: #T by 3 by 2 or 3 [m].
+        points: #T by 2 or 3 [m].
     """
     a, b, c = corners.transpose(1, 0, 2)
     ab, ac = b - a, c - a
