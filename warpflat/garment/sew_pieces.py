@@ -340,7 +340,8 @@ def unsewn_borders(
     notes = list[tuple[float, str]]()
     for run in np.split(np.arange(len(here)), np.flatnonzero(ends) + 1):
         long = float((length[of[here[run]]] / count[of[here[run]]]).sum())
-        if long >= _SHORTEST:
+        # At a corner a border passes another one that ends there.
+        if long >= max(_SHORTEST, 2.0 * float(np.median(gap[run]))):
             names = edges.names[free[of[here[run[0]]]]], edges.names[free[of[there[run[0]]]]]
             whose = (
                 f"borders of {names[0]} and {names[1]}"
