@@ -36,8 +36,9 @@ Bands = Literal["auto", "straight", "as worn"]
 
 #: Borders that run along each other within this distance [m] are meant to be sewn, or reported.
 BESIDE = 1e-3
-# Of a piece that is sewn to no other, borders within this distance [m] of another piece are reported, too.
-_NEARLY = 5e-3
+# Of a piece that is sewn to no other, borders that run along another piece within this distance [m] are reported, too; the cosine
+# of the way there and the border is less than the second.
+_NEARLY, _AHEAD = 5e-3, 0.7
 # Of one border only places further apart along it than this [m] can be beside each other; shorter stretches than the second are corners.
 _APART, _SHORTEST = 1e-2, 3e-3
 # So many stretches that are not sewn are told one by one.
@@ -330,7 +331,10 @@ def unsewn_borders(
     gap = np.linalg.norm(to - foot[:, None] * along, axis=1)
     order = np.lexsort((gap, here))
     by_itself = np.array([name in alone for name in edges.names])[free][of]
-    nearly = (by_itself[here] | by_itself[there]) & (piece[here] != piece[there])
+    # The other border lies to the side of one that runs along it, and ahead of one that ends there.
+    way = edge[of[here]] / np.maximum(length[of[here]], np.finfo(float).tiny)[:, None]
+    beside = np.abs(((to - foot[:, None] * along) * way).sum(axis=1)) < _AHEAD * gap
+    nearly = (by_itself[here] | by_itself[there]) & (piece[here] != piece[there]) & beside
     order = order[gap[order] <= np.where(nearly, _NEARLY, BESIDE)[order]]
     if len(order) == 0:
         return []
@@ -340,8 +344,7 @@ def unsewn_borders(
     notes = list[tuple[float, str]]()
     for run in np.split(np.arange(len(here)), np.flatnonzero(ends) + 1):
         long = float((length[of[here[run]]] / count[of[here[run]]]).sum())
-        # At a corner a border passes another one that ends there.
-        if long >= max(_SHORTEST, 2.0 * float(np.median(gap[run]))):
+        if long >= _SHORTEST:
             names = edges.names[free[of[here[run[0]]]]], edges.names[free[of[there[run[0]]]]]
             whose = (
                 f"borders of {names[0]} and {names[1]}"
