@@ -102,6 +102,11 @@ def test_borders_that_miss_each_other_are_told():
     assert "run 0.00 mm apart for 4" in told[0]
     far = mirrored - np.array([2e-3, 0, 0])
     assert unsewn_borders(_surfaces((points, quads), (far, quads[:, ::-1]))) == []
+    # Of pieces that are sewn to nothing it is told, with the distance that would do.
+    told = unsewn_borders(_surfaces((points, quads), (far, quads[:, ::-1])), alone={"front", "back"})
+    assert len(told) == 1
+    assert "borders of front and back run 2.00 mm apart for 4" in told[0]
+    assert "(--meet) 3 makes them meet" in told[0]
 
 
 def _with_vertex(face: list[int], a: int, b: int, new: int) -> list[int]:

@@ -99,3 +99,11 @@ def test_lines_are_smoothed_on_the_pattern_only_and_not_where_a_tolerance_is_ask
     assert not is_wavy(chords(drafted.internal_lines["level"]))
     as_asked = draft_piece(piece, tolerance=1e-4).internal_lines["level"]
     np.testing.assert_allclose(as_asked - as_asked[0], line - line[0], atol=1e-12)
+
+
+def test_a_sliver_narrower_than_its_tolerance_keeps_the_points_of_its_border():
+    along = np.linspace(0.0, 0.2, 12)
+    low = np.column_stack([along, -4e-4 * np.sin(np.pi * along / 0.2)])
+    edges = [Edge(name="one", points=low), Edge(name="other", points=low[::-1] * [1, -1])]
+    drafted = draft_piece(Piece(name="p", edges=edges), tolerance=1e-3)
+    assert min(np.ptp(drafted.sew_line, axis=0)) == pytest.approx(8e-4, rel=0.1)

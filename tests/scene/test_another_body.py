@@ -12,7 +12,7 @@ from bodies import body_of_size
 from command import Command
 
 from warpflat.core.errors import InputError
-from warpflat.scene.fit import FitJob, ease_wishes, require_own_study
+from warpflat.scene.fit import FitJob, Fitted, ease_wishes, require_own_study, study_table
 from warpflat.seams.layers import read_garment
 from warpflat.surface.io.file_seams import file_seams
 
@@ -106,6 +106,13 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
     carried = job.to("EU 42", {})
     assert carried.kept()[1]
     assert carried.vertices.shape == job.read.raw.vertices.shape
+    # What its cloth cannot bear is told beside an ease that is kept.
+    for fits, word in ((True, "yes"), (False, "no")):
+        metrics = {"pieces": {"front": {"area_m2": 0.5, "wear": {"fits": fits}}}}
+        ended = Fitted(carried=carried, folder=tmp_path, metrics=metrics, converged=True)
+        assert ended.verdict().endswith("; it does not fit by its strain") is not fits
+        assert study_table([ended, ended])[1].split()[-1] == word
+        assert ended.row()["fits"] is fits
     # Whatever the file's unit, the carried mesh is in metres.
     assert np.ptp(carried.vertices[:, 1]) == pytest.approx(0.55, abs=0.1)
 

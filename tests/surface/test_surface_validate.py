@@ -12,6 +12,7 @@ from surface_meshes import broken_invariants, cylinder, grid, scattered
 from warpflat.core.errors import InputError
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.io.read import read_surface
+from warpflat.surface.repair.layers import Layer
 from warpflat.surface.repair.polygons import _quad_corners, find_crossed_quads
 from warpflat.surface.repair.slivers import degenerate_faces
 from warpflat.surface.repair.validate import make_surface
@@ -109,7 +110,23 @@ def test_repeated_faces_are_dropped_with_a_note():
     vertices, quads = grid(3, 2)
     surface = make_surface(vertices, [*quads.tolist(), quads[0, ::-1].tolist()])
     assert np.array_equal(surface.faces, quads)
-    assert surface.notes == ("1 face dropped that had the vertices of another: 2",)
+    assert surface.notes == ("1 face of 5,000 cm2 dropped that had the vertices of another: 2",)
+
+
+@pytest.mark.parametrize("where", [0, 5, 7])
+@pytest.mark.parametrize("order", [(0, 2, 1, 3), (1, 0, 2, 3)])
+def test_a_quad_with_corners_out_of_order_is_cut_as_they_belong(where, order):
+    # At a corner, at the border and inside; it made the surface one-sided, or tore a hole into it.
+    vertices, quads = grid(5, 5)
+    twisted = quads.copy()
+    twisted[where] = quads[where][list(order)]
+    surface = make_surface(vertices, twisted)
+    whole = np.delete(surface.faces, np.flatnonzero(surface.faces[:, 3] < 0), axis=0)
+    assert np.array_equal(np.sort(whole, axis=1), np.sort(np.delete(quads, where, axis=0), axis=1))
+    assert len(border_loops(surface.faces)) == 1
+    assert len(surface.vertices) == len(vertices)
+    assert Layer(surface.vertices, surface.faces).area == pytest.approx(Layer(vertices, quads).area)
+    assert f"1 quad with corners out of order, whose sides crossed, cut into triangles: {where}" in surface.notes
 
 
 def test_unused_vertices_go_but_the_input_stays():

@@ -130,9 +130,9 @@ def fit(
             click.echo(f"{one.body}:")
         ended = report_run(result, to, quiet=quiet or as_json, verbose=verbose, as_json=False)
         code = max(code, ended)
-        if shown:
-            click.echo(one.verdict())
         fitted.append(Fitted(carried=one, folder=to, metrics=result.metrics, converged=ended == DONE))
+        if shown:
+            click.echo(fitted[-1].verdict())
     written = write_study(folder, fitted)
     if as_json:
         click.echo((folder / "fit.json").read_text(encoding="utf-8"), nl=False)

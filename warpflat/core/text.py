@@ -38,6 +38,11 @@ def format_count(number: int, what: str) -> str:
     return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
+def area_words(area: float) -> str:
+    """Return an area [m2] in words: "1,207 cm2", "2.4 cm2"."""
+    return f"{1e4 * area:,.0f} cm2" if 1e4 * area >= 10.0 else f"{1e4 * area:.2g} cm2"
+
+
 def size_words(size: str) -> str:
     """Return the words for a size: "size EU 38", "size EU 38 made to measure", "made to measure"."""
     return size if size == MADE_TO_MEASURE else f"size {size}"

@@ -36,6 +36,9 @@ Bands = Literal["auto", "straight", "as worn"]
 
 #: Borders that run along each other within this distance [m] are meant to be sewn, or reported.
 BESIDE = 1e-3
+# Of a piece that is sewn to no other, borders that run along another piece within this distance [m] are reported, too; the cosine
+# of the way there and the border is less than the second.
+_NEARLY, _AHEAD = 5e-3, 0.7
 # Of one border only places further apart along it than this [m] can be beside each other; shorter stretches than the second are corners.
 _APART, _SHORTEST = 1e-2, 3e-3
 # So many stretches that are not sewn are told one by one.
@@ -277,7 +280,12 @@ def unsewn_notes(garment: Garment) -> list[str]:
         for name, row in zip(pair.pieces, pair.vertices, strict=True)
         for edge in pairwise(row.tolist())
     }
-    found = unsewn_borders({name: piece.network.surface for name, piece in garment.pieces.items()}, without=sewn)
+    joined = {name for pair in garment.stitching if pair.pieces[0] != pair.pieces[1] for name in pair.pieces}
+    found = unsewn_borders(
+        {name: piece.network.surface for name, piece in garment.pieces.items()},
+        without=sewn,
+        alone=garment.pieces.keys() - joined,
+    )
     left = len(found) - _MOST_TOLD
     more = [f"{left} more stretches of border run along others and are not sewn"] if left > 0 else []
     alone = len(garment.pieces) > 1 and not garment.stitching
@@ -285,12 +293,15 @@ def unsewn_notes(garment: Garment) -> list[str]:
     return [*found[:_MOST_TOLD], *more, *none]
 
 
-def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple[str, int, int]] = ()) -> list[str]:
+def unsewn_borders(
+    surfaces: Mapping[str, Surface], *, without: Collection[tuple[str, int, int]] = (), alone: Collection[str] = ()
+) -> list[str]:
     """Describe the stretches of border that run along another one and are not sewn to it, the longest first.
 
     Args:
         surfaces: by name.
         without: edges that are sewn in another way, by piece and vertices, the lower first.
+        alone: pieces that are sewn to no other: stretches that run somewhat farther from another piece are described, too.
     """
     from scipy.spatial import cKDTree
 
@@ -307,7 +318,7 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
     points = start[of] + share[:, None] * edge[of]
     loop, piece = edges.loop[free][of], edges.piece[free][of]
     arc, around = edges.arc[free][of] + share * length[of], edges.around[free][of]
-    here, there = cKDTree(points).query_pairs(BESIDE + 0.5 * spacing, output_type="ndarray").T
+    here, there = cKDTree(points).query_pairs((_NEARLY if alone else BESIDE) + 0.5 * spacing, output_type="ndarray").T
     apart = np.abs(arc[here] - arc[there])
     other = (loop[here] != loop[there]) | (np.minimum(apart, around[here] - apart) > _APART)
     # Both borders see each other: the first tells it.
@@ -319,7 +330,12 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
     foot = np.clip((to * along).sum(axis=1) / np.maximum(length[of[there]] ** 2, np.finfo(float).tiny), 0.0, 1.0)
     gap = np.linalg.norm(to - foot[:, None] * along, axis=1)
     order = np.lexsort((gap, here))
-    order = order[gap[order] <= BESIDE]
+    by_itself = np.array([name in alone for name in edges.names])[free][of]
+    # The other border lies to the side of one that runs along it, and ahead of one that ends there.
+    way = edge[of[here]] / np.maximum(length[of[here]], np.finfo(float).tiny)[:, None]
+    beside = np.abs(((to - foot[:, None] * along) * way).sum(axis=1)) < _AHEAD * gap
+    nearly = (by_itself[here] | by_itself[there]) & (piece[here] != piece[there]) & beside
+    order = order[gap[order] <= np.where(nearly, _NEARLY, BESIDE)[order]]
     if len(order) == 0:
         return []
     order = order[np.append(True, np.diff(here[order]) > 0)]
@@ -335,10 +351,17 @@ def unsewn_borders(surfaces: Mapping[str, Surface], *, without: Collection[tuple
                 if names[0] != names[1]
                 else f"two stretches of the border of {names[0]}"
             )
+            # At its ends a border goes on past the other.
+            farthest = float(np.quantile(gap[run], 0.9))
+            why = (
+                "only two borders that agree vertex by vertex are, and no lining to its outer layer all around"
+                if farthest <= BESIDE
+                else f"surface.meet_mm (--meet) {np.ceil(1e3 * farthest + 0.5):.0f} makes them meet"
+            )
             place = ", ".join(f"{100 * x:.0f}" for x in points[here[run[len(run) // 2]]] + 0.0)
             words = (
                 f"{whose} run {1e3 * float(np.median(gap[run])):.2f} mm apart for {1e3 * long:.0f} mm about ({place}) cm and are not "
-                "sewn: only two borders that agree vertex by vertex are, and no lining to its outer layer all around"
+                f"sewn: {why}"
             )
             notes.append((long, words))
     return [words for _, words in sorted(notes, key=lambda entry: -entry[0])]

@@ -100,13 +100,18 @@ def fit_edges(
                 fitted[first], fitted[second] = (found[0], used), (found[1].reversed() if against else found[1], used)
     _keep_near(pieces, lines, seams, fitted, tolerance)
     for piece in pieces:
-        # Curves that cross themselves or each other are replaced by their chords.
+        # Curves that cross themselves or each other, or all fall into one line, are replaced by their chords.
         keys = [(piece.name, edge.name) for edge in piece.edges]
         drawn = {key: shapely.LineString(fitted[key][0].sample()) for key in keys}
-        if shapely.Polygon(np.concatenate([line.coords[:-1] for line in drawn.values()])).is_valid:
+        ring = np.concatenate([line.coords[:-1] for line in drawn.values()])
+        if len(ring) > 2 and shapely.Polygon(ring).is_valid:
             continue
         for key in keys:
-            if not drawn[key].is_simple or any(drawn[key].crosses(drawn[other]) for other in keys if other != key):
+            if (
+                len(ring) < 3
+                or not drawn[key].is_simple
+                or any(drawn[key].crosses(drawn[other]) for other in keys if other != key)
+            ):
                 fitted[key] = chords(lines[key]), fitted[key][1]
     return fitted
 

@@ -362,6 +362,16 @@ class Fitted:
     metrics: Mapping[str, Any]
     converged: bool
 
+    @property
+    def fits(self) -> bool | None:
+        """Whether the cloth is held within its limits everywhere; None where no cloth is judged."""
+        judged = [piece["wear"]["fits"] for piece in self.metrics["pieces"].values() if piece.get("wear")]
+        return all(judged) if judged else None
+
+    def verdict(self) -> str:
+        """Return in one line how the garment fits the body, its cloth too."""
+        return self.carried.verdict() + ("; it does not fit by its strain" if self.fits is False else "")
+
     def row(self) -> dict[str, Any]:
         """Return the row of a study's table."""
         eases = {level: 1e3 * (girths[0] - girths[1]) for level, girths in self.carried.after.items()}
@@ -373,6 +383,7 @@ class Fitted:
             "kept": self.carried.kept()[1],
             "pieces": len(pieces),
             "area_m2": area,
+            "fits": self.fits,
             "done": self.converged,
         }
 
@@ -407,7 +418,10 @@ def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
     from warpflat._version import __version__
     from warpflat.core.output import atomic_path, write_json
 
-    entries = [{**each.carried.as_dict(), "folder": str(each.folder), "done": each.converged} for each in fitted]
+    entries = [
+        {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": each.converged}
+        for each in fitted
+    ]
     write_json(folder / "fit.json", {"warpflat": __version__, "bodies": entries})
     if len(fitted) == 1:
         return ["fit.json"]
@@ -422,14 +436,16 @@ def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
 def study_table(fitted: Sequence[Fitted]) -> list[str]:
     """Return the lines of the table of a study: ease by level [mm]."""
     rows = [each.row() for each in fitted]
-    width = max(4, *(len(row["body"]) for row in rows))
+    width, fits = max(4, *(len(row["body"]) for row in rows)), {True: "yes", False: "no", None: "-"}
     lines = [
-        f"{'ease [mm]':{width}}" + "".join(f"{level:>11}" for level in EASE_LEVELS) + f"{'pieces':>8}{'cloth m2':>10}"
+        f"{'ease [mm]':{width}}"
+        + "".join(f"{level:>11}" for level in EASE_LEVELS)
+        + f"{'pieces':>8}{'cloth m2':>10}{'fits':>6}"
     ]
     for row in rows:
         eases = (row[f"ease_{level}_mm"] for level in EASE_LEVELS)
         cells = "".join(f"{'-' if ease is None else format(ease, '+.0f'):>11}" for ease in eases)
-        lines.append(f"{row['body']:{width}}{cells}{row['pieces']:>8}{row['area_m2']:>10.2f}")
+        lines.append(f"{row['body']:{width}}{cells}{row['pieces']:>8}{row['area_m2']:>10.2f}{fits[row['fits']]:>6}")
     return lines
 
 

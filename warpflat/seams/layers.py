@@ -10,7 +10,7 @@ import numpy as np
 
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, plain_label
-from warpflat.core.text import format_count, quote_value
+from warpflat.core.text import area_words, format_count, quote_value
 from warpflat.seams.options import SeamCut
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
@@ -93,17 +93,17 @@ def read_garment(
     layers = [Layer(surface.vertices, surface.faces) for surface in found]
     total = sum(layer.area for layer in layers)
     doubled = doubled_layers(layers)
-    kept, trifles = list[Surface](), len(order) - len(found) - len(faults)
+    kept, trifles, area = list[Surface](), len(order) - len(found) - len(faults), 0.0
     for number, (surface, layer) in enumerate(zip(found, layers, strict=True)):
         if number in doubled:
             notes.append(f"{layer.describe()} dropped: a second layer that lies on another part")
         elif number and layer.area < (_CLOSED_TRIFLE if _is_closed(surface) else _TRIFLE) * total:
-            trifles += 1
+            trifles, area = trifles + 1, area + layer.area
         else:
             check_size(surface, file, scale)
             kept.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
     if trifles:
-        notes.append(f"{format_count(trifles, 'small part')}, such as buttons, left out")
+        notes.append(f"{format_count(trifles, 'small part')}, such as buttons, left out ({area_words(area)})")
     notes += [f"a part left out: {str(fault).removeprefix(f'{file}: ')}" for fault in faults[:3]]
     kept.sort(key=lambda surface: -Layer(surface.vertices, surface.faces).area)
     marks = [

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
-from warpflat.core.text import format_count
+from warpflat.core.text import area_words, format_count
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.layers import Layer, doubled_layers
 from warpflat.surface.repair.meet import MEET, meet_borders
+from warpflat.surface.repair.polygons import split_polygons
+from warpflat.surface.repair.sheets import face_vectors
 from warpflat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
 
 __all__ = ["object_parts", "read_pieces"]
@@ -49,7 +51,7 @@ def read_pieces(
     file, raw, scale, sources = read_mesh_file(path, units=units, prim=ALL_PRIMS, name=name)
     vertices = raw.vertices * scale
     found: list[Surface] = []
-    closed = small = 0
+    closed, small = list[float](), list[float]()
     largest = 0.0
     objects = list(_objects(raw, name or make_file_name(file.stem)))
     notes = list(raw.notes)
@@ -61,15 +63,17 @@ def read_pieces(
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
         for number in range(int(part.max()) + 1):
+            of = polygons[part == number]
             try:
-                surface = make_surface(points, polygons[part == number], name=title, weld=soup, source=source)
+                surface = make_surface(points, of, name=title, weld=soup, source=source)
             except ClosedSurfaceError:
-                closed += 1
+                faces, _ = split_polygons(points, of)
+                closed.append(float(np.linalg.norm(face_vectors(points, faces), axis=1).sum()))
                 continue
             size = float(np.ptp(surface.vertices, axis=0).max())
             largest = max(largest, size)
             if size < POSSIBLE[0]:
-                small += 1
+                small.append(Layer(surface.vertices, surface.faces).area)
                 continue
             check_size(surface, file, scale)
             found.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
@@ -78,9 +82,13 @@ def read_pieces(
     if not found:
         raise InputError(f"{file}: every part is closed (it has no border) or a crumb; give the layer of cloth alone")
     if closed:
-        notes.append(f"{format_count(closed, 'closed part')}, such as a button, left out")
+        notes.append(
+            f"{format_count(len(closed), 'closed part')}, such as a button, left out ({area_words(sum(closed))})"
+        )
     if small:
-        notes.append(f"{format_count(small, 'part')} of less than {1e3 * POSSIBLE[0]:g} mm left out")
+        notes.append(
+            f"{format_count(len(small), 'part')} of less than {1e3 * POSSIBLE[0]:g} mm left out ({area_words(sum(small))})"
+        )
     named = _named_apart(found)
     layers = [Layer(surface.vertices, surface.faces) for surface in named]
     doubled = doubled_layers(layers)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.text import format_count
+from warpflat.core.text import area_words, format_count
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["SAME_LAYER", "Layer", "doubled_layers", "lies_within"]
@@ -49,8 +49,7 @@ class Layer:
 
     def describe(self) -> str:
         """Return how many faces of which area it has, in words."""
-        area = 1e4 * self.area
-        return f"{format_count(len(self.faces), 'face')} of {f'{area:,.0f}' if area >= 10 else f'{area:.2g}'} cm2"
+        return f"{format_count(len(self.faces), 'face')} of {area_words(self.area)}"
 
     def vertices_at(self, points: FloatArray, distance: float) -> tuple[IntArray, BoolArray]:
         """Return the nearest vertex to each point (#P by 3 [m]), and whether it lies within a distance [m]."""

@@ -17,12 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_file_name, check_label
-from warpflat.core.text import format_count, quote_value
+from warpflat.core.text import area_words, format_count, quote_value
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.polygons import (
     distinct_corners,
+    find_crossed_quads,
     list_some,
     pad_polygons,
     split_polygons,
@@ -88,6 +89,11 @@ class _Mesh:
             self._made[name] = self.faces, made
         return made
 
+    def describe(self, which: BoolArray) -> str:
+        """Return how many faces of which area are chosen (#F), in words."""
+        area = np.linalg.norm(face_vectors(self.vertices, self.faces[which]), axis=1).sum()
+        return f"{format_count(int(which.sum()), 'face')} of {area_words(float(area))}"
+
     def keep(self, which: BoolArray) -> None:
         self.faces, self.origin = self.faces[which], self.origin[which]
 
@@ -131,6 +137,7 @@ def make_surface(
         mesh = _checked_faces(positions, polygons)
         paths = {key: checked_line(key, line, len(positions)) for key, line in (lines or {}).items()}
         place = _weld(mesh, weld, split_corners, component is not None)
+        _order_corners(mesh)
         _drop_double_faces(mesh)
         _part_sheets(mesh)
         _drop_double_layers(mesh)
@@ -223,6 +230,7 @@ def parts_of_faces(vertices: ArrayLike, polygons: ArrayLike, *, weld: bool, note
     mesh = _checked_faces(check_positions(vertices), polygons)
     _weld(mesh, weld, split_corners=False, chosen=True)
     before = len(mesh.notes)
+    _order_corners(mesh)
     _drop_double_faces(mesh)
     _part_sheets(mesh)
     if notes is not None:
@@ -326,6 +334,45 @@ def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> 
     return place
 
 
+def _order_corners(mesh: _Mesh) -> None:
+    """Cut quads with their corners in the right order whose sides cross, where the file goes from corner to corner in a wrong one.
+
+    Another order is right if the quad shares more sides with other faces in it; of two such, the one in which its sides do not cross. A
+    quad that is crossed in space alone is cut later.
+    """
+    he = mesh.half_edges
+    alone = np.bincount(he.face[he.count[he.edge] == 1], minlength=len(mesh.faces))
+    rows = np.flatnonzero((mesh.faces[:, 3] >= 0) & (alone >= 2))
+    rows = rows[find_crossed_quads(mesh.vertices, mesh.faces[rows])]
+    if len(rows) == 0:
+        return
+    orders = np.array([[0, 1, 2, 3], [0, 2, 1, 3], [0, 1, 3, 2]])
+    quads = mesh.faces[rows][:, orders]
+    # Each side as one number: lower vertex, higher vertex.
+    digits = (len(mesh.vertices), 1)
+    sides = np.sort(np.stack([quads, np.roll(quads, -1, axis=2)], axis=3), axis=3).astype(np.int64) @ digits
+    known = he.edges.astype(np.int64) @ digits
+    at = np.minimum(np.searchsorted(known, sides), len(known) - 1)
+    own = (sides[..., None] == sides[:, :1, None]).any(axis=3)
+    with_others = (np.where(known[at] == sides, he.count[at], 0) > own).sum(axis=2)
+    straight = np.ones(with_others.shape, dtype=bool)
+    for order in range(len(orders)):
+        straight[find_crossed_quads(mesh.vertices, quads[:, order]), order] = False
+    best = np.argmax(2 * with_others + straight, axis=1)
+    wrong = with_others[np.arange(len(rows)), best] > with_others[:, 0]
+    if wrong.any():
+        cut, none = rows[wrong], np.full((int(wrong.sum()), 1), -1, dtype=np.int32)
+        right = quads[wrong, best[wrong]]
+        mesh.notes.append(
+            f"{format_count(len(cut), 'quad')} with corners out of order, whose sides crossed, cut into triangles: "
+            f"{list_some(mesh.origin[cut])}"
+        )
+        faces = mesh.faces.copy()
+        faces[cut] = np.hstack([right[:, :3], none])
+        mesh.faces = np.insert(faces, cut + 1, np.hstack([right[:, [0, 2, 3]], none]), axis=0)
+        mesh.origin = np.insert(mesh.origin, cut + 1, mesh.origin[cut])
+
+
 def _drop_double_faces(mesh: _Mesh) -> None:
     key = np.sort(mesh.faces, axis=1)
     # Faces with different hashes are different, and hardly any two that differ have the same.
@@ -338,9 +385,8 @@ def _drop_double_faces(mesh: _Mesh) -> None:
         return
     keep = np.zeros(len(mesh.faces), dtype=bool)
     keep[first] = True
-    doubled = mesh.origin[~keep]
     mesh.notes.append(
-        f"{format_count(len(doubled), 'face')} dropped that had the vertices of another: {list_some(doubled)}"
+        f"{mesh.describe(~keep)} dropped that had the vertices of another: {list_some(mesh.origin[~keep])}"
     )
     mesh.keep(keep)
 
@@ -380,9 +426,10 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
                     f"{mesh.crowded}; parted there, it falls into {len(sizes):,} sheets of {_sizes(sizes[rank])} faces: choose one with "
                     f'{valid}, or take all with component = "all"'
                 )
-            lost = 1e4 * float(area[small].sum())
             mesh.keep(~small[label])
-            mesh.notes.append(f"{format_count(int(small.sum()), 'small sheet')} left out ({lost:.2g} cm2)")
+            mesh.notes.append(
+                f"{format_count(int(small.sum()), 'small sheet')} left out ({area_words(float(area[small].sum()))})"
+            )
         elif len(sizes) > 1:
             if (meeting := t_junction(mesh.vertices, mesh.faces, label)) is not None:
                 vertex, a, b = meeting
@@ -402,10 +449,8 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
         raise InputError(f"component {component!r} does not exist: {_sizes(sizes[rank])} faces; valid: {valid}")
     if len(sizes) > 1:
         keep = label == rank[component]
+        mesh.notes.append(f"component {component} of {len(sizes)} taken, {mesh.describe(~keep)} left out")
         mesh.keep(keep)
-        mesh.notes.append(
-            f"component {component} of {len(sizes)} taken, {format_count(int((~keep).sum()), 'face')} left out"
-        )
 
 
 def _sizes(sizes: NDArray[np.int64]) -> str:
@@ -440,10 +485,10 @@ def _part_sheets(mesh: _Mesh) -> None:
     before = int(mesh.part.max()) + 1
     mesh.faces, mesh.vertices, mesh.index = faces, mesh.vertices[origin], mesh.index[origin]
     areas = np.sort(np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, faces), axis=1)))[::-1]
-    off = [f"{1e4 * area:.2g}" for area in areas[1 : 1 + max(len(areas) - before, 0)]]
+    off = [area_words(area) for area in areas[1 : 1 + max(len(areas) - before, 0)]]
     mesh.notes.append(
         f"{format_count(len(crowded), 'edge')} at which more than two faces meet: the sheets were parted there"
-        + (f", {format_count(len(off), 'sheet')} came off ({', '.join(off[:4])} cm2)" if off else "")
+        + (f", {format_count(len(off), 'sheet')} came off ({', '.join(off[:4])})" if off else "")
     )
 
 
