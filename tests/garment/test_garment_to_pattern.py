@@ -21,6 +21,7 @@ from warpflat.garment.to_pattern import pattern_of_garment, pattern_of_surface
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.draft import draft_garment
+from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
 
 FORMS = ("basic_block", "tshirt", "dress", "princess_dress", "a_line_skirt")
@@ -313,3 +314,27 @@ def test_a_parted_surface_is_sewn_together_again():
     drafted = draft_garment(pattern)
     assert abs(drafted.seams[0].difference_mm) < 0.5
     assert all(any(n.seam == seam.name for n in piece.notches) for piece in drafted.pieces[""])
+
+
+def test_an_edge_is_sewn_to_a_row_of_edges_that_corners_part():
+    # Beside a straight border the one piece is flat; the other is folded twice at its middle, and has a corner there in the plane.
+    border = np.array([[0.0, -0.2, 0.0], [0.0, 0.0, 0.0], [0.0, 0.2, 0.0]])
+    flat_side = np.vstack([border, [[-0.3, -0.2, 0.0], [-0.3, 0.0, 0.0], [-0.3, 0.2, 0.0]]])
+    folds = np.array([[0.2, -0.3, 1.0], [1.0, 0.3, -0.8]])
+    folded = np.vstack([border, 0.3 * folds / np.linalg.norm(folds, axis=1)[:, None]])
+    surfaces = [
+        make_surface(flat_side, np.array([[1, 0, 3, 4], [2, 1, 4, 5]]), name="plain"),
+        make_surface(folded, np.array([[0, 1, 3, -1], [3, 1, 4, -1], [4, 1, 2, -1]]), name="bent"),
+    ]
+    pieces = [flatten(each) for each in surfaces]
+    pattern, _ = pattern_of_surface(pieces, name="two")
+    (seam,) = pattern.seams
+    plain, bent = sorted(seam.sides, key=len)
+    assert [side.piece for side in (*plain, *bent)] == ["plain", "bent", "bent"]
+    # The row runs the other way round its piece, beginning with the edge of its last vertices.
+    assert len({side.reversed for side in bent}) == 1 and plain[0].reversed != bent[0].reversed
+    drafted = draft_garment(pattern)
+    assert abs(drafted.seams[0].difference_mm) < 1.0
+    edges = {edge.name: edge.vertices for edge in pattern.pieces[""][1].edges}
+    row = [edges[side.edge] for side in bent]
+    assert row[0][0 if bent[0].reversed else -1] == row[1][-1 if bent[0].reversed else 0] == 1

@@ -57,6 +57,8 @@ __all__ = ["check_edge_names", "grain_of", "pattern_of_garment", "pattern_of_sur
 ON_DATUM = 1e-3
 #: Least distance [m] of the grain line from darts and holes, and the steps [m] in which it is moved aside.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
+#: A side of a seam is a row of at most so many edges, parted by corners in the plane.
+_MOST_EDGES = 8
 #: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
 BESIDE, ALIGNED = 0.05, 1e-3
 
@@ -558,37 +560,57 @@ def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piec
 def _mesh_seams(
     results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
 ) -> tuple[Seam, ...]:
-    """Return the seams: those that are named, and pairs of edges that are one curve in space."""
+    """Return the seams: those that are named, and pairs of rows of edges that are one curve in space.
+
+    A corner in the plane parts the edge of one side alone: its other side is then sewn to a row of edges.
+    """
     from scipy.spatial import cKDTree
 
     seams: list[Seam] = [*named]
     done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
-    edges = [
-        (SeamSide(piece=piece.name, edge=edge.name), result.network.surface.vertices[edge.vertices])
-        for result, piece in zip(results, pieces, strict=True)
-        for edge in piece.edges
-        if edge.kind in ("seam", "cut") and edge.vertices is not None and (piece.name, edge.name) not in done
-    ]
-    if not edges:
+    rows: list[tuple[tuple[SeamSide, ...], FloatArray]] = []
+    for result, piece in zip(results, pieces, strict=True):
+        vertices, count = result.network.surface.vertices, len(piece.edges)
+        for start in range(count):
+            ids: list[int] = []
+            for length in range(1, min(count, _MOST_EDGES) + 1):
+                edge = piece.edges[(start + length - 1) % count]
+                if edge.kind not in ("seam", "cut") or edge.vertices is None or (piece.name, edge.name) in done:
+                    break
+                if ids and (ids[-1] != edge.vertices[0] or ids[0] == ids[-1]):
+                    break
+                ids = [*ids[:-1], *edge.vertices.tolist()]
+                sides = [piece.edges[(start + k) % count].name for k in range(length)]
+                rows.append((tuple(SeamSide(piece=piece.name, edge=name) for name in sides), vertices[ids]))
+    if not rows:
         return tuple(seams)
-    # Only edges whose ends lie at the same two places can be one curve.
-    ends = np.array([curve[[0, -1]] for _, curve in edges]).reshape(-1, 3)
+    # Only rows whose ends lie at the same two places can be one curve.
+    ends = np.array([curve[[0, -1]] for _, curve in rows]).reshape(-1, 3)
     place = join_labels(len(ends), *cKDTree(ends).query_pairs(SAME_PLACE, output_type="ndarray").T)
-    groups: dict[tuple[int, ...], list[tuple[SeamSide, FloatArray]]] = {}
-    for edge, here in zip(edges, np.sort(place.reshape(-1, 2), axis=1).tolist(), strict=True):
-        groups.setdefault(tuple(here), []).append(edge)
+    groups: dict[tuple[int, ...], list[tuple[tuple[SeamSide, ...], FloatArray]]] = {}
+    for row, here in zip(rows, np.sort(place.reshape(-1, 2), axis=1).tolist(), strict=True):
+        groups.setdefault(tuple(here), []).append(row)
 
     def are_one(curve: FloatArray, other: FloatArray) -> bool:
         return len(curve) == len(other) and bool(np.linalg.norm(curve - other, axis=1).max() < SAME_PLACE)
 
-    for group in groups.values():
-        for (first, curve), (second, other) in combinations(group, 2):
-            against = not are_one(curve, other)
-            if are_one(curve, other[::-1] if against else other):
-                name = first.edge.removesuffix(".left").removesuffix(".right")
-                name = find_unused_name(name, {seam.name for seam in seams})
-                sides = ((first,), (replace(second, reversed=against),))
-                seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
+    # Those of fewest edges first, in the order of the pieces.
+    order = {row: number for number, (row, _) in enumerate(rows)}
+    pairs = [pair for group in groups.values() for pair in combinations(group, 2)]
+    for (first, curve), (second, other) in sorted(
+        pairs, key=lambda pair: (len(pair[0][0]) + len(pair[1][0]), order[pair[0][0]])
+    ):
+        taken = [(side.piece, side.edge) for side in (*first, *second)]
+        if len(set(taken)) < len(taken) or not done.isdisjoint(taken):
+            continue
+        against = not are_one(curve, other)
+        if not are_one(curve, other[::-1] if against else other):
+            continue
+        done.update(taken)
+        name = first[0].edge.removesuffix(".left").removesuffix(".right")
+        name = find_unused_name(name, {seam.name for seam in seams})
+        beside = tuple(replace(side, reversed=against) for side in (second[::-1] if against else second))
+        seams.append(Seam(name=name, sides=(first, beside), ease=rules.ease.get(name, 0.0)))
     return tuple(seams)
 
 

@@ -317,8 +317,15 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
     """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
     area = cloth.face_areas
     plain, bands = [], [_band(cloth, mesh) for mesh in meshes]
+    of_sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1))
+    sleeves = [int(np.median(of_sleeve[mesh.face_of])) for mesh in meshes]
+    # A short sleeve from the armhole on is no cuff.
+    bands = [
+        "" if band == "cuff" and sleeves.count(sleeve) == 1 and sleeve >= 0 else band
+        for band, sleeve in zip(bands, sleeves, strict=True)
+    ]
     both_sides = Counter[str]()
-    for mesh, band in zip(meshes, bands, strict=True):
+    for mesh, band, sleeve in zip(meshes, bands, sleeves, strict=True):
         weight = area[mesh.face_of]
         corners = cloth.faces[mesh.face_of]
         facing = cloth.values.get(FACING, np.zeros(len(cloth.vertices)))
@@ -330,7 +337,6 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
         face = ("front" if float(turned.sum()) > 0.0 else "back") if FACING in cloth.values else ""
         if FACING in cloth.values and abs(float(turned.sum())) < _AROUND * float(np.abs(turned).sum()):
             face = ""
-        sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
         if sleeve >= 0:
             name = f"{side_word(side)}_sleeve"
         elif anatomy.kind == "trousers":
