@@ -332,7 +332,7 @@ def test_an_edge_is_sewn_to_a_row_of_edges_that_corners_part():
     plain, bent = sorted(seam.sides, key=len)
     assert [side.piece for side in (*plain, *bent)] == ["plain", "bent", "bent"]
     # The row runs the other way round its piece, beginning with the edge of its last vertices.
-    assert len({side.reversed for side in bent}) == 1 and plain[0].reversed != bent[0].reversed
+    assert {side.reversed for side in bent} == {not plain[0].reversed}
     drafted = draft_garment(pattern)
     assert abs(drafted.seams[0].difference_mm) < 1.0
     edges = {edge.name: edge.vertices for edge in pattern.pieces[""][1].edges}
