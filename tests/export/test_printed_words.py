@@ -20,8 +20,11 @@ from warpflat.export.svg import write_svg
 from warpflat.garment.pattern_files import check_names
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.drafted import DraftedGarment
+from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.measures import length_words
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.sewing_order import sewing_steps
 from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 
@@ -99,3 +102,18 @@ def test_first_pages_tell_measures_needed_openings_and_what_is_needed(tmp_path: 
                 210,
                 True,
             ]
+
+
+@pytest.mark.parametrize("name", ["knee", "facing knee"])
+@pytest.mark.parametrize("kind", ["hem", "cut"])
+def test_a_lower_edge_is_printed_as_hem_turned_up_or_raw(name: str, kind: str):
+    corners = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.5], [0.0, 0.5]])
+    names = (name, "side right", "neck", "side left")
+    edges = [
+        Edge(name=each, points=corners[[k, (k + 1) % 4]], kind=kind if each == name else "cut")
+        for k, each in enumerate(names)
+    ]
+    (piece,) = draft_garment(Pattern(name="stand", pieces={"": [Piece(name="facing", edges=edges)]})).pieces[""]
+    printed = {words.text for words in draw_piece(piece).words}
+    assert {"hem", "neck"} <= printed
+    assert name not in printed
