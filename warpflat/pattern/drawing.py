@@ -17,6 +17,7 @@ from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import TAILS, Label, Words, text_width
+from warpflat.pattern.measures import name_in_units
 from warpflat.pattern.piece_parts import HEMMED_LEVELS
 from warpflat.pattern.placement import LabelRoom, Spot, spots_along
 from warpflat.pattern.words import translate, translate_name
@@ -316,6 +317,7 @@ def _annotations(
         )
         # One of a pair is neither left nor right, as in the sewing order.
         text = translate_name(without_side(kind) if piece.piece.is_pair else kind)
+        text = name_in_units(text, piece.piece.units)
         width = text_width(text, NAME)
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
             others = [*drawn[:index], *drawn[index + 1 :]]
