@@ -28,6 +28,7 @@ import numpy as np
 
 import warpflat
 from warpflat.core.errors import InputError
+from warpflat.export.usd_prims import part_path
 
 SCENES = Path(__file__).parents[1] / "scenes"
 
@@ -39,7 +40,7 @@ def largest_shares(film: Path) -> tuple[int, list[int], float]:
     stage = Usd.Stage.Open(str(film))
     worst, counts, frames = 0.0, list[int](), 0
     for piece in stage.GetDefaultPrim().GetChildren():
-        pattern = UsdGeom.Mesh(stage.GetPrimAtPath(f"{piece.GetPath()}/pattern"))
+        pattern = UsdGeom.Mesh(stage.GetPrimAtPath(part_path(str(piece.GetPath()), "pattern")))
         if not pattern:
             continue
         # Between two samples USD interpolates: a frame is what a reader gets at its time.

@@ -107,8 +107,14 @@ def test_a_pattern_from_a_file_is_corrected(tmp_path: Path, capsys: pytest.Captu
         'spacing_mm = 40\ntop = "hip"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\ntolerance = 0.05\n'
         "max_steps = 3000\n"
     )
-    main(["drape", str(tmp_path / "narrow.json"), "--seams", str(table), "--out", str(out), "--correct"])
-    assert "of the cloth was stretched beyond its limit, now" in capsys.readouterr().err
+    command = ["drape", str(tmp_path / "narrow.json"), "--seams", str(table)]
+    assert main([*command, "--out", str(out), "--correct"]) == 0
+    printed = capsys.readouterr()
+    assert "corrected in 1 round: " in printed.err
+    assert "of the cloth was stretched beyond its limit, now" in printed.err
+    # Quiet, the same drape prints nothing.
+    assert main([*command, "--out", str(tmp_path / "quiet"), "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
     assert {"narrow.corrected.dxf", "narrow.corrected.svg", "corrected.png"} <= {path.name for path in out.iterdir()}
     rounds = json.loads((out / "metrics.json").read_text())["drape"]["correction"]["rounds"]
     assert rounds[0]["beyond_limit"] > 0.1

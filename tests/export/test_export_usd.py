@@ -63,7 +63,7 @@ def test_numbers_read_back_as_written(tmp_path: Path) -> None:
         ]
     assert numbers == [1, 2, 3, 4, 5]
     stage = open_stage(tmp_path / "frames.usdc")
-    surface, pattern = mesh_at(stage, "/World/dome/surface"), mesh_at(stage, "/World/dome/pattern")
+    surface, pattern = mesh_at(stage, "/World/dome/dome_surface"), mesh_at(stage, "/World/dome/dome_pattern")
     np.testing.assert_array_equal(np.asarray(surface.GetPointsAttr().Get()), shape.vertices.astype(np.float32))
     assert pattern.GetPointsAttr().GetTimeSamples() == [1.0, 2.0, 3.0, 4.0, 5.0]
     for number, (flat, density) in zip(numbers, frames, strict=True):
@@ -100,7 +100,7 @@ def test_stage_says_what_it_is(tmp_path: Path) -> None:
     assert piece.GetDisplayName() == "Ärmel links"
     assert Usd.ModelAPI(stage.GetDefaultPrim()).GetKind() == Kind.Tokens.assembly
     assert Usd.ModelAPI(piece).GetKind() == Kind.Tokens.component
-    pattern = mesh_at(stage, f"{piece.GetPath()}/pattern")
+    pattern = mesh_at(stage, f"{piece.GetPath()}/{piece.GetName()}_pattern")
     assert pattern.GetSubdivisionSchemeAttr().Get() == UsdGeom.Tokens.none
     assert pattern.GetOrientationAttr().Get() == UsdGeom.Tokens.rightHanded
     assert list(pattern.GetFaceVertexCountsAttr().Get(2)) == [4, 3, 3]
@@ -121,7 +121,7 @@ def test_colours_have_one_scale_over_time_and_pieces(tmp_path: Path) -> None:
     expected = {("front", 1): 1.0, ("front", 2): 1.0, ("back", 1): 1.0, ("back", 2): 0.5}
     for (name, frame), share in expected.items():
         for kind in ("surface", "pattern"):
-            colour = mesh_at(stage, f"/World/{name}/{kind}").GetDisplayColorPrimvar()
+            colour = mesh_at(stage, f"/World/{name}/{name}_{kind}").GetDisplayColorPrimvar()
             assert colour.GetAttr().GetCustomData()["rangeMax"] == 2.0
             np.testing.assert_allclose(
                 np.asarray(colour.ComputeFlattened(frame)),
@@ -174,12 +174,12 @@ def test_a_viewer_finds_cameras_light_material_and_texture(tmp_path: Path) -> No
     (sun,) = [UsdLux.DistantLight(prim) for prim in stage.Traverse() if prim.IsA(UsdLux.DistantLight)]
     assert sun.GetNormalizeAttr().Get() is True
     assert sun.GetIntensityAttr().Get() * 2.0 ** sun.GetExposureAttr().Get() > 1.0
-    pattern, surface = mesh_at(stage, "/World/front/pattern"), mesh_at(stage, "/World/front/surface")
+    pattern, surface = mesh_at(stage, "/World/front/front_pattern"), mesh_at(stage, "/World/front/front_surface")
     corners = np.asarray(pattern.GetPointsAttr().Get(last))[np.asarray(pattern.GetFaceVertexIndicesAttr().Get(last))]
     for mesh in (pattern, surface):
         assert UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0].GetPath() == "/World/Looks/energy"
         np.testing.assert_array_equal(np.asarray(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").Get()), corners[:, :2])
-    lines = UsdGeom.Imageable(stage.GetPrimAtPath("/World/front/pattern_lines/bust_line"))
+    lines = UsdGeom.Imageable(stage.GetPrimAtPath("/World/front/front_pattern_lines/bust_line"))
     assert lines.ComputePurpose() == UsdGeom.Tokens.guide
     cache = UsdGeom.BBoxCache(last, [UsdGeom.Tokens.default_])
     box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
@@ -220,7 +220,7 @@ def test_validation_finds_what_is_wrong(tmp_path: Path) -> None:
 
     cut_film(tmp_path / "frames.usdc")
     stage = open_stage(tmp_path / "frames.usdc")
-    mesh = mesh_at(stage, "/World/front/pattern")
+    mesh = mesh_at(stage, "/World/front/front_pattern")
     mesh.GetFaceVertexIndicesAttr().Set(Vt.IntArray([999] * 256), 3)
     mesh.GetPointsAttr().Set(Vt.Vec3fArray([9.0 * point for point in mesh.GetPointsAttr().Get(4)]), 4)
     mesh.GetDisplayColorAttr().Set(Vt.Vec3fArray([(0.0, 0.0, 0.0)] * 3), 2)
@@ -246,7 +246,7 @@ def test_validation_finds_points_that_run_across_a_change(tmp_path: Path) -> Non
         for size in (1.0, 2.0):
             writer.write("front", positions=size * shape.vertices[:, :2], face_energy_density=np.ones(4))
     stage = open_stage(tmp_path / "a.usdc")
-    indices = mesh_at(stage, "/World/front/pattern").GetFaceVertexIndicesAttr()
+    indices = mesh_at(stage, "/World/front/front_pattern").GetFaceVertexIndicesAttr()
     indices.Set(Vt.IntArray(list(indices.Get(1))[::-1]), 2)
     stage.Export(str(tmp_path / "bad.usdc"))
     assert any("interpolated across it" in message for message in validate_usd(tmp_path / "bad.usdc"))
@@ -262,7 +262,7 @@ def test_validation_of_a_file_that_is_not_usd(tmp_path: Path) -> None:
 def test_fractional_frames_hold_across_a_change_of_topology(tmp_path: Path, before: int, after: int) -> None:
     cut_film(tmp_path / "frames.usdc")
     stage = open_stage(tmp_path / "frames.usdc")
-    pattern = mesh_at(stage, "/World/front/pattern")
+    pattern = mesh_at(stage, "/World/front/front_pattern")
 
     def corners(time: float) -> np.ndarray:
         """What is drawn: the corners of each face."""
@@ -274,14 +274,14 @@ def test_fractional_frames_hold_across_a_change_of_topology(tmp_path: Path, befo
     assert np.abs(corners(after) - corners(before)).max() > 0.01
     # Elsewhere frames are blended.
     np.testing.assert_allclose(corners(3.5), 0.5 * (corners(3) + corners(4)), atol=1e-7)
-    lines = stage.GetPrimAtPath("/World/front/pattern_lines/bust_line").GetAttribute("points")
+    lines = stage.GetPrimAtPath("/World/front/front_pattern_lines/bust_line").GetAttribute("points")
     np.testing.assert_array_equal(np.asarray(lines.Get(before + 0.5)), np.asarray(lines.Get(before)))
 
 
 def test_drawn_faces_are_those_given_whatever_the_numbering(tmp_path: Path) -> None:
     faces, cut, _ = cut_film(tmp_path / "frames.usdc")
     stage = open_stage(tmp_path / "frames.usdc")
-    pattern = mesh_at(stage, "/World/front/pattern")
+    pattern = mesh_at(stage, "/World/front/front_pattern")
     for time, size in ((3, 1.0), (4, 1.2), (5, 1.0), (6, 1.3)):
         points = np.asarray(pattern.GetPointsAttr().Get(time))
         drawn = points[np.asarray(pattern.GetFaceVertexIndicesAttr().Get(time))][:, :2]
@@ -294,13 +294,13 @@ def test_lines_follow_the_mesh_and_cuts_show_while_they_exist(tmp_path: Path) ->
     _, cut, crack = cut_film(tmp_path / "frames.usdc")
     stage = open_stage(tmp_path / "frames.usdc")
     shape = dome(9)
-    on_surface = stage.GetPrimAtPath("/World/front/surface_lines/centre_front")
+    on_surface = stage.GetPrimAtPath("/World/front/front_surface_lines/centre_front")
     assert on_surface.GetDisplayName() == "centre front"
     np.testing.assert_allclose(
         np.asarray(on_surface.GetAttribute("points").Get()), shape.vertices[shape.lines["centre front"]], atol=1e-7
     )
     for place in ("surface_cuts", "pattern_cuts"):
-        dart = UsdGeom.BasisCurves(stage.GetPrimAtPath(f"/World/front/{place}/waist_dart"))
+        dart = UsdGeom.BasisCurves(stage.GetPrimAtPath(f"/World/front/front_{place}/waist_dart"))
         seen = [dart.ComputeVisibility(time) for time in (1, 2, 2.5, 3, 4, 5, 5.5, 6)]
         assert seen == ["invisible"] * 3 + ["inherited"] * 4 + ["invisible"]
     counts = list(dart.GetCurveVertexCountsAttr().Get(3))

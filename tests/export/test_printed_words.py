@@ -20,8 +20,11 @@ from warpflat.export.svg import write_svg
 from warpflat.garment.pattern_files import check_names
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.drafted import DraftedGarment
+from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.half_pieces import halved
-from warpflat.pattern.measures import length_words
+from warpflat.pattern.measures import length_words, name_in_units
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.sewing_order import sewing_steps
 from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 
@@ -99,3 +102,46 @@ def test_first_pages_tell_measures_needed_openings_and_what_is_needed(tmp_path: 
                 210,
                 True,
             ]
+
+
+@pytest.mark.parametrize("name", ["knee", "facing knee"])
+@pytest.mark.parametrize("kind", ["hem", "cut"])
+def test_a_lower_edge_is_printed_as_hem_turned_up_or_raw(name: str, kind: str):
+    corners = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, 0.5], [0.0, 0.5]])
+    names = (name, "side right", "neck", "side left")
+    edges = [
+        Edge(name=each, points=corners[[k, (k + 1) % 4]], kind=kind if each == name else "cut")
+        for k, each in enumerate(names)
+    ]
+    (piece,) = draft_garment(Pattern(name="stand", pieces={"": [Piece(name="facing", edges=edges)]})).pieces[""]
+    printed = {words.text for words in draw_piece(piece).words}
+    assert {"hem", "neck"} <= printed
+    assert name not in printed
+
+
+def test_a_nest_says_the_measures_of_every_size(tmp_path: Path):
+    made = sample_dress()
+    (sample,) = made.pieces
+    sizes = [sample, "40", "42", "44", "46", "48"]
+    measures = {
+        size: (Measure(name="bust", body=0.88 + 0.04 * k, finished=0.93 + 0.04 * k),) for k, size in enumerate(sizes)
+    }
+    pieces = {size: [replace(piece, size=size) for piece in made.pieces[sample]] for size in sizes}
+    nest = replace(made, pieces=pieces, worn=Worn(views={}, measures=measures, needed=()))
+    write_pdf(draft_garment(nest), tmp_path / "nest.pdf")
+    said = " ".join(page.extract_text() for page in PdfReader(tmp_path / "nest.pdf").pages)
+    assert "Choose your size" in said
+    for k in range(len(sizes)):
+        assert f"{88 + 4 * k} cm / {93 + 4 * k} cm" in said
+    one = replace(made, worn=Worn(views={}, measures={sample: measures[sample]}, needed=()))
+    write_pdf(draft_garment(one), tmp_path / "one.pdf")
+    assert all("Choose your size" not in page.extract_text() for page in PdfReader(tmp_path / "one.pdf").pages)
+
+
+def test_a_length_in_a_name_has_the_units_of_the_pattern():
+    assert [name_in_units("invisible zip 200 mm", units) for units in ("mm", "cm", "in")] == [
+        "invisible zip 200 mm",
+        "invisible zip 20 cm",
+        "invisible zip 7 7/8 in",
+    ]
+    assert name_in_units("hem 2", "cm") == "hem 2"

@@ -152,7 +152,7 @@ def test_what_was_exported_later_belongs_to_the_run(tmp_path: Path):
 def test_a_mesh_that_the_run_was_made_from_stays(tmp_path: Path):
     run(tmp_path, frames=3)
     tables = {
-        "surface": {"file": "out/frames.usdc", "prim": "/World/cap/surface"},
+        "surface": {"file": "out/frames.usdc", "prim": "/World/cap/cap_surface"},
         "output": {"frames": 0, "picture": False},
         "pattern": {"formats": []},
     }

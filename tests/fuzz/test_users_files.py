@@ -243,7 +243,7 @@ def a_scene_file_and_a_fabric_file() -> Commands:
 def frames_and_the_layers_they_refer_to() -> Commands:
     flatten(make_shape("dome", resolution=5)).save(".", picture=False)
     Path("scene.usda").write_text("#usda 1.0\n(\n metersPerUnit = 1\n subLayers = [@./frames.usdc@]\n)\n")
-    options = ("--prim", "/World/dome/surface", "--out", ".", "--name", "other")
+    options = ("--prim", "/World/dome/dome_surface", "--out", ".", "--name", "other")
     return [("flatten", "frames.usdc", *options), ("flatten", "scene.usda", *options)]
 
 

@@ -26,7 +26,7 @@ def shots_of(film: Path, piece: str) -> dict[int, list[np.ndarray]]:
     stage = Usd.Stage.Open(str(film))
     prim, points = (
         stage.GetPrimAtPath(f"/World/{piece}"),
-        stage.GetPrimAtPath(f"/World/{piece}/pattern").GetAttribute("points"),
+        stage.GetPrimAtPath(f"/World/{piece}/{piece}_pattern").GetAttribute("points"),
     )
     found: dict[Any, list[np.ndarray]] = {}
     for at in range(int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode()) + 1):
@@ -92,7 +92,7 @@ def test_a_compact_film_shows_the_same_in_fewer_bytes(tmp_path: Path) -> None:
     for name in ("all", "compact"):
         film = tmp_path / name / "frames.usdc"
         stage = Usd.Stage.Open(str(film))
-        samples.append(stage.GetPrimAtPath("/World/trial/pattern").GetAttribute("points").GetNumTimeSamples())
+        samples.append(stage.GetPrimAtPath("/World/trial/trial_pattern").GetAttribute("points").GetNumTimeSamples())
         sizes.append(film.stat().st_size)
     assert samples[0] == 60
     assert samples[1] < 20
@@ -127,7 +127,7 @@ def test_a_piece_that_ends_without_strain_has_the_colours_of_its_start(tmp_path:
     }
     run_scene(make_scene(settings, name="trial", folder=tmp_path, where="trial"), tmp_path)
     stage = Usd.Stage.Open(str(tmp_path / "frames.usdc"))
-    pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern"))
+    pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/trial_pattern"))
     scale = pattern.GetDisplayColorAttr().GetCustomData()["rangeMax"]
     density = UsdGeom.PrimvarsAPI(pattern).GetPrimvar("strainEnergyDensity").GetAttr()
     first, last = (np.array(density.Get(at)) for at in (stage.GetStartTimeCode(), stage.GetEndTimeCode()))
@@ -168,9 +168,8 @@ def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
     corners = UsdGeom.BBoxCache(Usd.TimeCode(1), [UsdGeom.Tokens.default_])
     body_box = corners.ComputeWorldBound(shown.GetPrim()).ComputeAlignedRange()
     for piece in json.loads((folder / "metrics.json").read_text())["pieces"]:
-        pattern = film.GetPrimAtPath(f"/World/{piece}/pattern")
+        pattern = film.GetPrimAtPath(f"/World/{piece}/{piece}_pattern")
         assert corners.ComputeWorldBound(pattern).ComputeAlignedRange().GetMin()[0] > body_box.GetMax()[0]
-        assert pattern.GetDisplayName() == f"{piece} pattern"
     line = film.GetPrimAtPath("/World/mannequin/lines").GetChildren()[0]
     assert UsdGeom.Imageable(line).ComputePurpose() == UsdGeom.Tokens.guide
 

@@ -241,7 +241,7 @@ def test_a_run_leaves_the_files_of_the_contract(tmp_path: Path):
     prim = stage.GetPrimAtPath("/World/trial")
     for key in ("model_energy_j", "strain_energy_j", "length_error"):
         assert prim.GetAttribute(f"warpflat:{key}").Get(stage.GetEndTimeCode()) == piece[key]
-    points = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern")).GetPointsAttr()
+    points = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/trial_pattern")).GetPointsAttr()
     texture = [
         [float(x) for x in line.split()[1:]]
         for line in (tmp_path / "out" / "trial.obj").read_text().splitlines()

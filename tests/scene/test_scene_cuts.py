@@ -210,7 +210,7 @@ def test_one_film_tells_the_whole_story(tmp_path: Path):
     film = tmp_path / "frames.usdc"
     assert list(validate_usd(film)) == []
     stage = Usd.Stage.Open(str(film))
-    pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern"))
+    pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/trial_pattern"))
     times = range(int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode()) + 1)
     counts = [len(pattern.GetPointsAttr().Get(time)) for time in times]
     changes = np.flatnonzero(np.diff(counts))
@@ -218,7 +218,7 @@ def test_one_film_tells_the_whole_story(tmp_path: Path):
     assert counts[0] == 17 * 17 < counts[-1]
     assert len(pattern.GetFaceVertexIndicesAttr().GetTimeSamples()) >= 2
     before, after = times[changes[0]], times[changes[0] + 1]
-    root = stage.GetPrimAtPath("/World/trial/pattern_cuts")
+    root = stage.GetPrimAtPath("/World/trial/trial_pattern_cuts")
     (lines,) = [UsdGeom.BasisCurves(prim) for prim in Usd.PrimRange(root) if prim.IsA(UsdGeom.BasisCurves)]
     # The line is drawn before the scissors come: one curve a side, then both sides of each crack.
     assert len(lines.GetCurveVertexCountsAttr().Get(before)) == 2

@@ -6,8 +6,9 @@ import io
 import shutil
 import socket
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -232,5 +233,18 @@ def test_marks_vanish_with_undo_and_the_view_follows_the_size(tmp_path: Path) ->
         assert page.session.can_undo == "size"
         # A measure is bounded in the unit that is shown.
         assert page._panel._measures["waist"].min > 10.0
+        # On a narrow page form and pattern are shown above the panel.
+        for wide, free in ((1280, 1.0), (400, 0.4)):
+            camera = SimpleNamespace(aspect=wide / 900, image_width=wide)
+            buffer = SimpleNamespace(sanctioned_dead_writes=nullcontext)
+            connection = SimpleNamespace(get_message_buffer=lambda buffer=buffer: buffer)
+            page.stage.show_all(
+                SimpleNamespace(client_id=wide, atomic=nullcontext, camera=camera, _websock_connection=connection)
+            )
+            x, y = (0.5 * length * np.array([-1.0, 1.0]) for length in page.stage.size)
+            left, lower = on_screen(camera, (x[0], y[0], 0.0), wide, 900)
+            right, upper = on_screen(camera, (x[1], y[1], 0.0), wide, 900)
+            assert 0.0 < left < right < wide
+            assert 0.0 < upper < lower < 900 * free
     finally:
         page.close()

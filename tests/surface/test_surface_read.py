@@ -455,12 +455,12 @@ def test_a_film_is_read_with_the_lines_of_the_mesh_that_is_chosen(tmp_path):
         # The pattern lies so near to the surface that its lines could be drawn on either.
         flat = shape.vertices[:, :2] * [1.0, 1.01]
         film.write("front", positions=flat, face_energy_density=np.zeros(len(shape.faces)))
-    surface = read_surface(tmp_path / "frames.usdc", prim="/World/front/surface")
+    surface = read_surface(tmp_path / "frames.usdc", prim="/World/front/front_surface")
     assert {name: line.tolist() for name, line in surface.lines.items()} == {
         name: line.tolist() for name, line in shape.lines.items()
     }
     assert surface.notes == ()
-    pattern = read_surface(tmp_path / "frames.usdc", prim="/World/front/pattern")
+    pattern = read_surface(tmp_path / "frames.usdc", prim="/World/front/front_pattern")
     assert set(pattern.lines) == set(shape.lines)
 
 

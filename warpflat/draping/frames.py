@@ -25,6 +25,7 @@ from warpflat.export.usd_prims import (
     define_mesh,
     export_stage,
     last_values_as_defaults,
+    part_path,
     set_face_map,
     set_points,
     usd_errors,
@@ -107,12 +108,12 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         last_values_as_defaults(stage, [cloth.GetPrim()])
         # On the patterns the gap is now that of the worn cloth.
         world = layer.GetPrimAtPath("/World").nameChildren
-        shown = {prim.GetInfo("displayName") or prim.name: prim for prim in world if "pattern" in prim.nameChildren}
+        shown = {prim.GetInfo("displayName") or prim.name: part_path(str(prim.path), "pattern") for prim in world}
         for name in drape.cloth.piece_vertices:
             faces = drape.cloth.flat_faces[drape.cloth.piece_faces[name]]
-            if name in shown:
+            if name in shown and layer.GetPrimAtPath(shown[name]):
                 gaps = corner_mean(drape.gap[drape.cloth.welded], faces)
-                set_face_map(layer, f"{shown[name].path}/pattern", "gap", gaps, unit="m", state="draped")
+                set_face_map(layer, shown[name], "gap", gaps, unit="m", state="draped")
     export_stage(stage, path)
 
 

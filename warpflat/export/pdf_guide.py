@@ -29,6 +29,8 @@ __all__ = ["guide_pages"]
 POINT = 72 / 0.0254
 #: Size of a thumbnail [m], and how many stand in a row at most.
 THUMBNAIL, IN_ROW = (0.026, 0.034), 7
+#: Sizes whose measures stand beside each other at most.
+SIZES_IN_ROW = 5
 #: The pictures of a step: their height and width in all [m], and how many there are at most.
 STEP_HEIGHT, STEP_WIDTH, STEP_PIECES = 0.013, 0.048, 4
 #: Sizes of type [pt] and distance of lines [m].
@@ -104,7 +106,8 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     pieces = printed.pieces[size]
     titles = piece_titles([piece.piece for piece in pieces])
     if whole.garment.worn is not None:
-        _worn(page, whole.garment.worn, size, units)
+        worn = whole.garment.worn
+        _worn(page, worn, size, [each for each in printed.pieces if each in worn.measures], units)
     page.heading(translate("You need"), 3 * LINE)
     page.paragraph(", ".join(notions(whole, size)), indent=0.030, lead=translate("Notions"))
     page.paragraph(tools(whole, size), indent=0.030, lead=translate("Tools"))
@@ -194,8 +197,11 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     page.end()
 
 
-def _worn(page: _Page, worn: Worn, size: str, units: str) -> None:
-    """Draw the garment from the front and the back, with its measures and the openings that it needs beside it."""
+def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) -> None:
+    """Draw the garment from the front and the back, with its measures and the openings that it needs beside it.
+
+    Of several sizes the measures of each stand below, to choose one by.
+    """
     top, high = page.y - 0.012, 0.088
     rings = [ring for row in worn.views.values() for each in row for ring in each.outlines]
     if rings:
@@ -257,6 +263,24 @@ def _worn(page: _Page, worn: Worn, size: str, units: str) -> None:
         page.paragraph(translate("It can be put on: every edge and level passes what of the body goes through it."))
     page.left, page.width = left, page.width + 0.100
     page.y = min(page.y, top - high - 0.006)
+    if len(sizes) > 1 and measures:
+        page.heading(translate("Choose your size: body / finished"), (2 + len(measures)) * LINE)
+        for start in range(0, len(sizes), SIZES_IN_ROW):
+            columns = [{each.name: each for each in worn.measures[one]} for one in sizes[start : start + SIZES_IN_ROW]]
+            rows = [
+                [
+                    translate_name(name),
+                    *(
+                        f"{length_words(each[name].body, units)} / {length_words(each[name].finished, units)}"
+                        if name in each
+                        else ""
+                        for each in columns
+                    ),
+                ]
+                for name in (measure.name for measure in measures)
+            ]
+            heads = ["", *sizes[start : start + SIZES_IN_ROW]]
+            page.table(heads, rows, (0.15, *[0.85 / SIZES_IN_ROW] * len(columns)))
 
 
 def _prices(page: _Page, found: Sequence[FoundSeam], units: str) -> None:

@@ -37,6 +37,7 @@ from warpflat.export.usd_prims import (
     define_energy_mesh,
     define_group,
     last_values_as_defaults,
+    part_path,
     require_usd,
     rows_on_table,
     set_face_map,
@@ -150,7 +151,7 @@ def film_scale(surfaces: Sequence[Surface], densities: Sequence[ArrayLike]) -> f
 class FrameWriter:
     """Streaming writer of `frames.usdc`; used in a ``with`` block.
 
-    ``/World/NAME/surface`` is the piece in space, where it lies in the input. ``/World/NAME/pattern`` is its pattern in
+    ``/World/NAME/NAME_surface`` is the piece in space, where it lies in the input. ``/World/NAME/NAME_pattern`` is its pattern in
     the XY plane, facing +Z; its points are the positions as given, and a translation sets it beside the surfaces
     and the other patterns. Both carry the energy density per face and colours per vertex (linear Rec. 709) on one
     scale for all pieces and all frames, stated in the colours' custom data. The values of the last frame are also
@@ -257,23 +258,20 @@ class FrameWriter:
         width = float(np.clip(0.004 * size, 1e-5, 2e-3))
 
         def group(below: str, colour: tuple[float, float, float]) -> SampledLines:
-            return SampledLines(self._stage, f"{path}/{below}", start=FIRST_FRAME, width=width, colour=colour)
+            return SampledLines(self._stage, part_path(path, below), start=FIRST_FRAME, width=width, colour=colour)
 
         default = Usd.TimeCode.Default()
         triangles, _ = triangulate(surface.faces)
         normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
         on_surface = MeshSamples(
-            define_energy_mesh(self._stage, f"{path}/surface", normals, per_face=False), self._scale
+            define_energy_mesh(self._stage, part_path(path, "surface"), normals, per_face=False), self._scale
         )
         on_surface.write(default, points, surface.faces)
         # Cuts change the number of vertices and never that of faces: one normal per face serves all frames.
         upright = np.tile([0.0, 0.0, 1.0], (len(surface.faces), 1))
         on_pattern = MeshSamples(
-            define_energy_mesh(self._stage, f"{path}/pattern", upright, per_face=True), self._scale
+            define_energy_mesh(self._stage, part_path(path, "pattern"), upright, per_face=True), self._scale
         )
-        # Programs that show names of meshes alone, as Blender does, tell the pieces apart by these.
-        for samples, kind in ((on_surface, "surface"), (on_pattern, "pattern")):
-            samples.mesh.GetPrim().SetDisplayName(f"{name} {kind}")
         lines = polylines_of(surface.lines)
         group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
         colours = VertexColours(surface.faces, face_areas(surface.vertices, surface.faces), len(points))
@@ -294,7 +292,7 @@ class FrameWriter:
 
     def write_map(self, name: str, key: str, values: FloatArray, *, unit: str, state: str) -> None:
         """Write a value per face of a piece's pattern, see :func:`warpflat.export.usd_prims.set_face_map`."""
-        mesh = f"{self._pieces[name].path}/pattern"
+        mesh = part_path(self._pieces[name].path, "pattern")
         set_face_map(self._stage.GetRootLayer(), mesh, key, values, unit=unit, state=state)
 
     def refer_to_body(self, file: str, points: ArrayLike) -> None:

@@ -39,6 +39,7 @@ __all__ = [
     "define_mesh",
     "export_stage",
     "last_values_as_defaults",
+    "part_path",
     "require_usd",
     "rows_on_table",
     "set_face_map",
@@ -108,6 +109,18 @@ def valid_name(name: str, taken: set[str]) -> str:
         result, number = f"{base}_{number}", number + 1
     taken.add(result)
     return result
+
+
+def part_path(piece: str, kind: str) -> str:
+    """Return the path of a part of a film's piece, such as its ``"surface"`` or ``"pattern"``.
+
+    It carries the name of the piece: programs that show names of meshes alone, as Blender does, tell the pieces apart by it.
+
+    Args:
+        piece: path of the piece's group.
+        kind: of the part.
+    """
+    return f"{piece}/{piece.rpartition('/')[2]}_{kind}"
 
 
 def define_group(stage: Any, path: str, *, label: str | None = None, kind: str | None = None) -> Any:

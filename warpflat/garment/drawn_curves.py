@@ -16,8 +16,8 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import turning_angles
 from warpflat.garment.constraints import Constraint, DrawnLine, FixedLength, Straight
-from warpflat.garment.edge_rules import HEMMED_LEVELS
 from warpflat.pattern.fairing import count_inflections, fair_line, fairest_line
+from warpflat.pattern.piece_parts import HEMMED_LEVELS
 
 if TYPE_CHECKING:
     from warpflat.garment.sewn import ConstraintResult

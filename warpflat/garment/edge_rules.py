@@ -8,11 +8,7 @@ from dataclasses import dataclass, field, replace
 from warpflat.core.errors import InputError, nearest
 from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, EDGE_KINDS
 
-__all__ = ["HEMMED_LEVELS", "EdgeRules"]
-
-#: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
-#: skirt, a band or a facing.
-HEMMED_LEVELS = ("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "forearm", "wrist")
+__all__ = ["EdgeRules"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,8 @@ import numpy as np
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import find_unused_name
-from warpflat.garment.edge_rules import HEMMED_LEVELS, EdgeRules
+from warpflat.garment.edge_rules import EdgeRules
+from warpflat.pattern.piece_parts import HEMMED_LEVELS
 from warpflat.pattern.pieces import Seam, SeamSide
 
 if TYPE_CHECKING:

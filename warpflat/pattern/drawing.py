@@ -17,6 +17,8 @@ from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import TAILS, Label, Words, text_width
+from warpflat.pattern.measures import name_in_units
+from warpflat.pattern.piece_parts import HEMMED_LEVELS
 from warpflat.pattern.placement import LabelRoom, Spot, spots_along
 from warpflat.pattern.words import translate, translate_name
 
@@ -308,15 +310,21 @@ def _annotations(
         elif borders and edge.kind != "fold" and edge.name not in second_legs:
             named.append((edge.name, edge.line, "left"))
     named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
-    called, hems = {name for name, _, _ in named}, {edge.name for edge in piece.edges if edge.kind == "hem"}
+    called = {name for name, _, _ in named}
+    hems = {
+        edge.name
+        for edge in piece.edges
+        if edge.kind == "hem" or (edge.kind == "cut" and HEMMED_LEVELS & set(edge.name.split(" ")))
+    }
     drawn = [shapely.LineString(line) for _, line, _ in named]
     for index, (name, line, side) in enumerate(named):
-        # What is turned up is a hem for a sewer, whatever level of the body it lies at; a vent keeps its name.
+        # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; a vent keeps its name.
         kind = (
             "hem" if name in hems and not {"vent", "slit"} & set(name.split(" ")) else name_without_number(name, called)
         )
         # One of a pair is neither left nor right, as in the sewing order.
         text = translate_name(without_side(kind) if piece.piece.is_pair else kind)
+        text = name_in_units(text, piece.piece.units)
         width = text_width(text, NAME)
         if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
             others = [*drawn[:index], *drawn[index + 1 :]]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from math import ceil
 
 from warpflat.pattern.words import translate
 
-__all__ = ["UNITS", "cloth_words", "length_words"]
+__all__ = ["UNITS", "cloth_words", "length_words", "name_in_units"]
 
 #: Units of a pattern's words.
 UNITS = ("mm", "cm", "in")
@@ -39,6 +40,11 @@ def cloth_words(length: float, units: str = "cm", *, of_width: bool = False) -> 
         return f"{round(length / INCH)} in"
     whole, eighths = divmod(ceil(length / YARD * 8 - 1e-9), 8)
     return f"{_with_fraction(whole, eighths, 8)} yd"
+
+
+def name_in_units(name: str, units: str) -> str:
+    """Return the name of a line, such as "invisible zip 200 mm", with the length at its end in the units of a pattern."""
+    return re.sub(r"\b(\d+) mm$", lambda found: length_words(int(found[1]) / 1e3, units), name)
 
 
 def _number(digits: str) -> str:

@@ -12,11 +12,24 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 
-__all__ = ["DEFAULT_ALLOWANCE", "EDGE_KINDS", "FOLD_STRAIGHT", "SAME_POINT", "Dart", "Edge", "Hole", "check_points"]
+__all__ = [
+    "DEFAULT_ALLOWANCE",
+    "EDGE_KINDS",
+    "FOLD_STRAIGHT",
+    "HEMMED_LEVELS",
+    "SAME_POINT",
+    "Dart",
+    "Edge",
+    "Hole",
+    "check_points",
+]
 
 #: Allowance [m] of an edge that names none, by its kind.
 DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
 EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
+#: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
+#: skirt, a band or a facing.
+HEMMED_LEVELS = frozenset(("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "forearm", "wrist"))
 
 #: Ends of neighbouring edges that are closer than this [m] are one corner.
 SAME_POINT = 1e-6

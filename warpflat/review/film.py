@@ -24,6 +24,7 @@ from warpflat.core.sums import weighted_percentile
 from warpflat.core.usd_process import UNREADABLE, read_apart
 from warpflat.export.colours import VertexColours, energy_colours
 from warpflat.export.geometry import face_areas, outline_edges
+from warpflat.export.usd_prims import part_path
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["MAPS", "FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
@@ -64,8 +65,8 @@ class FilmPiece:
         from pxr import UsdGeom
 
         self.stage = stage  # prims live as long as it does
-        self._pattern = UsdGeom.Mesh(stage.GetPrimAtPath(f"{prim.GetPath()}/pattern"))
-        self._surface = UsdGeom.Mesh(stage.GetPrimAtPath(f"{prim.GetPath()}/surface"))
+        self._pattern = UsdGeom.Mesh(stage.GetPrimAtPath(part_path(str(prim.GetPath()), "pattern")))
+        self._surface = UsdGeom.Mesh(stage.GetPrimAtPath(part_path(str(prim.GetPath()), "surface")))
         self.name = prim.GetDisplayName() or prim.GetName()
         self.prim = prim
         self.times = []
@@ -138,7 +139,11 @@ def open_film(path: Path) -> list[FilmPiece]:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
         raise InputError("is not a USD file that can be opened; run the scene again") from error
-    found = [FilmPiece(stage, prim) for prim in stage.GetDefaultPrim().GetChildren() if prim.GetChild("pattern")]
+    found = [
+        FilmPiece(stage, prim)
+        for prim in stage.GetDefaultPrim().GetChildren()
+        if stage.GetPrimAtPath(part_path(str(prim.GetPath()), "pattern"))
+    ]
     return [piece for piece in found if piece.times]
 
 

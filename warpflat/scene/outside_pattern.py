@@ -12,6 +12,7 @@ from pydantic import Field
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
 from warpflat.core.input_files import read_json
+from warpflat.core.text import format_count
 from warpflat.core.toml_file import Table, check_table, read_toml
 from warpflat.mannequin.table import MannequinTable, mannequin_from_table
 from warpflat.scene.load import errors_named, expand_variables
@@ -347,9 +348,9 @@ def drape_outside(
 def _correction_words(found: Correction) -> str:
     """Return in a sentence what a correction has come to."""
     first, last = found.rounds[0].strained, found.rounds[-1].strained
-    rounds = len(found.rounds) - 1
+    rounds = format_count(len(found.rounds) - 1, "round")
     return (
-        f"corrected in {rounds} rounds: {100 * first:.1f} % of the cloth was stretched beyond its limit, now {100 * last:.1f} % "
+        f"corrected in {rounds}: {100 * first:.1f} % of the cloth was stretched beyond its limit, now {100 * last:.1f} % "
         f"({found.reason})"
     )
 

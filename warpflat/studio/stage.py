@@ -32,6 +32,8 @@ _HANDLE = 0.009
 _BEYOND = np.array([0.05, 0.12, 0.12])
 _FOV = 0.35  # radians: a long lens, so that the pattern is hardly foreshortened
 _ROOM = 1.12
+# On pages narrower than this [CSS pixels] viser lays its panel over the lower part, and leaves this share of the height free.
+_NARROW, _FREE = 576, 0.4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -247,7 +249,7 @@ class Stage:
             self._place()
 
     def show_all(self, client: Any, side: float | None = None) -> None:
-        """Move a client's camera so that form and pattern fill its window.
+        """Move a client's camera so that form and pattern fill its window, or what the panel leaves free of it.
 
         Args:
             client: of the server.
@@ -258,15 +260,17 @@ class Stage:
         width, height = self.size
         aspect = client.camera.aspect or 1.5
         half = np.tan(0.5 * _FOV)
-        away = _ROOM * max(0.5 * height / half, 0.5 * width / (half * aspect))
+        free = _FREE if client.camera.image_width < _NARROW else 1.0
+        away = _ROOM * max(0.5 * height / (half * free), 0.5 * width / (half * aspect))
+        low = (free - 1.0) * half * away
         angle = np.radians(side)
         # A page that is closed in this moment is none to be warned of.
         with client.atomic(), client._websock_connection.get_message_buffer().sanctioned_dead_writes():
             client.camera.fov = _FOV
             client.camera.up_direction = (0.0, 1.0, 0.0)
             # Moving a camera moves what it looks at along with it.
-            client.camera.position = (away * np.sin(angle), 0.0, away * np.cos(angle))
-            client.camera.look_at = (0.0, 0.0, 0.0)
+            client.camera.position = (away * np.sin(angle), low, away * np.cos(angle))
+            client.camera.look_at = (0.0, low, 0.0)
 
     @property
     def size(self) -> tuple[float, float]:
