@@ -32,8 +32,9 @@ _HANDLE = 0.009
 _BEYOND = np.array([0.05, 0.12, 0.12])
 _FOV = 0.35  # radians: a long lens, so that the pattern is hardly foreshortened
 _ROOM = 1.12
-# On pages narrower than this [CSS pixels] viser lays its panel over the lower part, and leaves this share of the height free.
-_NARROW, _FREE = 576, 0.4
+# On a telephone's upright page, narrower than this [CSS pixels], viser lays its panel over the lower part, and leaves this share of the
+# height free.
+_NARROW, _UPRIGHT, _FREE = 480, 0.7, 0.4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -260,7 +261,7 @@ class Stage:
         width, height = self.size
         aspect = client.camera.aspect or 1.5
         half = np.tan(0.5 * _FOV)
-        free = _FREE if client.camera.image_width < _NARROW else 1.0
+        free = _FREE if client.camera.image_width < _NARROW and aspect < _UPRIGHT else 1.0
         away = _ROOM * max(0.5 * height / (half * free), 0.5 * width / (half * aspect))
         low = (free - 1.0) * half * away
         angle = np.radians(side)
