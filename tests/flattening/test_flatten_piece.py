@@ -415,7 +415,7 @@ def test_save_leaves_the_files_of_the_contract_and_they_read_back(tmp_path: Path
     assert np.array_equal(corners[:, :, 1], piece.faces)
 
     stage = Usd.Stage.Open(str(tmp_path / "out" / "frames.usdc"))
-    pattern = next(p for p in stage.Traverse() if p.IsA(UsdGeom.Mesh) and p.GetName() == "pattern")
+    pattern = next(p for p in stage.Traverse() if p.IsA(UsdGeom.Mesh) and p.GetName() == "hemisphere_pattern")
     last = Usd.TimeCode(stage.GetEndTimeCode())
     points = np.array(UsdGeom.Mesh(pattern).GetPointsAttr().Get(last))
     flat = piece.positions
