@@ -23,5 +23,6 @@ def test_eased_seams_that_push_each_other_settle_in_a_few_rounds(seed: int) -> N
         if equations.violation(residuals) <= 1.0:
             break
         rounds += 1
-        assert rounds < 10
+        # Four in which each is corrected alone, and those of Broyden's method.
+        assert rounds < 14
         offset = offset + correction(residuals)

@@ -45,6 +45,8 @@ _SHARED = 1.0
 _EASED = 0.3
 # The part of an offset by which the residual of such a group is expected to fall, at first, and at least.
 _RESPONSE, _LEAST_RESPONSE = 0.3, 0.1
+# The rounds in which every group is corrected alone: most garments need no more, and end as they did before.
+_ALONE = 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +93,8 @@ class ConstraintEquations:
 class Correction:
     """The growth of the offsets from round to round (augmented Lagrangian).
 
-    An equation's offset grows by its residual. Those of equations that hold together grow by a step of Broyden's method (1965):
+    An equation's offset grows by its residual. That of equations that hold together grows by their mean residual over its
+    response to the last growth (secant method); where that does not settle within some rounds, by a step of Broyden's method (1965):
     seams of one piece push each other, so that none has a response of its own.
     """
 
@@ -101,6 +104,7 @@ class Correction:
         # By how much the mean residuals of the groups change with their offsets.
         self._response = -_RESPONSE * np.eye(int((self._weight > 0).sum()))
         self._last: tuple[FloatArray, FloatArray] | None = None
+        self._rounds = 0
 
     def __call__(self, residuals: FloatArray) -> FloatArray:
         """Return by how much the offsets grow (#P [m])."""
@@ -110,8 +114,14 @@ class Correction:
             mean = equations.group_sums(residuals)[own] / self._weight[own]
             if self._last is not None:
                 before, step = self._last
-                missed = mean - before - self._response @ step
-                self._response += np.outer(missed, step) / max(float(step @ step), 1e-300)
+                if self._rounds < _ALONE:
+                    response = np.full(len(mean), _RESPONSE)
+                    np.divide(before - mean, step, out=response, where=np.abs(step) > 1e-9)
+                    self._response = -np.diag(np.clip(response, _LEAST_RESPONSE, 1.0))
+                else:
+                    missed = mean - before - self._response @ step
+                    self._response += np.outer(missed, step) / max(float(step @ step), 1e-300)
+            self._rounds += 1
             most = float(np.abs(mean).max()) / _LEAST_RESPONSE
             step = np.clip(np.linalg.lstsq(-self._response, mean, rcond=1e-3)[0], -most, most)
             self._last = mean, step

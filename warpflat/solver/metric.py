@@ -289,7 +289,9 @@ def _cell_rows(network: SpringNetwork, positions: FloatArray) -> list[csr_array]
         # F e changes by -F u (grad w . e) where a corner moves by u, w its weight.
         deformation = cells.edges[acts] @ gradient[acts]
         of_corner = np.column_stack([share.sum(axis=1), -share])
-        root = np.sqrt(stiffness * 0.5 * det[acts])
+        # Of a face of no size that is a NaN, which no factor takes.
+        with np.errstate(invalid="ignore"):
+            root = np.sqrt(stiffness * 0.5 * det[acts])
         unit = worn[acts] / stretch[:, None]
         excess = np.sqrt(1.0 - (1.0 + onset[acts]) / stretch)
         for direction, size in ((unit, root), (_turned(unit), root * excess)):
