@@ -22,6 +22,8 @@ _SWIRLS = (-3.0, -1.5, -0.1, 0.1, 1.5, 3.0)
 # Pieces of more vertices are not: that takes six times as long as contact alone. Nor does contact start again where it has not come to
 # rest.
 _MOST_SWIRLED = 10_000
+# Nor are pieces that contact strains by less than this: a part of a circle lies flat almost without energy, and any share of that is little.
+_IMPERCEPTIBLE = 1e-3
 
 
 def keep_apart(
@@ -57,7 +59,8 @@ def keep_apart(
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
         if outcome is not None and outcome.converged:
             before = relaxed.model_energy_j
-            costly = outcome.energies.potential > (1.0 + task.options.contact_share) * before
+            least = max(task.options.contact_share * before, state.energy_of_strain(_IMPERCEPTIBLE))
+            costly = outcome.energies.potential > before + least
             if costly and len(surface.vertices) <= _MOST_SWIRLED:
                 # Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be
                 # wound up or unwound.

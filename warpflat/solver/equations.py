@@ -18,7 +18,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier
-from warpflat.solver.energy import Energy, Point
+from warpflat.solver.energy import Energy
 from warpflat.solver.grain import align_grain
 from warpflat.solver.metric import Metric, StiffnessFactor
 from warpflat.solver.minimise import Cloth, Descent
@@ -110,11 +110,17 @@ def relax_under_equations(
     problem = Cloth(Energy(state, Barrier.of(network, gap) if gap else None), metric)
     descent = Descent(problem, problem.at(state.positions()))
     factored_at = 0
+
+    def is_at_rest(share: float) -> bool:
+        # Pieces that lie flat without strain, as those of a bag, have no energy of which to take a share.
+        energy = descent.point.energy
+        return energy <= state.negligible_energy or descent.release <= share * options.residual_tolerance**2 * energy
+
     while True:
         most = min(_STEPS_PER_ROUND, options.max_steps - state.steps) + descent.iterations
         before = descent.iterations
         share = _FAR_FROM_HOLDING if not violations or violations[-1] > 1.0 else _NEGLIGIBLE_RELEASE
-        while descent.iterations < most and descent.step() and not _is_at_rest(descent, options, share):
+        while descent.iterations < most and descent.step() and not is_at_rest(share):
             pass
         state.steps += descent.iterations - before
         state.work_units = work_before + descent.work_units
@@ -124,7 +130,7 @@ def relax_under_equations(
         on_round(residuals)
         state.evaluate_at_rest()
         status = state.check_convergence(1.0)
-        at_rest = status.at_rest or _is_at_rest(descent, options, _NEGLIGIBLE_RELEASE)
+        at_rest = status.at_rest or is_at_rest(_NEGLIGIBLE_RELEASE)
         state.status = replace(status, at_rest=at_rest)
         # Twice, since within the tolerances of the equations the energy may still change.
         done = at_rest and (network.seams is None or (len(violations) > 1 and max(violations[-2:]) <= 1.0))
@@ -144,10 +150,6 @@ def relax_under_equations(
             problem.metric = _stiffness_metric(state)
             factored_at = descent.iterations
         descent.renew(forget=is_stale)
-
-
-def _is_at_rest(descent: Descent[Point], options: RelaxOptions, share: float) -> bool:
-    return descent.release <= share * options.residual_tolerance**2 * descent.point.energy
 
 
 def _relax_by_steps(
