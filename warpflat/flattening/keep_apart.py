@@ -22,7 +22,7 @@ _SWIRLS = (-3.0, -1.5, -0.1, 0.1, 1.5, 3.0)
 # Pieces of more vertices are not: that takes six times as long as contact alone. Nor does contact start again where it has not come to
 # rest.
 _MOST_SWIRLED = 10_000
-# Nor are pieces that contact strains by less than this: a part of a circle lies flat almost without energy, and any share of that is little.
+# Nor are pieces that contact strains by less than this: a part of a circle lies flat almost without energy.
 _IMPERCEPTIBLE = 1e-3
 
 

@@ -322,13 +322,13 @@ def _part(
 def _relax(state: Relaxation, equations: ConstraintEquations, gap: float = 0.0) -> ConstrainedOutcome:
     """Relax until all is at rest and the equations hold; with contact, if a gap is given [m]."""
     report_activity("sewing")
-    corrected, correction = equations.soft == 0, Correction(equations)
+    corrected = equations.soft == 0
 
     def on_round(residuals: FloatArray) -> None:
         farthest = np.abs(residuals[corrected]).max(initial=0.0)
         report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
 
-    return relax_under_equations(state, correction, equations.violation, on_round=on_round, gap=gap)
+    return relax_under_equations(state, Correction(equations), equations.violation, on_round=on_round, gap=gap)
 
 
 def _constraint_results(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -43,10 +43,8 @@ WAVE, SMOOTH = 0.04, 0.3
 _SHARED = 1.0
 # Stiffness of the edges of a seam that is eased, over the stiffer thread's.
 _EASED = 0.3
-# The part of an offset by which the residual of such a group is expected to fall, at first, and at least.
-_RESPONSE, _LEAST_RESPONSE = 0.3, 0.1
-# The rounds in which every group is corrected alone: most garments need no more, and end as they did before.
-_ALONE = 4
+# The part of an offset by which the mean residual of equations that hold together falls, where the cloth's stiffness is not factored.
+_RESPONSE = 0.3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,45 +88,42 @@ class ConstraintEquations:
         return float(max(own.max(initial=0.0), sums.max(initial=0.0)))
 
 
+Response = Callable[[FloatArray], FloatArray]
+"""Returns by how much residuals change where offsets grow by given lengths, each #P [m]."""
+
+
 class Correction:
     """The growth of the offsets from round to round (augmented Lagrangian).
 
-    An equation's offset grows by its residual. That of equations that hold together grows by their mean residual over its
-    response to the last growth (secant method); where that does not settle within some rounds, by a step of Broyden's method (1965):
-    seams of one piece push each other, so that none has a response of its own.
+    An equation's offset grows by its residual. Those of equations that hold together grow alike, by so much that all their sums would be
+    zero by the cloth's stiffness (Newton's method: seams of one piece push each other). A row that is pressed gives way by
+    waving, which that stiffness does not know: where the sums have come to miss by more, all later steps are half as long. Without the
+    stiffness each is corrected alone.
     """
 
     def __init__(self, equations: ConstraintEquations) -> None:
         self._equations = equations
-        self._weight = np.bincount(equations.group, equations.share, minlength=len(equations.sum_tolerance))
-        # By how much the mean residuals of the groups change with their offsets.
-        self._response = -_RESPONSE * np.eye(int((self._weight > 0).sum()))
-        self._last: tuple[FloatArray, FloatArray] | None = None
-        self._rounds = 0
+        self._fraction, self._missed = 1.0, np.inf
 
-    def __call__(self, residuals: FloatArray) -> FloatArray:
+    def __call__(self, residuals: FloatArray, respond: Response | None = None) -> FloatArray:
         """Return by how much the offsets grow (#P [m])."""
-        equations, own = self._equations, self._weight > 0
-        change = np.where(equations.soft > 0, 0.0, residuals)
-        if own.any():
-            mean = equations.group_sums(residuals)[own] / self._weight[own]
-            if self._last is not None:
-                before, step = self._last
-                if self._rounds < _ALONE:
-                    response = np.full(len(mean), _RESPONSE)
-                    np.divide(before - mean, step, out=response, where=np.abs(step) > 1e-9)
-                    self._response = -np.diag(np.clip(response, _LEAST_RESPONSE, 1.0))
-                else:
-                    missed = mean - before - self._response @ step
-                    self._response += np.outer(missed, step) / max(float(step @ step), 1e-300)
-            self._rounds += 1
-            most = float(np.abs(mean).max()) / _LEAST_RESPONSE
-            step = np.clip(np.linalg.lstsq(-self._response, mean, rcond=1e-3)[0], -most, most)
-            self._last = mean, step
-            grown = np.zeros(len(own))
-            grown[own] = step
-            change = np.where(equations.share > 0, grown[equations.group], change)
-        return change
+        equations = self._equations
+        grown, joint = np.where(equations.soft > 0, 0.0, residuals), equations.share > 0
+        if joint.any():
+            groups, of = np.unique(equations.group[joint], return_inverse=True)
+            sums = equations.group_sums(residuals)[groups]
+            response = -_RESPONSE * np.diag(np.bincount(of, equations.share[joint]))
+            if respond is not None:
+                for number in range(len(groups)):
+                    unit = np.zeros(len(equations))
+                    unit[np.flatnonzero(joint)[of == number]] = 1.0
+                    response[:, number] = equations.group_sums(respond(unit))[groups]
+            missed = float((np.abs(sums) / equations.sum_tolerance[groups]).max())
+            if missed > self._missed:
+                self._fraction *= 0.5
+            self._missed = missed
+            grown[joint] = self._fraction * np.linalg.lstsq(response, -sums, rcond=1e-6)[0][of]
+        return grown
 
 
 def one_group(*equations: ConstraintEquations) -> ConstraintEquations:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier
 from warpflat.solver.energy import Energy
 from warpflat.solver.grain import align_grain
-from warpflat.solver.metric import Metric, StiffnessFactor
+from warpflat.solver.metric import Metric, Solve, StiffnessFactor, equation_rows
 from warpflat.solver.minimise import Cloth, Descent
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation, relax_by_steps, take_first_steps
@@ -29,10 +30,8 @@ from warpflat.solver.stop import Outcome
 __all__ = ["ConstrainedOutcome", "factor_pays", "relax_under_equations"]
 
 # A round ends when by the metric the next step could release at most this times the squared residual tolerance, as a share of the energy,
-# or after so many steps.
-_NEGLIGIBLE_RELEASE = 0.05
-# Four times as much before the equations hold: what is left then goes with the next offsets (a princess dress: 149 steps for 205).
-_FAR_FROM_HOLDING = 0.2
+# or after so many steps. With more left, the sums of eased seams move by more than the offsets correct (0.2: a dress bounced).
+_NEGLIGIBLE_RELEASE = 0.02
 _STEPS_PER_ROUND = 200
 _MOST_ROUNDS = 50
 # Rounds over which the violation must come down, or the equations contradict each other.
@@ -45,6 +44,9 @@ _MOST_VERTICES = 100_000
 # to rest before the offsets grow or only begun to. After every few rounds the next ones become a quarter longer: offsets that follow cloth
 # that still swings keep it swinging.
 _PAPER_STEPS_PER_ROUND, _ROUNDS_UNTIL_LONGER, _PAPER_PATIENCE = 40, 5, 20
+
+
+Correction = Callable[[FloatArray, Callable[[FloatArray], FloatArray] | None], FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +78,7 @@ def _stiffness_metric(state: Relaxation) -> Metric:
 
 def relax_under_equations(
     state: Relaxation,
-    correction: Callable[[FloatArray], FloatArray] = lambda residuals: residuals,
+    correction: Correction = lambda residuals, _: residuals,
     violation: Callable[[FloatArray], float] = lambda residuals: 0.0,
     *,
     on_round: Callable[[FloatArray], None] = lambda residuals: None,
@@ -86,7 +88,8 @@ def relax_under_equations(
 
     Args:
         state: where to start, no cell mirrored; holds the relaxed layout afterwards.
-        correction: of residuals (#P [m]), by how much the offsets grow.
+        correction: of residuals (#P [m]), by how much the offsets grow; it may ask by how much residuals then change, by the metric,
+            where that has been factored.
         violation: of residuals (#P [m]), the largest over its tolerance: up to 1 all equations hold.
         on_round: called after each round with the residuals.
         gap: with contact between stretches of a piece's border, the distance below which it acts [m]; then no piece may lie over
@@ -111,16 +114,16 @@ def relax_under_equations(
     descent = Descent(problem, problem.at(state.positions()))
     factored_at = 0
 
-    def is_at_rest(share: float) -> bool:
+    def is_at_rest() -> bool:
         # Pieces that lie flat without strain, as those of a bag, have no energy of which to take a share.
         energy = descent.point.energy
-        return energy <= state.negligible_energy or descent.release <= share * options.residual_tolerance**2 * energy
+        least = _NEGLIGIBLE_RELEASE * options.residual_tolerance**2 * energy
+        return energy <= state.negligible_energy or descent.release <= least
 
     while True:
         most = min(_STEPS_PER_ROUND, options.max_steps - state.steps) + descent.iterations
         before = descent.iterations
-        share = _FAR_FROM_HOLDING if not violations or violations[-1] > 1.0 else _NEGLIGIBLE_RELEASE
-        while descent.iterations < most and descent.step() and not is_at_rest(share):
+        while descent.iterations < most and descent.step() and not is_at_rest():
             pass
         state.steps += descent.iterations - before
         state.work_units = work_before + descent.work_units
@@ -130,7 +133,7 @@ def relax_under_equations(
         on_round(residuals)
         state.evaluate_at_rest()
         status = state.check_convergence(1.0)
-        at_rest = status.at_rest or is_at_rest(_NEGLIGIBLE_RELEASE)
+        at_rest = status.at_rest or is_at_rest()
         state.status = replace(status, at_rest=at_rest)
         # Twice, since within the tolerances of the equations the energy may still change.
         done = at_rest and (network.seams is None or (len(violations) > 1 and max(violations[-2:]) <= 1.0))
@@ -144,7 +147,10 @@ def relax_under_equations(
                 contradictory=contradictory,
             )
         if network.seams is not None:
-            network.seams.offset.assign(network.seams.offset.numpy() + correction(residuals))
+            grown = correction(
+                residuals, partial(_respond, network, descent.point.positions, problem.solver(descent.point))
+            )
+            network.seams.offset.assign(network.seams.offset.numpy() + grown)
         is_stale = descent.iterations - factored_at > _STEPS_PER_FACTOR
         if is_stale:
             problem.metric = _stiffness_metric(state)
@@ -152,9 +158,18 @@ def relax_under_equations(
         descent.renew(forget=is_stale)
 
 
+def _respond(network: SpringNetwork, positions: FloatArray, solve: Solve, growth: FloatArray) -> FloatArray:
+    """Return by how much residuals change, by a metric, where offsets grow by given lengths, each #P [m]."""
+    assert network.seams is not None
+    root = np.sqrt(network.seams.stiffness.numpy())
+    rows = equation_rows(network, positions)
+    moved = -solve((rows.T @ (root * growth)).reshape(-1, 2))
+    return np.divide(rows @ moved.ravel(), root, out=np.zeros(len(root)), where=root > 0.0)
+
+
 def _relax_by_steps(
     state: Relaxation,
-    correction: Callable[[FloatArray], FloatArray],
+    correction: Correction,
     violation: Callable[[FloatArray], float],
     on_round: Callable[[FloatArray], None],
 ) -> ConstrainedOutcome:
@@ -180,7 +195,7 @@ def _relax_by_steps(
             return ConstrainedOutcome(
                 outcome=outcome, residuals=residuals, satisfied=satisfied, contradictory=contradictory
             )
-        seams.offset.assign(seams.offset.numpy() + correction(residuals))
+        seams.offset.assign(seams.offset.numpy() + correction(residuals, None))
 
 
 def _stagnates(violations: Sequence[float], patience: int) -> bool:
