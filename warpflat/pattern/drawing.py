@@ -42,6 +42,8 @@ CLEAR, WELL_CLEAR, LETTER_CLEAR = 0.0004, 0.006, 0.001
 LETTER, LETTER_GAP = 0.0026, 0.0012
 #: What lies closer [m] to a fold lies on it.
 ON_FOLD = 1e-5
+#: No words stand so far beyond a fold [m].
+BEYOND_FOLD = 0.02
 #: Radius [m] of the circle around a drill hole.
 DRILL = 0.002
 
@@ -300,6 +302,42 @@ def _annotations(
             words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
         return spot is not None
 
+    for fold in piece.fold_edges:
+        # A line beside the fold whose two arms point to it, with words along it.
+        start, span = fold.line[0], fold.line[-1] - fold.line[0]
+        length = float(np.linalg.norm(span))
+        inwards = np.array([-span[1], span[0]]) / length
+        depth = min(BRACKET, length / 4)
+        a, b = start + 0.15 * span, start + 0.85 * span
+        points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
+        bracket = [
+            Stroke(role="grain", name="", points=points),
+            _arrow(a, -inwards, "grain"),
+            _arrow(b, -inwards, "grain"),
+        ]
+        strokes += bracket
+        angle = float(np.arctan2(span[1], span[0]))
+        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
+            angle += np.pi
+        places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
+        inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
+        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
+        # Other words keep off the bracket, and inside the half that is printed.
+        for stroke in bracket:
+            room.take(shapely.LineString(stroke.points))
+        if paper is not None:
+            run = BEYOND_FOLD * span / length
+            room.take(
+                shapely.Polygon(
+                    [
+                        start - run,
+                        start - run - BEYOND_FOLD * inwards,
+                        fold.line[-1] + run - BEYOND_FOLD * inwards,
+                        fold.line[-1] + run,
+                    ]
+                )
+            )
+
     # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
     first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
     second_legs = {dart.dart.right for dart in piece.darts}
@@ -372,25 +410,6 @@ def _annotations(
             ]
             beside = [Spot(x=float(x), y=float(y)) for x, y in places]
             write(letter, LETTER, beside, bold=True, enough=LETTER_CLEAR)
-    for fold in piece.fold_edges:
-        # A line beside the fold whose two arms point to it, with words along it.
-        start, span = fold.line[0], fold.line[-1] - fold.line[0]
-        length = float(np.linalg.norm(span))
-        inwards = np.array([-span[1], span[0]]) / length
-        depth = min(BRACKET, length / 4)
-        a, b = start + 0.15 * span, start + 0.85 * span
-        points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
-        strokes += [
-            Stroke(role="grain", name="", points=points),
-            _arrow(a, -inwards, "grain"),
-            _arrow(b, -inwards, "grain"),
-        ]
-        angle = float(np.arctan2(span[1], span[0]))
-        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
-            angle += np.pi
-        places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
-        inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
-        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
     return strokes, words
 
 
