@@ -378,11 +378,13 @@ def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     """Write how much cloth each size takes at the usual widths."""
     page.heading(translate("Cloth needed"), 3 * LINE)
     head = ["", *(translate("{width} wide", width=cloth_words(width, units, of_width=True)) for width in WIDTHS)]
+    needed = cloth_needed(whole)
+    fabrics = dict.fromkeys(fabric for cloths in needed.values() for fabric in cloths)
     rows = []
-    for size, cloths in cloth_needed(whole).items():
-        for fabric, lengths in cloths.items():
-            words = [translate("too narrow") if length is None else cloth_words(length, units) for length in lengths]
-            rows.append([", ".join(part for part in (fabric, printed_size(size) if size else "") if part), *words])
+    for fabric, size in ((fabric, size) for fabric in fabrics for size in needed if fabric in needed[size]):
+        lengths = needed[size][fabric]
+        words = [translate("too narrow") if length is None else cloth_words(length, units) for length in lengths]
+        rows.append([", ".join(part for part in (fabric, printed_size(size) if size else "") if part), *words])
     page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
     page.paragraph(
         translate("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")

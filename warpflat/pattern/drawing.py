@@ -34,6 +34,8 @@ ARROW, BARB = 0.006, 0.002
 BRACKET = 0.014
 #: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
 NAME, NAME_GAP = 0.0024, 0.0028
+#: On an edge of a nest that is no longer than this [m] the sizes stand once.
+SHORT_EDGE = 0.15
 #: Where along its line a name stands, in order of preference.
 NAME_SHARES = (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5)
 #: Least distance [m] of words from all else; that at which no better place is sought, for names and for letters.
@@ -117,6 +119,7 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
 
     drawings = []
     middle = len(pieces) // 2
+    longest = max(pieces, key=lambda piece: sum(polyline_length(edge.line) for edge in piece.fold_edges))
 
     def shift_across(name: str) -> float:
         middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
@@ -140,6 +143,9 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             *(replace(line, hidden=True) for line in _cutout_sew_strokes(piece)),
             *_detail_strokes(piece),
         ]
+        if piece is not longest:
+            # Dashes of several sizes upon each other would be a full line.
+            strokes = [replace(line, hidden=True) if line.role == "fold" else line for line in strokes]
         words: list[Words] = []
         if index == middle:
             label = nest_label(pieces)
@@ -152,14 +158,18 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
                     text = all_sizes[0].upper() + all_sizes[1:]
                     height = row.height * min(1.0, label.width / text_width(text, row.height))
                     rows[number] = replace(row, text=text, height=height)
-            more, words = _annotations(piece, label, rows, paper, borders=False)
+            others = [stroke for other in pieces if other is not piece for stroke in _detail_strokes(other)]
+            slits = [shapely.LineString(stroke.points) for stroke in others if stroke.role == "notch"]
+            more, words = _annotations(piece, label, rows, paper, borders=False, slits=slits)
             strokes += more
         if edge:
             # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
             ring = shapely.LinearRing(piece.cut_line)
             joints = shapely.MultiLineString([] if paper is None else [joint.tolist() for joint in paper.joints])
-            for start in (0.08, 0.62):
-                at_first = start + 0.3 * (index + 0.5) / len(pieces)
+            # Twice on a long edge.
+            rows_of_tags = ((0.08, 0.3), (0.62, 0.3)) if piece.edge(edge).length > SHORT_EDGE else ((0.05, 0.9),)
+            for start, along in rows_of_tags:
+                at_first = start + along * (index + 0.5) / len(pieces)
                 tags = []
                 # A little to either side, more and more, where a joint of two sheets would cut it.
                 for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
@@ -255,7 +265,13 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
 
 
 def _annotations(
-    piece: DraftedPiece, label: Label, rows: Sequence[Words], paper: OnPaper | None, *, borders: bool = True
+    piece: DraftedPiece,
+    label: Label,
+    rows: Sequence[Words],
+    paper: OnPaper | None,
+    *,
+    borders: bool = True,
+    slits: Sequence[Geometry] = (),
 ) -> tuple[list[Stroke], list[Words]]:
     """Draw grain, internal lines, leader and brackets of folds, and place all words of a piece so that they keep clear of each other.
 
@@ -268,6 +284,7 @@ def _annotations(
         rows: what the label says, at its place.
         paper: where it is printed; None writes no letters.
         borders: whether edges have names.
+        slits: notches of other sizes, which letters keep off.
     """
     import shapely
 
@@ -409,7 +426,7 @@ def _annotations(
                 for sign, out in zip((1.0, -1.0), aside, strict=True)
             ]
             beside = [Spot(x=float(x), y=float(y)) for x, y in places]
-            write(letter, LETTER, beside, bold=True, enough=LETTER_CLEAR)
+            write(letter, LETTER, beside, bold=True, avoid=slits, enough=LETTER_CLEAR)
     return strokes, words
 
 
