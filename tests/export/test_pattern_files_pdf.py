@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,10 +16,11 @@ from pypdf import PdfReader
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
-from warpflat.export.pdf import PAPERS, write_pdf
+from warpflat.export.pdf import PAPERS, draw_sheet, write_pdf
 from warpflat.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece
 
@@ -230,6 +233,26 @@ def test_names_on_the_first_page_stay_on_it_and_on_their_pieces(tmp_path):
     assert "waistband" in below
     assert "tab" not in below
     assert "1" in below, "its number in the list"
+
+
+def test_a_sheet_shows_words_whole_or_not_at_all(dress, tmp_path):
+    path = tmp_path / "tiled.pdf"
+    tiling = write_pdf(dress, path, sizes=["38"])
+    _, drawings = draw_sheet(halved(replace(dress, pieces={"38": dress.pieces["38"]})), "A4")
+    inner = np.array([tiling.paper.width, tiling.paper.height]) - 2 * tiling.paper.margin
+    pages = PdfReader(path).pages[first_pages(path, tiling) :]
+    shown = ["".join(page.extract_text().split()) for page in pages]
+    texts = Counter(words.text for row in drawings for words in row[0].words)
+    for placed, row in zip(tiling.sheet.placed, drawings, strict=True):
+        for words in row[0].words:
+            low, high = (f(placed.on_sheet(words.box()), axis=0) for f in (np.min, np.max))
+            corners = {tile: tiling.corner(*tile) for tile in tiling.tiles}
+            shows = [tile for tile, c in corners.items() if (low >= c).all() and (high <= c + inner).all()]
+            assert shows, f"{words.text} is whole on no sheet"
+            # A reader finds all letters of a form, seen or not.
+            if sum(words.text in text for text in texts.elements()) == 1 and len(words.text) > 6:
+                found = ["".join(words.text.split()) in text for text in shown]
+                assert found == [tile in shows for tile in tiling.tiles]
 
 
 def test_unknown_paper_is_refused(dress, tmp_path):

@@ -13,7 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.export.svg import write_marker_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.layout import lay_out, nests
-from warpflat.pattern.marker import Cloth, make_marker, unfold_piece
+from warpflat.pattern.marker import Cloth, cloth_needed, make_marker, unfold_piece
 from warpflat.pattern.piece_parts import Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece
 
@@ -145,3 +145,26 @@ def test_the_sheet_keeps_pieces_apart_and_sizes_together(dress):
     assert sheet.size[0] <= 1.0 + 1e-9
     assert all([p.size for p in placed.pieces] == ["36", "38"] for placed in sheet.placed)
     assert all(shapely.box(0, 0, *sheet.size).contains(box) for box in boxes)
+
+
+@pytest.mark.parametrize(("width", "length", "needed"), [(1.05, 1.0, 1.20), (1.05, 0.9, 1.25)])
+def test_a_size_that_lies_within_a_larger_one_needs_no_more_cloth(
+    monkeypatch: pytest.MonkeyPatch, width: float, length: float, needed: float
+):
+    """The lay of a size is searched for by itself, and that of a larger one may turn out shorter."""
+    corners = np.array([[0.0, 0.0], [0.5, 0.0], [0.4, 0.8], [0.1, 0.8], [0.0, 0.0]])
+    sizes = {"38": np.array([1.0, 1.0]), "42": np.array([width, length])}
+    pieces = {
+        size: [
+            Piece(
+                name="front",
+                size=size,
+                edges=[Edge(name=f"edge_{k}", points=grown * corners[k : k + 2], kind="seam") for k in range(4)],
+            )
+        ]
+        for size, grown in sizes.items()
+    }
+    found = iter([1.25, 1.25, None, 1.20, 1.20, 1.30])
+    monkeypatch.setattr("warpflat.pattern.marker.nest_on_strip", lambda *_, **__: next(found))
+    cloth = cloth_needed(draft_garment(Pattern(name="dress", pieces=pieces)))
+    assert cloth == {"38": {"": (needed, needed, 1.30 if needed == 1.20 else None)}, "42": {"": (1.20, 1.20, 1.30)}}

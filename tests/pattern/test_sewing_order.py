@@ -84,7 +84,7 @@ def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
             "at the zip": "At the zip, turn in the edges and sew them to its tape by hand: back right neck right facing",
             "ends": "Join the ends of bands and bindings",
             "baste": "Baste the lining to the shell, wrong sides together: armhole.",
-            "bind": "Sew bands and bindings to their edges",
+            "bind": "Sew the bindings on, fold them over the raw edges and sew them down inside, notch to notch",
             "hems": "Turn up and sew the hems: 3 cm (front, back right, back left)",
         }.items()
     }
@@ -175,8 +175,8 @@ def test_nothing_ends_at_a_zip_that_is_not_there():
         (
             (ZIP,),
             [
-                "Sew the invisible zip of 30 cm to both edges of A (side left: front to back), from the upper edge down to its "
-                "notch, then close the seam below it.",
+                "Sew the invisible zip of 30 cm to both edges of A (side left: front to back), from the upper edge down to the end "
+                "of its line, then close the seam below it.",
                 "Sew the side seams, notch to notch: A (side right: front to back).",
             ],
         ),
@@ -200,3 +200,45 @@ def test_a_waistband_above_a_zip_has_a_hook():
     band = Finishing(kind="waistband", edge="neck", width=0.03)
     assert "1 hook and bar" in notions(draft_garment(finish_edges(top(ZIP), [band], gaps=["centre back"])), "")
     assert "1 hook and bar" not in notions(draft_garment(finish_edges(top(), [band])), "")
+
+
+@pytest.mark.parametrize(
+    ("kind", "share", "expected"),
+    [
+        ("band", 0.85, "Fold the bands lengthwise, wrong sides together, and sew both their edges on"),
+        ("binding", 1.0, "Sew the bindings on, fold them over the raw edges and sew them down inside"),
+        ("ruffle", 1.5, "Hem the free edges of ruffles, and sew the ruffles on"),
+    ],
+)
+def test_each_strip_is_sewn_on_as_its_kind_is(kind: str, share: float, expected: str):
+    finishing = Finishing(kind=kind, edge="neck", width=0.03, share=share)
+    drafted = draft_garment(finish_edges(top(), [finishing]))
+    steps = [step.words for step in sewing_steps(drafted, "")]
+    assert sum(step.startswith(f"{expected}, notch to notch: ") for step in steps) == 1
+    with printed_in(language_words("de")):
+        assert not any(expected in step.words for step in sewing_steps(drafted, ""))
+
+
+def test_a_waistband_has_ends_only_above_an_opening():
+    band = Finishing(kind="waistband", edge="neck", width=0.03)
+    for openings, gaps, ends in (((ZIP,), ["centre back"], True), ((), [], False)):
+        steps = sewing_steps(draft_garment(finish_edges(top(*openings), [band], gaps=gaps)), "")
+        (step,) = [step.words for step in steps if step.words.startswith("Sew the waistband on, ")]
+        assert ("sew its ends" in step) == ends
+
+
+def test_a_lining_is_sewn_to_its_vent():
+    pattern = top()
+    pieces = [
+        replace(
+            piece,
+            edges=[
+                replace(e, name=f"{e.name} vent", kind="hem") if e.name == "centre back" else e for e in piece.edges
+            ],
+        )
+        for piece in pattern.pieces[""]
+    ]
+    seams = [seam for seam in pattern.seams if seam.name != "centre back"]
+    drafted = draft_garment(add_lining(replace(pattern, pieces={"": pieces}, seams=seams), "lining"))
+    (step,) = [step for step in sewing_steps(drafted, "") if step.words.startswith("At the vent, ")]
+    assert step.sewn == {f"back_{side}_lining": frozenset({"centre back vent"}) for side in ("right", "left")}

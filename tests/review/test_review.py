@@ -202,6 +202,9 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
         "over": "head",
     }
     words = verdict_words({"pieces": {"front": piece}, "rings": [ring]})
+    # No number is parted from its unit.
+    assert "10&nbsp;cm deep" in words
+    words = words.replace("&nbsp;", " ")
     assert "It fits, by its strain" in words
     assert "Needs an opening at the neck, 10 cm deep: 37.0 cm around, and 56.9 cm must pass (head)." in words
     # Where it was draped, the drape alone says whether it fits.
@@ -209,11 +212,11 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
     words = verdict_words({"pieces": {"front": piece}, "drape": drape})
     assert "It does not fit, as it was draped" in words
     assert "It fits" not in words
-    assert "stands off by 20 mm" in words
-    unfit = {**piece, "wear": {**fit, "fits": False, "where_not": ["stretched 9 %"]}, "converged": False}
+    assert "stands off by 20&nbsp;mm" in words
+    unfit = {**piece, "wear": {**fit, "fits": False, "where_not": ["stretched 9 %, 3 cm2"]}, "converged": False}
     words = verdict_words({"pieces": {"front": unfit, "back": piece}})
     assert (
         words.index("not at rest: front")
         < words.index("It does not fit, by its strain")
-        < words.index("front: stretched 9 %")
+        < words.index("front: stretched 9&nbsp;%, 3&nbsp;cm²")
     )

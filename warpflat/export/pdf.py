@@ -189,19 +189,17 @@ def _pages(
                 (of_size if nested and stroke.role in OF_LAYER else shared).append(stroke)
             for stroke in shared:
                 _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
-            for words in (words for words in drawing.words if not words.tag):
-                _words(canvas, words, placed.matrix, "#000000")
             if nested:
                 canvas._code.append(f"/OC /size{chosen.index(drawing.piece.size)} BDC")
             for stroke in of_size:
                 _stroke(canvas, stroke, placed.matrix, index, widen)
-            for words in (words for words in drawing.words if words.tag):
-                _words(canvas, words, placed.matrix, SIZE_COLOURS[index % len(SIZE_COLOURS)])
             if nested:
                 canvas._code.append("EMC")
     if sheet.reserved is not None:
         draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
     canvas.endForm()
+    # Words are drawn on the sheets that show them whole; on all, if none does.
+    forms = _word_forms(canvas, tiling, drawings, chosen)
     if guide:
         if kind.tiled:
             legend_page(canvas, printed, chosen, tiling.sheet, tiling)
@@ -222,6 +220,7 @@ def _pages(
         canvas.clipPath(window, stroke=0, fill=0)
         canvas.translate(*((paper.margin - corner) * POINT))
         canvas.doForm("sheet")
+        canvas.doForm(forms[row, column])
         canvas.restoreState()
         if tiling.joined:
             _joining_marks(canvas, tiling, row, column)
@@ -241,9 +240,10 @@ def _pages(
             f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
             for k, size in enumerate(chosen)
         }
-        form = document.idToObject[xObjectName("sheet")]
-        form.Resources = PDFResourceDictionary(Properties=groups)
-        form.Resources.basicFonts()
+        for name in ("sheet", *forms.values()):
+            form = document.idToObject[xObjectName(name)]
+            form.Resources = PDFResourceDictionary(Properties=groups)
+            form.Resources.basicFonts()
         order = PDFArray(list(groups.values()))
         catalog = document.Catalog
         catalog.OCProperties = PDFDictionary(
@@ -252,6 +252,35 @@ def _pages(
         catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
     canvas.save()
     return stream.getvalue()
+
+
+def _word_forms(
+    canvas: Any, tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]], sizes: Sequence[str]
+) -> dict[tuple[int, int], str]:
+    """Draw the words of each sheet as a form, and return the names of the forms by row and column."""
+    written = []
+    for placed, of_piece in zip(tiling.sheet.placed, drawings, strict=True):
+        for index, drawing in enumerate(of_piece):
+            layer = f"size{sizes.index(drawing.piece.size)}" if len(placed.pieces) > 1 else ""
+            written += [(words, placed, layer if words.tag else "", index) for words in drawing.words]
+    boxes = np.array([placed.on_sheet(words.box()) for words, placed, _, _ in written]).reshape(-1, 4, 2)
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    inner = np.array([tiling.paper.width, tiling.paper.height]) - 2 * tiling.paper.margin
+    corners = {tile: tiling.corner(*tile) for tile in tiling.tiles}
+    whole = {tile: ((low >= corner) & (high <= corner + inner)).all(axis=1) for tile, corner in corners.items()}
+    nowhere = ~np.any(list(whole.values()), axis=0)
+    names = {}
+    for tile in tiling.tiles:
+        names[tile] = f"words{tile[0]}_{tile[1]}"
+        canvas.beginForm(names[tile], *((corners[tile] - 0.05) * POINT), *((corners[tile] + inner + 0.05) * POINT))
+        for k in np.flatnonzero(whole[tile] | nowhere).tolist():
+            words, placed, layer, index = written[k]
+            colour = SIZE_COLOURS[index % len(SIZE_COLOURS)] if words.tag else "#000000"
+            canvas._code += [f"/OC /{layer} BDC"] if layer else []
+            _words(canvas, words, placed.matrix, colour)
+            canvas._code += ["EMC"] if layer else []
+        canvas.endForm()
+    return names
 
 
 def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict[tuple[int, int], FloatArray]:

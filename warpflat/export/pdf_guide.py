@@ -17,7 +17,7 @@ from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
 from warpflat.pattern.pieces import FoundSeam
 from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams, tools
-from warpflat.pattern.words import translate, translate_name
+from warpflat.pattern.words import listed, translate, translate_name
 from warpflat.pattern.worn import Worn
 
 if TYPE_CHECKING:
@@ -45,10 +45,12 @@ class _Page:
         self.left, self.width = paper.margin + 0.005, paper.width - 2 * paper.margin - 0.010
         self.y = paper.height - paper.margin - 0.004
 
-    def need(self, height: float) -> None:
-        """Begin a new page if less than `height` [m] is left."""
-        if self.y - height < self.paper.margin + 0.004:
+    def need(self, height: float) -> bool:
+        """Begin a new page if less than `height` [m] is left; return whether one began."""
+        full = self.y - height < self.paper.margin + 0.004
+        if full:
             self.end()
+        return full
 
     def end(self) -> None:
         """End the page."""
@@ -83,11 +85,17 @@ class _Page:
     def table(self, head: Sequence[str], rows: Sequence[Sequence[str]], shares: Sequence[float]) -> None:
         """Write rows in columns of the given shares of the width."""
         starts = self.left + self.width * np.concatenate([[0.0], np.cumsum(shares)[:-1]])
-        for number, row in enumerate([head, *rows]):
-            self.need(LINE)
-            self.y -= LINE
-            for x, share, cell in zip(starts, shares, row, strict=True):
-                self.text(float(x), cell, bold=number == 0, width=share * self.width - 0.002)
+        self._row(head, starts, shares, bold=True)
+        for row in rows:
+            # A page that begins within a table begins with its head.
+            if self.need(LINE):
+                self._row(head, starts, shares, bold=True)
+            self._row(row, starts, shares)
+
+    def _row(self, cells: Sequence[str], starts: FloatArray, shares: Sequence[float], *, bold: bool = False) -> None:
+        self.y -= LINE
+        for x, share, cell in zip(starts, shares, cells, strict=True):
+            self.text(float(x), cell, bold=bold, width=share * self.width - 0.002)
 
 
 def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, paper: Paper) -> None:
@@ -137,19 +145,18 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
                 page.y -= 0.0038
             page.y = y
         page.y -= 3 * 0.0038
-    allowances = {
-        (edge.kind == "hem", edge.kind, round(edge.width, 4))
-        for piece in pieces
-        for edge in piece.edges
-        if edge.kind in ("seam", "hem") and edge.width > 0
-    }
+    widths: dict[str, list[float]] = {"seam": [], "hem": []}
+    for edge in (edge for piece in pieces for edge in piece.edges if edge.kind in widths and edge.width > 0):
+        widths[edge.kind].append(round(edge.width, 4))
+    allowances = [
+        translate(f"{kind}s {{width}}", width=listed([length_words(width, units) for width in sorted(set(row))]))
+        for kind, row in widths.items()
+        if row
+    ]
     page.paragraph(
         translate(
             "Allowances are included: {allowances}. Lay every grain arrow along the selvedge.",
-            allowances=", ".join(
-                translate(f"{kind}s {{width}}", width=length_words(width, units))
-                for _, kind, width in sorted(allowances)
-            ),
+            allowances=", ".join(allowances),
         )
     )
     cloths = cut_list(pieces)
@@ -166,6 +173,8 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     page.heading(translate("Sewing order"), 3 * LINE)
     page.paragraph(
         translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
+        + " "
+        + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
     )
     for number, sewing in enumerate(sewing_steps(whole, size), 1):
         _step(
@@ -369,11 +378,13 @@ def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     """Write how much cloth each size takes at the usual widths."""
     page.heading(translate("Cloth needed"), 3 * LINE)
     head = ["", *(translate("{width} wide", width=cloth_words(width, units, of_width=True)) for width in WIDTHS)]
+    needed = cloth_needed(whole)
+    fabrics = dict.fromkeys(fabric for cloths in needed.values() for fabric in cloths)
     rows = []
-    for size in whole.pieces:
-        for fabric, lengths in cloth_needed(whole, size).items():
-            words = [translate("too narrow") if length is None else cloth_words(length, units) for length in lengths]
-            rows.append([" ".join(part for part in (fabric, printed_size(size) if size else "") if part), *words])
+    for fabric, size in ((fabric, size) for fabric in fabrics for size in needed if fabric in needed[size]):
+        lengths = needed[size][fabric]
+        words = [translate("too narrow") if length is None else cloth_words(length, units) for length in lengths]
+        rows.append([", ".join(part for part in (fabric, printed_size(size) if size else "") if part), *words])
     page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
     page.paragraph(
         translate("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")

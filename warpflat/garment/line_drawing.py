@@ -28,6 +28,8 @@ __all__ = ["describe_worn"]
 
 # Lines are drawn to within this [m]; what covers less [m2] is a sliver of the projection.
 _WITHIN, _LEAST_AREA = 0.001, 1e-5
+# Slits and spikes of an outline are narrower than twice this [m].
+_SLIT = 1e-4
 # A face whose normal points away from the viewer by more than this cosine is on the far side.
 _NEAR_SIDE, _EDGE_ON = -0.1, -0.6
 # Teeth of a zip are drawn so far apart; the bar at its end, and a circle of radius 1 [m].
@@ -146,7 +148,11 @@ def _views(flat: Flattening, *, half: bool) -> tuple[ViewedPiece, ViewedPiece]:
     mirrored = [space[:, :2], space[:, :2] * [-1.0, 1.0]] if half else [space[:, :2]]
     shown = np.concatenate([points[triangles] for points in mirrored])
     # What it covers from the back is the mirror image of what it covers from the front.
-    covered = shapely.union_all(shapely.polygons(shown), grid_size=1e-6).simplify(_WITHIN)
+    covered = shapely.union_all(shapely.polygons(shown), grid_size=1e-6)
+    # Slits and spikes between faces that rounding has parted are no lines of the garment.
+    for grown in (_SLIT, -2.0 * _SLIT, _SLIT):
+        covered = covered.buffer(grown, join_style="mitre")
+    covered = covered.simplify(_WITHIN)
     parts = [part for part in shapely.get_parts(covered) if part.geom_type == "Polygon" and part.area > _LEAST_AREA]
     outlines = [np.asarray(part.exterior.coords)[:-1] for part in parts]
     corners = space[triangles]

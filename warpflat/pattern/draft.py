@@ -47,6 +47,8 @@ __all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabell
 
 #: A grain line may lie beyond the sewing line by this much [m], as along a fold.
 GRAIN_ON_BORDER = 1e-4
+#: A grain line lies this far [m] from a line along it; how far it is moved aside for that, in order of preference.
+GRAIN_CLEAR, GRAIN_ASIDE = 0.003, (0.0, 0.008, -0.008, 0.014, -0.014)
 #: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
 ALONG_GRAIN = np.radians(1.0)
 
@@ -165,6 +167,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     # The middle of a curved piece, such as a facing, lies outside it.
     if grain is None or not shapely.Polygon(sew_line).buffer(GRAIN_ON_BORDER).covers(shapely.LineString(grain)):
         grain = default_grain(sew_line, list(holes.values()))
+    grain = _beside_lines(grain, list(internal.values()), sew_line)
     leg_lines = [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
     widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
     # Pleats are not marked through the cloth.
@@ -218,6 +221,20 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
             *uneven,
         ),
     )
+
+
+def _beside_lines(grain: FloatArray, lines: Sequence[FloatArray], sew_line: FloatArray) -> FloatArray:
+    """Return the grain line (2 by 2 [m]) moved aside, where it would lie on a line that runs along it, such as a fold."""
+    import shapely
+
+    room = shapely.Polygon(sew_line).buffer(GRAIN_ON_BORDER)
+    drawn = shapely.MultiLineString([line for line in lines if len(line) > 1])
+    for aside in GRAIN_ASIDE:
+        moved = grain + np.array([aside, 0.0])
+        line = shapely.LineString(moved)
+        if room.covers(line) and line.buffer(GRAIN_CLEAR).intersection(drawn).length < 0.5 * line.length:
+            return moved
+    return grain
 
 
 def _frame(piece: Piece) -> FloatArray:

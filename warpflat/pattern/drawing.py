@@ -34,6 +34,8 @@ ARROW, BARB = 0.006, 0.002
 BRACKET = 0.014
 #: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
 NAME, NAME_GAP = 0.0024, 0.0028
+#: On an edge of a nest that is no longer than this [m] the sizes stand once.
+SHORT_EDGE = 0.15
 #: Where along its line a name stands, in order of preference.
 NAME_SHARES = (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5)
 #: Least distance [m] of words from all else; that at which no better place is sought, for names and for letters.
@@ -42,6 +44,8 @@ CLEAR, WELL_CLEAR, LETTER_CLEAR = 0.0004, 0.006, 0.001
 LETTER, LETTER_GAP = 0.0026, 0.0012
 #: What lies closer [m] to a fold lies on it.
 ON_FOLD = 1e-5
+#: No words stand so far beyond a fold [m].
+BEYOND_FOLD = 0.02
 #: Radius [m] of the circle around a drill hole.
 DRILL = 0.002
 
@@ -115,6 +119,7 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
 
     drawings = []
     middle = len(pieces) // 2
+    longest = max(pieces, key=lambda piece: sum(polyline_length(edge.line) for edge in piece.fold_edges))
 
     def shift_across(name: str) -> float:
         middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
@@ -138,6 +143,9 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             *(replace(line, hidden=True) for line in _cutout_sew_strokes(piece)),
             *_detail_strokes(piece),
         ]
+        if piece is not longest:
+            # Dashes of several sizes upon each other would be a full line.
+            strokes = [replace(line, hidden=True) if line.role == "fold" else line for line in strokes]
         words: list[Words] = []
         if index == middle:
             label = nest_label(pieces)
@@ -150,14 +158,18 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
                     text = all_sizes[0].upper() + all_sizes[1:]
                     height = row.height * min(1.0, label.width / text_width(text, row.height))
                     rows[number] = replace(row, text=text, height=height)
-            more, words = _annotations(piece, label, rows, paper, borders=False)
+            others = [stroke for other in pieces if other is not piece for stroke in _detail_strokes(other)]
+            slits = [shapely.LineString(stroke.points) for stroke in others if stroke.role == "notch"]
+            more, words = _annotations(piece, label, rows, paper, borders=False, slits=slits)
             strokes += more
         if edge:
             # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
             ring = shapely.LinearRing(piece.cut_line)
             joints = shapely.MultiLineString([] if paper is None else [joint.tolist() for joint in paper.joints])
-            for start in (0.08, 0.62):
-                at_first = start + 0.3 * (index + 0.5) / len(pieces)
+            # Twice on a long edge.
+            rows_of_tags = ((0.08, 0.3), (0.62, 0.3)) if piece.edge(edge).length > SHORT_EDGE else ((0.05, 0.9),)
+            for start, along in rows_of_tags:
+                at_first = start + along * (index + 0.5) / len(pieces)
                 tags = []
                 # A little to either side, more and more, where a joint of two sheets would cut it.
                 for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
@@ -253,7 +265,13 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
 
 
 def _annotations(
-    piece: DraftedPiece, label: Label, rows: Sequence[Words], paper: OnPaper | None, *, borders: bool = True
+    piece: DraftedPiece,
+    label: Label,
+    rows: Sequence[Words],
+    paper: OnPaper | None,
+    *,
+    borders: bool = True,
+    slits: Sequence[Geometry] = (),
 ) -> tuple[list[Stroke], list[Words]]:
     """Draw grain, internal lines, leader and brackets of folds, and place all words of a piece so that they keep clear of each other.
 
@@ -266,6 +284,7 @@ def _annotations(
         rows: what the label says, at its place.
         paper: where it is printed; None writes no letters.
         borders: whether edges have names.
+        slits: notches of other sizes, which letters keep off.
     """
     import shapely
 
@@ -299,6 +318,42 @@ def _annotations(
             at = np.array([spot.x, spot.y])
             words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
         return spot is not None
+
+    for fold in piece.fold_edges:
+        # A line beside the fold whose two arms point to it, with words along it.
+        start, span = fold.line[0], fold.line[-1] - fold.line[0]
+        length = float(np.linalg.norm(span))
+        inwards = np.array([-span[1], span[0]]) / length
+        depth = min(BRACKET, length / 4)
+        a, b = start + 0.15 * span, start + 0.85 * span
+        points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
+        bracket = [
+            Stroke(role="grain", name="", points=points),
+            _arrow(a, -inwards, "grain"),
+            _arrow(b, -inwards, "grain"),
+        ]
+        strokes += bracket
+        angle = float(np.arctan2(span[1], span[0]))
+        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
+            angle += np.pi
+        places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
+        inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
+        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
+        # Other words keep off the bracket, and inside the half that is printed.
+        for stroke in bracket:
+            room.take(shapely.LineString(stroke.points))
+        if paper is not None:
+            run = BEYOND_FOLD * span / length
+            room.take(
+                shapely.Polygon(
+                    [
+                        start - run,
+                        start - run - BEYOND_FOLD * inwards,
+                        fold.line[-1] + run - BEYOND_FOLD * inwards,
+                        fold.line[-1] + run,
+                    ]
+                )
+            )
 
     # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
     first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
@@ -371,26 +426,7 @@ def _annotations(
                 for sign, out in zip((1.0, -1.0), aside, strict=True)
             ]
             beside = [Spot(x=float(x), y=float(y)) for x, y in places]
-            write(letter, LETTER, beside, bold=True, enough=LETTER_CLEAR)
-    for fold in piece.fold_edges:
-        # A line beside the fold whose two arms point to it, with words along it.
-        start, span = fold.line[0], fold.line[-1] - fold.line[0]
-        length = float(np.linalg.norm(span))
-        inwards = np.array([-span[1], span[0]]) / length
-        depth = min(BRACKET, length / 4)
-        a, b = start + 0.15 * span, start + 0.85 * span
-        points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
-        strokes += [
-            Stroke(role="grain", name="", points=points),
-            _arrow(a, -inwards, "grain"),
-            _arrow(b, -inwards, "grain"),
-        ]
-        angle = float(np.arctan2(span[1], span[0]))
-        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
-            angle += np.pi
-        places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
-        inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
-        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
+            write(letter, LETTER, beside, bold=True, avoid=slits, enough=LETTER_CLEAR)
     return strokes, words
 
 

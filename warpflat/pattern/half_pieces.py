@@ -224,6 +224,8 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
                 placed, at=placed.at * upright, base=(placed.base[0] * upright,),
                 direction=np.sign(placed.direction[1]) * upright,
             )  # fmt: skip
+        # Of a double notch on the fold one slit is the other's mirror image.
+        placed = replace(placed, base=tuple(base for base in placed.base if side * base[0] >= -SYMMETRIC))
         notches.append(placed)
     return replace(draft_half(half, garment.name, tuple(edges), tuple(notches), piece.notes), enlarged=piece.enlarged)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,8 +17,11 @@ from warpflat.pattern.label import Label, printed_size
 from warpflat.pattern.matched_lay import Stripes
 from warpflat.pattern.pieces import unknown_size
 from warpflat.pattern.placement import fit_label
-from warpflat.pattern.tile_nesting import nest_on_strip
+from warpflat.pattern.tile_nesting import CELL, nest_on_strip
 from warpflat.pattern.words import printed_in, translate
+
+if TYPE_CHECKING:
+    from shapely import Polygon
 
 __all__ = ["WIDTHS", "Cloth", "Copy", "Marker", "cloth_needed", "make_marker"]
 
@@ -387,22 +391,43 @@ WIDTHS = (0.90, 1.15, 1.50)
 GAP, SELVEDGE = 0.006, 0.010
 
 
-def cloth_needed(garment: DraftedGarment, size: str) -> dict[str, tuple[float | None, ...]]:
-    """Return the length [m] of cloth for one garment at each of `WIDTHS`, by fabric; None where a piece is too wide.
+def cloth_needed(garment: DraftedGarment) -> dict[str, dict[str, tuple[float | None, ...]]]:
+    """Return by size and fabric the length [m] of cloth for one garment at each of `WIDTHS`; None where a piece is too wide.
 
     Whole pieces are laid on one layer with their grain along it, either way up. The lay is quick and repeatable; a
-    marker (:func:`warpflat.pattern.marker.make_marker`) searches longer and finds shorter ones.
+    marker (:func:`warpflat.pattern.marker.make_marker`) searches longer and finds shorter ones. A size whose pieces are no
+    larger than those of another one is laid as that one where its own lay is longer.
     """
     import shapely
 
-    shapes: dict[str, list[shapely.Polygon]] = {}
-    for piece in garment.pieces[size]:
-        whole = shapely.Polygon(unfold_piece(piece))
-        mirrored = shapely.transform(whole, lambda points: points * [-1.0, 1.0])
-        for cloth, quantity in cloths_of(piece).items():
-            pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
-            shapes.setdefault(cloth, []).extend(mirrored if pairs and k % 2 else whole for k in range(quantity))
-    return {
-        fabric: tuple(nest_on_strip(row, width=width - 2 * SELVEDGE, gap=GAP) for width in WIDTHS)
-        for fabric, row in shapes.items()
-    }
+    shapes: dict[str, dict[str, list[shapely.Polygon]]] = {}
+    for size, pieces in garment.pieces.items():
+        for piece in pieces:
+            whole = shapely.Polygon(unfold_piece(piece))
+            mirrored = shapely.transform(whole, lambda points: points * [-1.0, 1.0])
+            for cloth, quantity in cloths_of(piece).items():
+                pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
+                row = shapes.setdefault(cloth, {}).setdefault(size, [])
+                row.extend(mirrored if pairs and k % 2 else whole for k in range(quantity))
+    needed: dict[str, dict[str, tuple[float | None, ...]]] = {size: {} for size in garment.pieces}
+    for cloth, by_size in shapes.items():
+        own = {
+            size: [nest_on_strip(row, width=width - 2 * SELVEDGE, gap=GAP) for width in WIDTHS]
+            for size, row in by_size.items()
+        }
+        for size, row in by_size.items():
+            holders = [own[other] for other, others in by_size.items() if _are_within(row, others)]
+            columns = ([length for length in column if length is not None] for column in zip(*holders, strict=True))
+            needed[size][cloth] = tuple(min(column, default=None) for column in columns)
+    return needed
+
+
+def _are_within(shapes: Sequence[Polygon], others: Sequence[Polygon]) -> bool:
+    """Return whether each shape is no longer, wider or larger than its counterpart, within a cell of the lay."""
+    if len(shapes) != len(others):
+        return False
+    extents, larger = (
+        np.array([[x1 - x0, y1 - y0] for x0, y0, x1, y1 in (shape.bounds for shape in row)]) for row in (shapes, others)
+    )
+    areas, larger_areas = (np.array([shape.area for shape in row]) for row in (shapes, others))
+    return bool((extents <= larger + CELL).all() and (areas <= larger_areas).all())

@@ -6,11 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from string import ascii_uppercase
 
+from warpflat.core.polyline import polyline_length
 from warpflat.core.text import other_side, without_side
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.measures import length_words
 from warpflat.pattern.pieces import Piece, Seam, SeamOpening, SeamSide
-from warpflat.pattern.words import translate, translate_name
+from warpflat.pattern.words import listed, translate, translate_name
 
 __all__ = [
     "SewingStep",
@@ -44,8 +45,8 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Join the linings", ({"lining"},)),
     ("Sew the lining to the facings", ({"facing", "lining"},)),
     ("Join the ends of bands and bindings", ({"strip"}, {"waistband"})),
-    ("Sew bands and bindings to their edges", ({"strip", "shell"},)),
-    ("Sew the waistband on, turn it in and sew its inner edge down", ({"waistband", "shell"}, {"strip", "waistband"})),
+    ("", ({"strip", "shell"},)),
+    ("", ({"waistband", "shell"}, {"strip", "waistband"})),
     ("Sew the cuffs on, fold them right sides together, sew their ends and turn them", ({"cuff", "shell"}, {"cuff"})),
     ("Sew the hood's own seams", ({"hood"},)),
     ("Sew the hood on", ({"hood", "shell"},)),
@@ -53,7 +54,15 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Sew the collar on", ({"collar", "shell"},)),
 )
 # A seam of these stages is mentioned by others.
-_ON_FACINGS, _LININGS, *_ON_BANDS = (len(_STAGES) + k for k in (1, 2, 5, 6))
+_ON_FACINGS, _LININGS, _BAND_ENDS, _ON_BANDS, _WAISTBANDS = (len(_STAGES) + k for k in (1, 2, 4, 5, 6))
+#: How a strip is sewn on: one that is folded lengthwise, one with a hem of its own, one that is folded over the raw edge.
+_FOLDED = "Fold the bands lengthwise, wrong sides together, and sew both their edges on"
+_HEMMED = "Hem the free edges of ruffles, and sew the ruffles on"
+_BOUND = "Sew the bindings on, fold them over the raw edges and sew them down inside"
+#: How a waistband is: one that is folded, with ends or as a ring; and one that is cut in two layers.
+_WITH_ENDS = "Sew the waistband on, fold it right sides together, sew its ends, turn it and sew its inner edge down"
+_RING = "Sew the waistband on, turn it in and sew its inner edge down"
+_LAYERS = "Sew one layer of the waistband on, sew the other to it along the upper edge and open ends, turn it in and sew it down"
 
 
 #: A piece and an edge of it, by their names.
@@ -198,7 +207,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         (True, "Fold the pleats and sew them as far as they are marked; they hang open below: {pleats}."),
     ):
         legs = {piece.name: _dart_legs(piece, pleats=pleats) for piece in pieces}
-        words = [f"{titles[piece]}: {_listed(list(of_piece))}" for piece, of_piece in legs.items() if of_piece]
+        words = [f"{titles[piece]}: {listed(list(of_piece))}" for piece, of_piece in legs.items() if of_piece]
         if words:
             places = [(piece, leg) for piece, of_piece in legs.items() for row in of_piece.values() for leg in row]
             steps.append(SewingStep.at(translate(phrase, darts="; ".join(words), pleats="; ".join(words)), places))
@@ -208,7 +217,10 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     if patches:
         steps.append(
             SewingStep.at(
-                translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=called(patches)),
+                translate(
+                    "Hem the upper edges of the patch pockets, turn in the others and sew them to their marks: {pockets}.",
+                    pockets=called(patches),
+                ),
                 [(piece.name, edge.name) for piece in patches for edge in piece.edges if edge.kind == "seam"],
                 patches,
             )
@@ -272,7 +284,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     bound = {
         without_side(edge)
         for seam in seams
-        if seam.stage in _ON_BANDS
+        if seam.stage in (_ON_BANDS, _WAISTBANDS)
         for piece, edge in seam.places
         if roles.get(piece) == "shell"
     }
@@ -281,9 +293,24 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     basted = {edge: row for edge, row in inside.items() if edge in bound and row}
     turned_in_at = max((each.stage for each in seams if each.stage in (_LININGS + 1, _ON_FACINGS)), default=None)
     stages = sorted({seam.stage for seam in seams})
-    first_band = next((stage for stage in stages if stage in _ON_BANDS), None)
+    by_name = {piece.name: piece for piece in pieces}
+    rings = {piece for seam in seams if seam.stage == _BAND_ENDS for piece, _ in seam.places}
+
+    def way(seam: SewnSeam) -> str:
+        """Return how a seam is sewn: by its stage, and by what a strip or a waistband is like."""
+        strips = [by_name[piece] for piece, _ in seam.places if roles.get(piece) in ("strip", "waistband")]
+        if seam.stage == _WAISTBANDS:
+            if not any("fold line" in strip.internal_lines for strip in strips):
+                return _LAYERS
+            return _RING if any(strip.name in rings for strip in strips) else _WITH_ENDS
+        if seam.stage != _ON_BANDS:
+            return [*_STAGES, *_FINISHING][seam.stage][0]
+        if any(edge.kind == "hem" for strip in strips for edge in strip.edges):
+            return _HEMMED
+        return _FOLDED if any("fold line" in strip.internal_lines for strip in strips) else _BOUND
+
+    first_band = next((stage for stage in stages if stage in (_ON_BANDS, _WAISTBANDS)), None)
     for stage in stages:
-        what = translate([*_STAGES, *_FINISHING][stage][0])
         here = [seam for seam in seams if seam.stage == stage]
         if basted and stage == first_band:
             steps.append(
@@ -298,12 +325,15 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         plain = [seam for seam in here if not seam.openings or stage == _LININGS]
         for seam in (seam for seam in here if seam not in plain):
             steps += [SewingStep.at(words, seam.places) for words in _opened_steps(seam, units)]
-        if plain:
-            words = [seam.words() + (translate(", open beside the zip") if _zips(seam) else "") for seam in plain]
+        ways: dict[str, list[SewnSeam]] = {}
+        for seam in plain:
+            ways.setdefault(way(seam), []).append(seam)
+        for what, alike in ways.items():
+            words = [seam.words() + (translate(", open beside the zip") if _zips(seam) else "") for seam in alike]
             steps.append(
                 SewingStep.at(
-                    translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(words)),
-                    [place for seam in plain for place in seam.places],
+                    translate("{what}, notch to notch: {seams}.", what=translate(what), seams=", ".join(words)),
+                    [place for seam in alike for place in seam.places],
                 )
             )
         if stage == _LININGS:
@@ -344,6 +374,16 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
                 [place for row in hems.values() for place in row],
             )
         )
+    for kind in ("vent", "slit"):
+        lined = [
+            (piece.name, edge.name)
+            for piece in pieces
+            for edge in piece.edges
+            if piece.piece.role == "lining" and edge.kind == "hem" and kind in edge.name.split(" ")
+        ]
+        if lined:
+            phrase = f"At the {kind}, turn in the edges of the lining and sew them to the shell by hand: {{pieces}}."
+            steps.append(SewingStep.at(translate(phrase, pieces=called(lined)), lined))
     for elastic in garment.garment.elastics:
         cased_edges = [
             (piece.name, edge)
@@ -402,7 +442,9 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     units = garment.garment.units
     zips = [
         translate(
-            f"{{count}} {opening.style} zip of {{length}}", count=seam.count, length=length_words(opening.length, units)
+            f"{{count}} {opening.style} {'zip' if seam.count == 1 else 'zips'} of {{length}}",
+            count=seam.count,
+            length=length_words(opening.length, units),
         )
         for seam in sewn_seams(garment, size)
         for opening in _zips(seam)
@@ -410,27 +452,36 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     ]
     elastics = [
         translate(
-            "{count} elastic of {length}, at most {width} wide",
+            f"{{count}} {'elastic' if elastic.count == 1 else 'elastics'} of {{length}}, at most {{width}} wide",
             count=elastic.count,
             length=length_words(elastic.lengths[size], units),
             width=length_words(elastic.width, units),
         )
         for elastic in garment.garment.elastics
     ]
-    buttons = _buttons(garment.pieces[size]).values()
+    pieces = garment.pieces[size]
+    titles = piece_titles([piece.piece for piece in pieces])
+    buttons = []
+    for title, count in _buttons(pieces).items():
+        lines = [piece.internal_lines.get("buttonhole") for piece in pieces if titles[piece.name] == title]
+        holes = [polyline_length(line) for line in lines if line is not None]
+        words = translate("{count} buttons", count=count)
+        if holes:
+            words += translate(", for buttonholes of {length}", length=length_words(holes[0], units))
+        buttons.append(words)
     # Both layers of a collar have one button.
     small = sum(
         piece.piece.quantity // (2 if piece.piece.role == "collar" else 1)
-        for piece in garment.pieces[size]
+        for piece in pieces
         if _buttons_at_one_end(piece)
     )
     return (
         translate("sewing thread"),
         *zips,
         *elastics,
-        *(translate("{count} buttons", count=count) for count in buttons),
+        *buttons,
         *(translate("1 hook and bar") for _ in _hooked(garment, size)),
-        *([translate("{count} small buttons", count=small)] if small else []),
+        *([translate("{count} small buttons" if small > 1 else "1 small button", count=small)] if small else []),
     )
 
 
@@ -484,10 +535,11 @@ def _opened_steps(seam: SewnSeam, units: str) -> list[str]:
     for opening in seam.openings:
         length = length_words(opening.length, units)
         if opening.kind == "zip":
-            where = translate("from the upper edge down to its notch")
+            where = translate("from the upper edge down to the end of its line")
             if opening.begin > 0.0:
                 where = translate(
-                    "from {begin} below the upper edge down to its notch", begin=length_words(opening.begin, units)
+                    "from {begin} below the upper edge down to the end of its line",
+                    begin=length_words(opening.begin, units),
                 )
             if opening.whole:
                 where = translate("all along")
@@ -590,8 +642,3 @@ def _free_edges(pieces: Sequence[DraftedPiece], seams: Sequence[Seam]) -> dict[s
             if edge.kind == "seam" and (piece.name, edge.name) not in sewn:
                 found.setdefault(without_side(edge.name).rstrip(" 0123456789"), []).append((piece.name, edge.name))
     return found
-
-
-def _listed(names: Sequence[str]) -> str:
-    both = f" {translate('and')} "
-    return both.join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]

@@ -7,14 +7,14 @@ longest run of a name's words that the table has is replaced, then the next. Wha
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from importlib import resources
 
 from warpflat.core.toml_file import read_toml
 
-__all__ = ["language_words", "printed_in", "translate", "translate_name"]
+__all__ = ["language_words", "listed", "printed_in", "translate", "translate_name"]
 
 _EMPTY: Mapping[str, str] = {}
 _table: ContextVar[Mapping[str, str]] = ContextVar("words", default=_EMPTY)
@@ -60,3 +60,9 @@ def translate_name(name: str) -> str:
         found.append(table[" ".join(words[:count])] if count else words[0])
         words = words[max(count, 1) :]
     return " ".join(found)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return one or more names as a list in the present words: "a, b and c"."""
+    both = f" {translate('and')} "
+    return both.join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]

@@ -6,6 +6,7 @@ import base64
 import io
 import json
 import os
+import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
@@ -17,7 +18,7 @@ from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import guarded, open_file, read_result
 from warpflat.core.output import atomic_path, latest_file, recorded_files
-from warpflat.core.text import energy_words
+from warpflat.core.text import energy_words, format_count
 from warpflat.export.colours import SMALLEST_SCALE
 from warpflat.review.film import open_film, pack_film, pack_foreign_film
 
@@ -268,7 +269,7 @@ def verdict_words(metrics: Mapping[str, Any]) -> str:
     overlap = sum(piece.get("overlap_m2", 0.0) for piece in pieces.values())
     wrong = [
         *([f"not at rest: {', '.join(unfinished)}"] if unfinished else []),
-        *([f"{flips} flipped faces"] if flips else []),
+        *([format_count(flips, "flipped face")] if flips else []),
         *([f"{1e6 * overlap:.3g} mm² lie over each other"] if overlap else []),
     ]
     drape, wear = metrics.get("drape"), metrics.get("wear") or {}
@@ -300,12 +301,18 @@ def verdict_words(metrics: Mapping[str, Any]) -> str:
         )
     if metrics.get("rings") and not shut:
         lines.append(("good", "It can be put on: every edge and level passes what of the body goes through it."))
-    html = "".join(f'<p class="verdict {kind}">{escape(words)}</p>' for kind, words in lines)
+    html = "".join(f'<p class="verdict {kind}">{_typeset(words)}</p>' for kind, words in lines)
     if worst:
         title = "Worst places" if fits is False else "Places to look at"
-        items = "".join(f"<li>{escape(words)}</li>" for words in list(dict.fromkeys(worst))[:5])
+        items = "".join(f"<li>{_typeset(words)}</li>" for words in list(dict.fromkeys(worst))[:5])
         html += f"<p><b>{title}</b></p><ul>{items}</ul>"
     return html
+
+
+def _typeset(words: str) -> str:
+    """Return the HTML of words from the console, which keeps to ASCII: with squares, and no number parted from its unit."""
+    squared = re.sub(r"\b([mc]?m)2\b", r"\1²", words)
+    return re.sub(r"(?<=\d) (?=(?:%|[mc]?m|[mc]?m²|Pa|m?J)(?!\w))", "&nbsp;", escape(squared))
 
 
 def ease_table(metrics: Mapping[str, Any]) -> str:
