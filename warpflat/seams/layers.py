@@ -121,7 +121,7 @@ def read_garment(
         marks.append(
             SeamCut(name=plain_label(key), line=line, closed=closed, where=f"line {quote_value(key)} of {file}")
         )
-    kept[0] = replace(kept[0], notes=(*notes, *kept[0].notes))
+    kept[0] = replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes])))
     return GarmentFile(layers=tuple(kept), marks=tuple(marks), raw=raw, scale=scale)
 
 

@@ -98,7 +98,7 @@ def read_pieces(
         _named_apart([surface for number, surface in enumerate(found) if number not in surplus]), meet
     )
     notes += met
-    return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
+    return (replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes]))), *kept[1:])
 
 
 def object_parts(

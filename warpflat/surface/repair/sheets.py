@@ -123,7 +123,7 @@ def _facing(middle: FloatArray, vector: FloatArray, reach: FloatArray) -> tuple[
     normal = vector / np.maximum(area, np.finfo(float).tiny)[:, None]
     tree = cKDTree(np.hstack([middle, _TURN * size * normal]))
 
-    def mates(rows: IntArray, shift: float) -> tuple[IntArray, FloatArray, FloatArray]:
+    def mates(rows: NDArray[np.integer], shift: float) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return for some faces the partner, how deep it lies below them and how far aside, sought at a depth."""
         places = middle[rows] - shift * normal[rows]
         found = tree.query(np.hstack([places, -_TURN * size * normal[rows]]))[1]
