@@ -110,9 +110,11 @@ def test_a_worn_mesh_is_draped_by_its_pattern_from_where_it_is_worn(command: Com
     assert "front.to back: " in listed.out
     job = OutsideJob.read(Path("skirt.obj"), units="m", body="EU 38")
     worn = skirt()[0]
-    for piece in job.pattern.pieces[""]:
-        places = job.lifts[piece.name](np.concatenate([edge.points for edge in piece.edges]))
-        assert max(np.linalg.norm(worn - place, axis=1).min() for place in places) < 1e-4
+    border = worn[(worn[:, 1] < 1e-9) | (worn[:, 1] > 0.4 - 1e-9)]
+    places = np.concatenate(
+        [job.lifts[piece.name](edge.points) for piece in job.pattern.pieces[""] for edge in piece.edges]
+    )
+    assert max(np.linalg.norm(places - vertex, axis=1).min() for vertex in border) < 1e-4
 
 
 def test_what_is_written_as_style3d_has_it_is_read_back(tmp_path: Path):
