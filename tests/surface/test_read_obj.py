@@ -10,6 +10,7 @@ import pytest
 
 from warpflat.core.errors import InputError
 from warpflat.surface.io.read_obj import ObjMesh, read_obj
+from warpflat.surface.io.read_pieces import read_pieces
 
 GRID = 12
 
@@ -87,7 +88,7 @@ def test_file_is_read_whole(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.vertices, positions, rtol=0, atol=0.06 if name == "short numbers" else 0)
     np.testing.assert_array_equal(mesh.polygons, polygons)
     assert mesh.lines == {"side": [[0, 1, 2]]}
-    assert mesh.groups == [(0, "piece"), (GRID * GRID, "side")]
+    assert mesh.objects[0] == [(0, "piece")]
     assert mesh.split_corners == (name in ("texture", "texture and normal", "Windows"))
 
 
@@ -120,3 +121,63 @@ def test_file_that_is_cut_short_is_refused(tmp_path: Path) -> None:
     path.write_text(plain("{v}/{v}").rstrip("\n").rpartition("/")[0])
     with pytest.raises(InputError, match="is cut short"):
         read_obj(path)
+
+
+def panels(style: str) -> str:
+    """A front and a back, each a strip of three quads, with their names where different programs write them."""
+    points = {
+        name: [f"v {x} {y} {z}" for y in (0.0, 0.3) for x in (0.0, 0.1, 0.2, 0.3)]
+        for name, z in (("front", 0.1), ("back", -0.1))
+    }
+    if style == "interleaved":  # vertex by vertex of both
+        rows = [row for pair in zip(*points.values(), strict=True) for row in pair]
+        corners = {"front": [2 * k + 1 for k in range(8)], "back": [2 * k + 2 for k in range(8)]}
+    else:
+        rows = [row for one in points.values() for row in one]
+        corners = {"front": list(range(1, 9)), "back": list(range(9, 17))}
+    faces = {name: [f"f {c[k]} {c[k + 1]} {c[k + 5]} {c[k + 4]}" for k in range(3)] for name, c in corners.items()}
+    match style:
+        case "name, vertices, faces":
+            lines = [line for name in points for line in (f"o {name}", *points[name], *faces[name])]
+        case "vertices, name, faces":
+            lines = [line for name in points for line in (*points[name], f"g {name}", *faces[name])]
+        case "group within an object":
+            lines = [
+                line
+                for name in points
+                for line in (f"o {name}", *points[name], "g seam", *faces[name][:1], "g rest", *faces[name][1:])
+            ]
+        case "groups of one object":
+            lines = ["o shirt", *rows, *(line for name in points for line in (f"g {name}", *faces[name]))]
+        case "faces in turn":
+            turns = zip(faces["front"], faces["back"], strict=True)
+            lines = [*rows, *(line for one, other in turns for line in ("g front", one, "g back", other))]
+        case _:
+            lines = [*rows, *(line for name in points for line in (f"o {name}", *faces[name]))]
+    return "\n".join([*lines, ""])
+
+
+@pytest.mark.parametrize(
+    "style",
+    [
+        "name, vertices, faces", "vertices, name, faces", "all vertices first", "interleaved", "groups of one object",
+        "group within an object", "faces in turn",
+    ],
+)  # fmt: skip
+def test_objects_keep_their_names_wherever_their_vertices_stand(style: str, tmp_path: Path) -> None:
+    file = tmp_path / "shirt.obj"
+    file.write_text(panels(style))
+    front, back = read_pieces(file, units="m", meet=0.0)
+    assert (front.name, back.name) == ("front", "back")
+    assert (front.vertices[:, 2] == 0.1).all()
+    assert (back.vertices[:, 2] == -0.1).all()
+    # Vertices count from their object's first one, where objects have theirs in turn.
+    last = [piece.input_index.max() for piece in (front, back)]
+    assert last == ([14, 15] if style == "interleaved" else [7, 7])
+
+
+def test_groups_that_share_vertices_are_one_object(tmp_path: Path) -> None:
+    file = tmp_path / "shirt.obj"
+    file.write_text(panels("all vertices first") + "o strap\nf 4 9 13 8\n")
+    (piece,) = read_pieces(file, units="m", meet=0.0)
+    assert piece.name == "shirt"

@@ -128,6 +128,100 @@ def test_thick_pieces_are_flattened_from_the_command_line(tmp_path: Path, capsys
     assert set(json.loads((tmp_path / "all" / "metrics.json").read_text())["pieces"]) == {"thick_1", "thick_2"}
 
 
+def parts(*meshes: tuple[np.ndarray, object], path: Path, names: tuple[str, ...] = ()) -> Path:
+    """An OBJ file of several meshes, each an object of its own."""
+    rows, before = list[str](), 1
+    for number, (vertices, faces) in enumerate(meshes):
+        rows += [f"o {names[number]}"] if names else []
+        rows += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
+        rows += ["f " + " ".join(str(before + int(k)) for k in face) for face in faces]  # type: ignore[attr-defined]
+        before += len(vertices)
+    path.write_text("\n".join([*rows, ""]))
+    return path
+
+
+def shells(sheet, thickness: float, turned: bool = False) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The outer and the inner sheet of thick cloth, without a rim: each with vertices of its own."""
+    points, quads = sheet()
+    vertices, faces = solidified(points, quads, thickness, rim=False)
+    rows = np.array(faces)[:, :: -1 if turned else 1]
+    count = len(points)
+    return [(vertices[:count], rows[: len(quads)]), (vertices[count:], rows[len(quads) :] - count)]
+
+
+def three_readings(path: Path) -> list[tuple[warpflat.Surface, ...]]:
+    return [
+        warpflat.read_pieces(path, units="m"), read_garment(path, units="m").layers, (warpflat.read_surface(path, units="m"),)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("thickness", [0.0005, 0.006])
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("sheet", [bodice, sleeve])
+def test_two_sheets_without_a_rim_are_one_cloth(
+    sheet, turned: bool, order: int, thickness: float, tmp_path: Path
+) -> None:
+    both = shells(sheet, thickness, turned)
+    outer = both[0][0]
+    for read in three_readings(parts(*both[::order], path=tmp_path / "shells.obj")):
+        assert len(read) == 1
+        assert np.abs(read[0].vertices[:, None] - outer[None]).max(axis=2).min(axis=1).max() < 1e-8
+        note = next(note for note in read[0].notes if "thick" in note)
+        assert float(note.split("drawn ")[1].split(" mm")[0]) == pytest.approx(1e3 * thickness, rel=0.03)
+        assert "cm2) left out" in note
+
+
+def test_sheets_and_a_rim_apart_with_a_pocket_and_a_coarser_inner_side(tmp_path: Path) -> None:
+    """As programs write that give the front, the back and the side of cloth a material and vertices each."""
+    (outer, faces), (inner, inner_faces) = shells(bodice, 0.003)
+    at = np.arange(26 * 21).reshape(26, 21)
+    ring = np.concatenate([at[0, :-1], at[:-1, -1], at[-1, :0:-1], at[:0:-1, 0]])
+    count = len(ring)
+    rim = (
+        np.vstack([outer[ring], inner[ring]]),
+        [[k, (k + 1) % count, count + (k + 1) % count, count + k] for k in range(count)],
+    )
+    pocket = (
+        outer[at[6:13, 3:9].ravel()] + [0, 0, 0.001],
+        np.stack(
+            [
+                cells.ravel()
+                for cells in (lambda k: (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]))(np.arange(42).reshape(7, 6))
+            ],
+            -1,
+        ),
+    )
+    coarse = at[::5, ::2]
+    coarser = np.stack(
+        [cells.ravel() for cells in (coarse[1:, :-1], coarse[1:, 1:], coarse[:-1, 1:], coarse[:-1, :-1])], -1
+    )
+    names = ("inside", "outside", "side", "pocket")
+    for below in (inner_faces, coarser):
+        used, number = np.unique(below, return_inverse=True)
+        path = parts(
+            (inner[used], number.reshape(below.shape)),
+            (outer, faces),
+            rim,
+            pocket,
+            path=tmp_path / "coat.obj",
+            names=names,
+        )
+        pieces = warpflat.read_pieces(path, units="m")
+        assert [piece.name for piece in pieces] == ["outside", "pocket"]
+        words = " ".join(pieces[0].notes)
+        assert "its outer sheet, outside, was taken, the inner one or the rim (inside, " in words
+        assert "the rim (side, " in words
+
+
+def test_sheets_that_look_the_same_way_or_lie_unevenly_stay_two(tmp_path: Path) -> None:
+    outer, (inner, faces) = shells(bodice, 0.004)
+    lining = inner, faces[:, ::-1]
+    wedge = outer[0] - np.linspace(0.0, 0.02, len(inner))[:, None] * [0, 0, 1], faces
+    for second in (lining, wedge):
+        assert len(warpflat.read_pieces(parts(outer, second, path=tmp_path / "two.obj"), units="m")) == 2
+
+
 def with_fin(height: float = 0.02) -> tuple[np.ndarray, list[list[int]], int]:
     """A bodice with a fin on the middle of it: vertices, faces with those of the fin last, and how many these are."""
     points, quads = bodice()

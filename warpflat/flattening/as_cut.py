@@ -32,7 +32,7 @@ class CutPattern:
     Attributes:
         unit: of the texture that it is.
         area_ratio: its area over that of the worn cloth.
-        distances: by piece how far the vertices of what flattening gives lie from it, #V [m].
+        distances: by piece how far the vertices of what flattening gives lie from it, #V [m]; empty if that was not asked for.
     """
 
     unit: str
@@ -48,7 +48,7 @@ class CutPattern:
         return {
             "unit": self.unit,
             "area_ratio": self.area_ratio,
-            **measured(np.concatenate(list(self.distances.values()))),
+            **(measured(np.concatenate(list(self.distances.values()))) if self.distances else {}),
             "pieces": {name: measured(off) for name, off in self.distances.items()},
         }
 

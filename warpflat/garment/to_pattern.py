@@ -32,6 +32,7 @@ from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mi
 from warpflat.garment.openings import one_sided, place_opening
 from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
+from warpflat.pattern.curves import curve_through
 from warpflat.pattern.from_mesh import MeshFeatures, inner_stretches, line_labels, piece_from_mesh
 from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
@@ -100,12 +101,13 @@ def pattern_of_garment(
         stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
         pattern = replace(pattern, seams=[_eased(seam, pattern, stretched) for seam in pattern.seams])
         if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
-            return pattern, notes
+            return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
         pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
         drawn, more = _drawn_once(pattern.pieces, pairs)
         pattern = replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs))
         pattern, equal = draw_equal_pieces_once(pattern)
+        pattern = pattern if sample.as_cut is None else _through_vertices(pattern)
         return pattern, (*notes, *more, *equal)
     forms = {size: garment.form for size, garment in garments.items() if garment.form is not None}
     form = sample.form
@@ -289,6 +291,22 @@ def _form_piece(
         ),
     )
     return replace(drawn, placement=_placement(drawn, flat))
+
+
+def _through_vertices(pattern: Pattern) -> Pattern:
+    """Return the pattern with edges that run through their vertices as curves: what was cut is as long as these, not as their chords."""
+
+    def drawn(edge: Edge) -> Edge:
+        points = edge.points if edge.kind == "fold" else curve_through(edge.points)
+        return edge if len(points) == len(edge.points) else replace(edge, points=points, vertices=None)
+
+    return replace(
+        pattern,
+        pieces={
+            size: [replace(piece, edges=[drawn(edge) for edge in piece.edges]) for piece in row]
+            for size, row in pattern.pieces.items()
+        },
+    )
 
 
 def _placement(piece: Piece, flat: Flattening) -> FloatArray | None:

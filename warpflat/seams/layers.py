@@ -15,7 +15,7 @@ from warpflat.seams.options import SeamCut
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.layers import Layer, doubled_layers
+from warpflat.surface.repair.layers import Layer, surplus_layers
 from warpflat.surface.repair.validate import make_surface, parts_of_faces
 
 __all__ = ["GarmentFile", "read_garment", "read_layers"]
@@ -92,12 +92,13 @@ def read_garment(
         raise faults[0] if faults else wrong_size(largest, file, scale)
     layers = [Layer(surface.vertices, surface.faces) for surface in found]
     total = sum(layer.area for layer in layers)
-    doubled = doubled_layers(layers)
+    surplus = surplus_layers(layers)
+    notes += surplus.values()
     kept, trifles, area = list[Surface](), len(order) - len(found) - len(faults), 0.0
     for number, (surface, layer) in enumerate(zip(found, layers, strict=True)):
-        if number in doubled:
-            notes.append(f"{layer.describe()} dropped: a second layer that lies on another part")
-        elif number and layer.area < (_CLOSED_TRIFLE if _is_closed(surface) else _TRIFLE) * total:
+        if number in surplus:
+            continue
+        if number and layer.area < (_CLOSED_TRIFLE if _is_closed(surface) else _TRIFLE) * total:
             trifles, area = trifles + 1, area + layer.area
         else:
             check_size(surface, file, scale)
@@ -120,7 +121,7 @@ def read_garment(
         marks.append(
             SeamCut(name=plain_label(key), line=line, closed=closed, where=f"line {quote_value(key)} of {file}")
         )
-    kept[0] = replace(kept[0], notes=(*notes, *kept[0].notes))
+    kept[0] = replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes])))
     return GarmentFile(layers=tuple(kept), marks=tuple(marks), raw=raw, scale=scale)
 
 

@@ -68,7 +68,8 @@ class RawMesh:
         name: of the mesh in the file.
         curves: #P by 3 by name; `chains`: vertices by name.
         notes: one sentence each.
-        groups: objects, nodes or prims as (first vertex, name), in their order.
+        objects: objects, nodes or prims as (first vertex, name), in their order, and #F, the one of each face; None where the format
+            knows none.
         marked: rows of vertices without a name: creases of USD, edge elements of PLY.
         texture: #F by k by 2, texture coordinates at the corners, nan where there are none; None if the file has none.
         face_material, face_group: #F, a number for the material of each face, and for its group, object, node or subset, each with
@@ -83,7 +84,7 @@ class RawMesh:
     curves: dict[str, FloatArray] = field(default_factory=dict)
     chains: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    groups: list[tuple[int, str]] = field(default_factory=list)
+    objects: tuple[list[tuple[int, str]], NDArray[np.int64]] | None = None
     marked: list[NDArray[np.int64]] = field(default_factory=list)
     texture: FloatArray | None = None
     face_material: tuple[NDArray[np.int64], tuple[str, ...]] | None = None
@@ -249,7 +250,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
             name=usd.name,
             curves=usd.curves,
             notes=usd.notes,
-            groups=usd.groups,
+            objects=_in_turn(usd.groups, polygons),
             marked=usd.creases,
         )
     if prim == ALL_PRIMS:
@@ -263,7 +264,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
             polygons=obj.polygons,
             scale=scale,
             split_corners=obj.split_corners,
-            groups=obj.groups,
+            objects=obj.objects,
             notes=obj.notes,
             texture=obj.texture,
             face_material=obj.face_material,
@@ -300,12 +301,20 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         polygons=mesh.faces,
         scale=scale,
         split_corners=mesh.split_corners,
-        groups=mesh.groups,
+        objects=_in_turn(mesh.groups, mesh.faces) if mesh.groups else None,
         marked=list(mesh.edges),
         texture=mesh.corner_texture,
         face_material=mesh.face_material,
         face_group=mesh.face_group,
     )
+
+
+def _in_turn(
+    objects: list[tuple[int, str]], polygons: NDArray[np.int64]
+) -> tuple[list[tuple[int, str]], NDArray[np.int64]]:
+    """Return objects, each of its first vertex and name, whose vertices follow each other, and #F, the one of each face."""
+    first = np.array([start for start, _ in objects], dtype=np.int64)
+    return objects, np.maximum(np.searchsorted(first, polygons[:, 0], side="right") - 1, 0)
 
 
 def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.io.usd_stage import numbered
 from warpflat.surface.repair.polygons import pad_corners
 
@@ -40,7 +41,7 @@ class ObjMesh:
         polygons: #F by the largest corner count, vertex indices from 0, filled up with -1.
         lines: line elements by the name of their group or object, each a list of chains of vertex indices.
         split_corners: the exporter wrote one `v` per texture coordinate.
-        groups: objects and groups as (first vertex, name), in their order.
+        objects: as (first vertex, name), in their order, and #F, the one of each face.
         texture: #F by k by 2, the texture coordinates of corners, nan where they have none; None if no face has any.
         face_material, face_group: #F, a number for the material and the group or object of each face, and their names.
         notes: what was left out, one sentence each.
@@ -50,7 +51,7 @@ class ObjMesh:
     polygons: NDArray[np.int64]
     lines: dict[str, list[list[int]]] = field(default_factory=dict)
     split_corners: bool = False
-    groups: list[tuple[int, str]] = field(default_factory=list)
+    objects: tuple[list[tuple[int, str]], NDArray[np.int64]]
     texture: FloatArray | None = None
     face_material: tuple[NDArray[np.int64], tuple[str, ...]]
     face_group: tuple[NDArray[np.int64], tuple[str, ...]]
@@ -77,9 +78,9 @@ def read_obj(path: Path) -> ObjMesh:
 
     # Rows are the text after a keyword, with their line numbers.
     vertices, vertex_line, faces, face_line = list[str](), list[int](), list[str](), list[int]()
-    elements, groups, group = list[tuple[str, str, int, int]](), list[tuple[int, str]](), ""
+    elements, starts, group, whole = list[tuple[str, str, int, int]](), list[tuple[int, str]](), "", ""
     textures, texture_line, material = list[str](), list[int](), ""
-    of_material, of_group = list[str](), list[str]()
+    of_material, of_group, of_object = list[str](), list[str](), list[str]()
     for number, line in enumerate(text.split("\n"), start=1):
         if "#" in line:
             line = line[: line.index("#")]
@@ -92,6 +93,7 @@ def read_obj(path: Path) -> ObjMesh:
             face_line.append(number)
             of_material.append(material)
             of_group.append(group)
+            of_object.append(whole)
         elif key == "vt":
             textures.append(rest)
             texture_line.append(number)
@@ -101,7 +103,8 @@ def read_obj(path: Path) -> ObjMesh:
             elements.append((group, rest, number, len(vertices)))
         elif key in ("g", "o") and rest.strip():
             group = rest.strip()
-            groups.append((len(vertices), group))
+            whole = group if key == "o" else whole
+            starts.append((len(vertices), group))
     if not vertices:
         raise InputError("not an OBJ file: no line of it is a vertex ('v x y z')")
 
@@ -150,12 +153,51 @@ def read_obj(path: Path) -> ObjMesh:
         lines=_line_elements(elements, total),
         # All corners' texture coordinates have the numbers of their vertices: the exporter wrote one `v` per `vt`.
         split_corners=len(textures) == total and all(map(_SAME_TEXTURE.match, chain.from_iterable(corners))),
-        groups=groups,
+        # One object may hold groups that are pieces.
+        objects=_objects(
+            polygons, of_object if len(set(of_object)) > 1 or len(set(of_group)) < 2 else of_group, starts
+        ),
         texture=texture,
         face_material=numbered(of_material),
         face_group=numbered(of_group),
         notes=notes,
     )
+
+
+def _objects(
+    polygons: NDArray[np.int64], names: list[str], starts: list[tuple[int, str]]
+) -> tuple[list[tuple[int, str]], NDArray[np.int64]]:
+    """Return the objects as (first vertex, name), and #F, the one of each face; those that share vertices are one, without a name.
+
+    Vertices stand behind the name of their object, before it, or all at the top of the file. Where objects have theirs in turn, each
+    counts them from its first; otherwise all count them as the file does.
+
+    Args:
+        polygons: #F by k.
+        names: of the object of each face, "" for none.
+        starts: names as the file has them, and how many vertices stand above each.
+    """
+    label, titles = numbered(names)
+    used = polygons >= 0
+    of_corner, vertex = np.repeat(label, used.sum(axis=1)), polygons[used]
+    total = int(vertex.max()) + 1
+    joined = join_labels(total + len(titles), vertex, total + of_corner)[total:]
+    classes, of = np.unique(joined, return_inverse=True)
+    title = [titles[int(np.flatnonzero(of == k)[0])] if (of == k).sum() == 1 else "" for k in range(len(classes))]
+    low, high = np.full(len(classes), total), np.full(len(classes), -1)
+    np.minimum.at(low, of[of_corner], vertex)
+    np.maximum.at(high, of[of_corner], vertex)
+    order = np.argsort(low)
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    found, before = list[tuple[int, str]](), -1
+    in_turn = bool((high[order[:-1]] < low[order[1:]]).all())
+    for k in order.tolist():
+        told = [start for start, name in starts if name == title[k] and before < start <= low[k]]
+        first = max(told, default=int(low[k]) if found else 0) if in_turn else 0
+        found.append((first, title[k]))
+        before = int(high[k])
+    return found, place[of[label]]
 
 
 def _texture_of_corners(

@@ -17,7 +17,7 @@ from warpflat.core.text import area_words, format_count
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.layers import Layer, doubled_layers
+from warpflat.surface.repair.layers import Layer, surplus_layers
 from warpflat.surface.repair.meet import MEET, meet_borders
 from warpflat.surface.repair.polygons import split_polygons
 from warpflat.surface.repair.sheets import face_vectors
@@ -91,17 +91,14 @@ def read_pieces(
         )
     named = _named_apart(found)
     layers = [Layer(surface.vertices, surface.faces) for surface in named]
-    doubled = doubled_layers(layers)
-    notes += [
-        f"{layers[number].describe()} of {named[number].name} dropped: a second layer that lies on {named[other].name} everywhere"
-        for number, other in doubled.items()
-    ]
+    surplus = surplus_layers(layers, [surface.name for surface in named])
+    notes += surplus.values()
     # Without its second layer a piece may be alone of its name.
     kept, met = meet_borders(
-        _named_apart([surface for number, surface in enumerate(found) if number not in doubled]), meet
+        _named_apart([surface for number, surface in enumerate(found) if number not in surplus]), meet
     )
     notes += met
-    return (replace(kept[0], notes=(*notes, *kept[0].notes)), *kept[1:])
+    return (replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes]))), *kept[1:])
 
 
 def object_parts(
@@ -126,20 +123,12 @@ def object_parts(
 
 
 def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:
-    """Yield the objects of a file: name, first vertex, and the faces in its own numbering; one of all faces if they share vertices."""
-    highest = raw.polygons.max(axis=1)
-    lowest = np.where(raw.polygons >= 0, raw.polygons, len(raw.vertices)).min(axis=1)
-    starts = {first: name for first, name in raw.groups if first < len(raw.vertices)}
-    first = np.array([0, *(start for start in starts if start > 0)], dtype=np.int64)
-    of = np.searchsorted(first, lowest, side="right") - 1
-    if (np.searchsorted(first, highest, side="right") - 1 != of).any():
-        yield stem, 0, raw.polygons
-        return
-    for number, start in enumerate(first.tolist()):
+    """Yield the objects of a file: name, first vertex, and the faces in its own numbering."""
+    objects, of = raw.objects or ([(0, "")], np.zeros(len(raw.polygons), dtype=np.int64))
+    for number, (first, name) in enumerate(objects):
         polygons = raw.polygons[of == number]
         if len(polygons):
-            title = make_file_name(starts[start]) if start in starts else stem
-            yield title, start, np.where(polygons >= 0, polygons - start, -1)
+            yield make_file_name(name) if name else stem, first, np.where(polygons >= 0, polygons - first, -1)
 
 
 def _named_apart(surfaces: list[Surface]) -> tuple[Surface, ...]:

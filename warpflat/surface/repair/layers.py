@@ -1,4 +1,4 @@
-"""Layers of cloth that lie on each other: a second copy of a part, which is no piece of its own."""
+"""Layers of cloth that lie on each other: a second copy of a part, or the inner sheet of thick cloth, which are no pieces of their own."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.text import area_words, format_count
+from warpflat.surface.repair.sheets import inner_sheets
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["SAME_LAYER", "Layer", "doubled_layers", "lies_within"]
+__all__ = ["SAME_LAYER", "Layer", "doubled_layers", "lies_within", "surplus_layers"]
 
 #: Layers nowhere further apart than this [m] are one: thinner than any cloth.
 SAME_LAYER = 5e-5
@@ -55,6 +56,32 @@ class Layer:
         """Return the nearest vertex to each point (#P by 3 [m]), and whether it lies within a distance [m]."""
         far, nearest = self._tree.query(points)
         return np.asarray(nearest, dtype=np.int32), np.asarray(far <= distance)
+
+
+def surplus_layers(layers: Sequence[Layer], names: Sequence[str] | None = None) -> dict[int, str]:
+    """Return the layers that are no cloth of their own, each with a sentence on what it is.
+
+    Args:
+        layers: connected parts, their faces wound alike.
+        names: of the layers; without them a layer lies on "another part".
+    """
+
+    def name(number: int) -> str:
+        return names[number] if names else "another part"
+
+    told = {
+        number: f"{layers[number].describe()}{f' of {name(number)}' if names else ''} dropped: a second layer that lies on "
+        f"{name(other)}{' everywhere' if names else ''}"
+        for number, other in doubled_layers(layers).items()
+    }
+    rest = [number for number in range(len(layers)) if number not in told]
+    for row, (of, thickness) in inner_sheets([(layers[k].vertices, layers[k].faces) for k in rest]).items():
+        number, other = rest[row], rest[of]
+        told[number] = (
+            f"cloth drawn {1e3 * thickness:.2g} mm thick: its outer sheet{f', {name(other)},' if names else ''} was taken, the inner "
+            f"one or the rim ({f'{name(number)}, ' if names else ''}{layers[number].describe()}) left out"
+        )
+    return told
 
 
 def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:

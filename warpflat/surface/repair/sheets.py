@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +10,18 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.surface.connectivity import components, join_labels
-from warpflat.surface.half_edges import HalfEdges, paired_half_edges
+from warpflat.surface.half_edges import HalfEdges, border_edges, paired_half_edges
 
-__all__ = ["OuterSheet", "face_vectors", "outer_sheet", "part_sheets"]
+__all__ = ["OuterSheet", "face_vectors", "inner_sheets", "outer_sheet", "part_sheets"]
 
 # Cloth is no thicker than this [m], nor than this share of its size, the square root of the area of one side.
 _THICKEST, _THICK_SHARE = 0.015, 0.03
 # Sheets of one cloth are at their usual distance within this share, over this share of the area.
 _EVEN, _MOSTLY = 0.6, 0.85
+# A part of less than this share of all cloth has no inner sheet looked for.
+_CRUMB = 1e-3
+# Two open sheets whose flux about their own middle is less than this share of their area times their size curve to neither side.
+_CURVED = 0.02
 # The nearest face that looks the other way: a difference in direction of 1 counts like this share of the size.
 _TURN = 0.05
 
@@ -47,10 +52,7 @@ def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray
     # Into each face, at right angles to the edge.
     along = vertices[he.edges[he.edge[at], 1]] - vertices[he.edges[he.edge[at], 0]]
     length = np.linalg.norm(along, axis=1)
-    faces = he.faces[he.face[at]]
-    real = faces >= 0
-    middle = (vertices[np.maximum(faces, 0)] * real[..., None]).sum(axis=1) / real.sum(axis=1)[:, None]
-    into = middle - vertices[he.tail[at]]
+    into = _middles(vertices, he.faces[he.face[at]]) - vertices[he.tail[at]]
     into -= along * ((into * along).sum(axis=1) / np.maximum(length**2, np.finfo(float).tiny))[:, None]
     into /= np.maximum(np.linalg.norm(into, axis=1, keepdims=True), np.finfo(float).tiny)
     starts = np.flatnonzero(np.append(True, np.diff(he.edge[at]) != 0))
@@ -97,6 +99,54 @@ def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray
     return out.astype(np.int32), origin.astype(np.int32)
 
 
+def _middles(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return #F by 3, the mean of the corners of each face (#F by 4)."""
+    real = faces >= 0
+    return np.asarray((vertices[np.maximum(faces, 0)] * real[..., None]).sum(axis=1) / real.sum(axis=1)[:, None])
+
+
+def _facing(middle: FloatArray, vector: FloatArray, reach: FloatArray) -> tuple[IntArray, BoolArray, float] | None:
+    """Pair each face with the nearest one that looks the other way; return None if they lie apart further than sheets of one cloth.
+
+    Args:
+        middle: #F by 3, middles of faces [m].
+        vector: #F by 3, their vector areas [m2], away from the cloth between the sheets.
+        reach: #F, their longest edges [m].
+
+    Returns:
+        #F, the partners; #F, whether both lie at the usual distance; and that distance, the thickness [m].
+    """
+    from scipy.spatial import cKDTree
+
+    area = np.linalg.norm(vector, axis=1)
+    size = float(np.sqrt(0.5 * area.sum()))
+    normal = vector / np.maximum(area, np.finfo(float).tiny)[:, None]
+    tree = cKDTree(np.hstack([middle, _TURN * size * normal]))
+
+    def mates(rows: NDArray[np.integer], shift: float) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Return for some faces the partner, how deep it lies below them and how far aside, sought at a depth."""
+        places = middle[rows] - shift * normal[rows]
+        found = tree.query(np.hstack([places, -_TURN * size * normal[rows]]))[1]
+        gap = middle[found] - middle[rows]
+        # At right angles to the larger of both, whose middle may lie far aside.
+        across = np.where((reach[found] > reach[rows])[:, None], -normal[found], normal[rows])
+        below = -(gap * across).sum(axis=1)
+        return found, below, np.linalg.norm(gap + below[:, None] * across, axis=1)
+
+    mate, depth, aside = mates(np.arange(len(area)), 0.0)
+    order = np.argsort(depth)
+    thickness = float(depth[order[np.searchsorted(np.cumsum(area[order]), 0.5 * area.sum())]])
+    if not 0.0 < thickness <= min(_THICKEST, _THICK_SHARE * size):
+        return None
+    # Another layer on top, as a pocket, is nearer.
+    above = np.flatnonzero(depth <= 0.0)
+    mate[above], depth[above], aside[above] = mates(above, thickness)
+    near = aside <= np.maximum(np.maximum(reach, reach[mate]), thickness)
+    paired = near & (np.abs(depth - thickness) <= _EVEN * thickness)
+    paired &= (normal * normal[mate]).sum(axis=1) < -0.5
+    return mate, paired, thickness
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OuterSheet:
     """The outer sheet of cloth that is drawn with its thickness.
@@ -122,30 +172,17 @@ def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
         vertices: #V by 3, positions [m].
         he: half-edges of faces that are wound alike, two at each edge.
     """
-    from scipy.spatial import cKDTree
-
     faces = he.faces
     vector = face_vectors(vertices, faces)
     area = np.linalg.norm(vector, axis=1)
-    size = float(np.sqrt(0.5 * area.sum()))
-    normal = vector / np.maximum(area, np.finfo(float).tiny)[:, None]
-    real = faces >= 0
-    middle = (vertices[np.maximum(faces, 0)] * real[..., None]).sum(axis=1) / real.sum(axis=1)[:, None]
+    middle = _middles(vertices, faces)
     if float((vector * (middle - middle.mean(axis=0))).sum()) < 0.0:
-        normal = -normal
-    _, mate = cKDTree(np.hstack([middle, _TURN * size * normal])).query(np.hstack([middle, -_TURN * size * normal]))
-    gap = middle[mate] - middle
-    depth = -(gap * normal).sum(axis=1)
-    aside = np.linalg.norm(gap + depth[:, None] * normal, axis=1)
-    order = np.argsort(depth)
-    thickness = float(depth[order[np.searchsorted(np.cumsum(area[order]), 0.5 * area.sum())]])
-    if not 0.0 < thickness <= min(_THICKEST, _THICK_SHARE * size):
+        vector = -vector
+    normal = vector / np.maximum(area, np.finfo(float).tiny)[:, None]
+    found = _facing(middle, vector, _longest_sides(vertices, faces))
+    if found is None:
         return None
-    edge = np.linalg.norm(vertices[he.edges[:, 1]] - vertices[he.edges[:, 0]], axis=1)
-    reach = np.zeros(len(faces))
-    np.maximum.at(reach, he.face, edge[he.edge])
-    paired = (np.abs(depth - thickness) <= _EVEN * thickness) & (aside <= np.maximum(reach, thickness))
-    paired &= (normal * normal[mate]).sum(axis=1) < -0.5
+    mate, paired, thickness = found
     if area[paired].sum() < _MOSTLY * area.sum():
         return None
     a, b = paired_half_edges(he)
@@ -164,9 +201,7 @@ def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
             break
         side[fresh] = np.sign(vote[fresh])
     outer = np.where(paired, side[part], 0.0)
-    flux = (vector * (middle - np.average(middle, axis=0, weights=area))).sum(axis=1) * np.sign(
-        (vector * normal).sum(axis=1)
-    )
+    flux = (vector * (middle - np.average(middle, axis=0, weights=area))).sum(axis=1)
     if float(flux[outer > 0.0].sum()) < float(flux[outer < 0.0].sum()):
         outer = -outer
     # Faces without a partner that lie wholly within the outer sheet are of it.
@@ -186,3 +221,80 @@ def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
     if not 0.3 * area.sum() < area[kept].sum() < 0.7 * area.sum():
         return None
     return OuterSheet(faces=kept, thickness=thickness, left_out=float(area[~kept].sum()))
+
+
+def inner_sheets(layers: Sequence[tuple[FloatArray, IntArray]]) -> dict[int, tuple[int, float]]:
+    """Return the layers that are the inner sheet or the rim of cloth with thickness, each with its outer sheet and the thickness [m].
+
+    Two sheets without a rim, or with one that shares no vertex with them, are parts of their own: they lie at one small distance over
+    nearly all of their area and look away from each other. A lining looks the same way as its outer layer.
+
+    Args:
+        layers: connected parts: #V by 3 [m], and faces (#F by 4) that are wound alike.
+    """
+    from scipy.spatial import cKDTree
+
+    low, high = (np.array([bound(points, axis=0) for points, _ in layers]) for bound in (np.min, np.max))
+    vectors = [face_vectors(points, faces) for points, faces in layers]
+    middles = [_middles(points, faces) for points, faces in layers]
+    areas = np.array([np.linalg.norm(vector, axis=1).sum() for vector in vectors])
+    if not areas.sum() > 0.0:
+        return {}
+    whole = np.average(np.concatenate(middles), axis=0, weights=np.linalg.norm(np.concatenate(vectors), axis=1))
+    found = dict[int, tuple[int, float]]()
+    taken = set[int]()
+    for one in np.argsort(-areas, kind="stable").tolist():
+        if areas[one] < _CRUMB * areas.sum():
+            break
+        within = (low >= low[one] - _THICKEST).all(axis=1) & (high <= high[one] + _THICKEST).all(axis=1)
+        others = [k for k in np.flatnonzero(within).tolist() if k != one and k not in taken]
+        if one in taken or not others:
+            continue
+        group = [one, *others]
+        own = np.repeat(np.arange(len(group)), [len(vectors[k]) for k in group])
+        middle, vector = (np.concatenate([rows[k] for k in group]) for rows in (middles, vectors))
+        reach = np.concatenate([_longest_sides(*layers[k]) for k in group])
+        area = np.linalg.norm(vector, axis=1)
+        sign, pairs = next(
+            ((sign, pairs) for sign in (1.0, -1.0) if (pairs := _facing(middle, sign * vector, reach)) is not None),
+            (0.0, None),
+        )
+        if pairs is None:
+            continue
+        mate, paired, thickness = pairs
+        across = paired & ((own == 0) != (own[mate] == 0))
+        share = np.bincount(own, area * across, minlength=len(group)) / areas[group]
+        partners = [k for k in range(1, len(group)) if share[k] >= _MOSTLY]
+        if share[0] < _MOSTLY or not partners:
+            continue
+        # The sheet that is farther out about their middle; two that curve to neither side, about that of the whole garment.
+        sheets = np.isin(own, [0, *partners])
+        side = np.where(own == 0, 1.0, -1.0) * sign
+        for centre in (np.average(middle[sheets], axis=0, weights=area[sheets]), whole):
+            flux = float((side * (vector * (middle - centre)).sum(axis=1))[sheets].sum())
+            if abs(flux) > _CURVED * areas[one] ** 1.5:
+                break
+        # Flat ones: the first.
+        first = flux >= -1e-9 * areas[one] ** 1.5
+        inner, outer = ([group[k] for k in partners], one) if first else ([one], group[partners[0]])
+        taken.update([one, *(group[k] for k in partners)])
+        found.update(dict.fromkeys(inner, (outer, thickness)))
+        # A rim is a strip along both, as wide as they lie apart.
+        around = cKDTree(np.concatenate([layers[k][0] for k in (one, *(group[k] for k in partners))]))
+        for k in others:
+            narrow = k not in taken and areas[k] <= 0.75 * thickness * _border_length(*layers[k])
+            if narrow and around.query(layers[k][0])[0].max() <= thickness:
+                taken.add(k)
+                found[k] = outer, thickness
+    return found
+
+
+def _longest_sides(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return #F, the longest side of each face (#F by 4) [m]."""
+    places = vertices[np.where(faces >= 0, faces, faces[:, :1])]
+    return np.asarray(np.linalg.norm(places - np.roll(places, -1, axis=1), axis=2).max(axis=1))
+
+
+def _border_length(vertices: FloatArray, faces: IntArray) -> float:
+    ends = border_edges(faces)
+    return float(np.linalg.norm(vertices[ends[:, 1]] - vertices[ends[:, 0]], axis=1).sum())

@@ -8,6 +8,7 @@ are refused with advice. Vertices that stay keep their order and their exact pos
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -392,24 +393,24 @@ def _drop_double_faces(mesh: _Mesh) -> None:
 
 
 def _drop_double_layers(mesh: _Mesh) -> None:
-    """Drop parts that lie on another part everywhere, with vertices of their own."""
+    """Drop parts that lie on another part everywhere, with vertices of their own, and inner sheets of thick cloth."""
     count = int(mesh.part.max()) + 1
     if count == 1:
         return
-    from warpflat.surface.repair.layers import Layer, doubled_layers
+    from warpflat.surface.repair.layers import Layer, surplus_layers
 
     layers = []
     for number in range(count):
         faces = mesh.faces[mesh.part == number]
         used, place = np.unique(faces, return_inverse=True)
         rows = place.reshape(faces.shape).astype(np.int32) - (used[0] < 0)
+        with suppress(InputError):  # a one-sided part has no sides
+            rows, _ = orient(rows)
         layers.append(Layer(mesh.vertices[used[used >= 0]], rows))
-    doubled = list(doubled_layers(layers))
-    if doubled:
-        mesh.notes += [
-            f"{layers[number].describe()} dropped: a second layer that lies on another part" for number in doubled
-        ]
-        mesh.keep(~np.isin(mesh.part, doubled))
+    surplus = surplus_layers(layers)
+    if surplus:
+        mesh.notes += surplus.values()
+        mesh.keep(~np.isin(mesh.part, list(surplus)))
 
 
 def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -> None:
