@@ -42,7 +42,8 @@ def _outside(piece: DraftedPiece) -> Iterator[str]:
             yield f"{piece.name}: point {hole.name} is outside"
     for notch in piece.notches:
         ends = [base + notch.depth * notch.direction for base in notch.base]
-        if not cloth.buffer(notch.depth).covers(shapely.MultiPoint([*notch.base, *ends])):
+        on_cut = cloth.buffer(ON_BORDER).covers(shapely.MultiPoint(notch.base))
+        if not (on_cut and cloth.buffer(notch.depth).covers(shapely.MultiPoint(ends))):
             yield f"{piece.name}: notch of {notch.seam} is outside"
     words = [shapely.Polygon(each.box()) for each in piece.label.words()]
     if piece.label.leader is None and not cloth.covers(shapely.union_all(words)):
@@ -56,6 +57,11 @@ def _cut_at_sheets(printed: DraftedGarment, paper: str) -> Iterator[str]:
     windows = [shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap)) for corner in corners]
     for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True):
         for drawing in sizes:
+            piece = drawing.piece
+            for fold in piece.fold_edges if piece.label.leader is None else ():
+                start, (x, y) = fold.line[0], fold.line[-1] - fold.line[0]
+                if any(((words.box() - start) @ [-y, x]).min() < 0.0 for words in drawing.words):
+                    yield f"{piece.name}: words stand beyond its fold"
             for words in drawing.words:
                 box = shapely.Polygon(placed.on_sheet(words.box()))
                 if not any(window.covers(box) for window in windows):

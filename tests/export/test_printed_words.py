@@ -75,6 +75,7 @@ def test_first_pages_tell_measures_needed_openings_and_what_is_needed(tmp_path: 
             "38": (Measure(name="bust", body=0.88, finished=0.93), Measure(name="waist", body=0.72, finished=0.7))
         },
         needed=(NeededOpening(ring="neck", length=0.37, over="head", girth=0.569, depth=0.1),),
+        knits=("interlock",),
     )
     told = draft_garment(replace(sample_dress(), worn=worn))
     read = pattern_from_json(pattern_json(told))
@@ -92,6 +93,7 @@ def test_first_pages_tell_measures_needed_openings_and_what_is_needed(tmp_path: 
             "+5 cm",
             "-2 cm",
             "sewing thread",
+            "needle and stitch for knits",
             "Cloth needed",
             "56.9 cm must pass (head)",
         ):

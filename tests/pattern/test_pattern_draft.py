@@ -15,7 +15,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, turning_angles
 from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece, nest_label
-from warpflat.pattern.drawing import draw_piece
+from warpflat.pattern.drawing import OnPaper, draw_nest, draw_piece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
@@ -518,3 +518,38 @@ def test_a_seam_that_names_a_wrong_edge_says_the_nearest():
     side = (SeamSide(piece="square", edge="botom"),)
     with pytest.raises(InputError, match="did you mean 'bottom'"):
         Pattern(name="g", pieces={"": [square()]}, seams=[Seam(name="s", sides=(side, side))])
+
+
+@pytest.mark.parametrize("across", [0.1, 0.097, 0.05])
+def test_the_grain_lies_beside_a_line_along_it_and_not_upon_it(across: float):
+    line = np.array([[across, 0.0], [across, 0.3]])
+    grain = np.array([[0.1, 0.05], [0.1, 0.25]])
+    piece = draft_piece(square(internal_lines={"fold line": line}, grain=grain))
+    (drawn,) = piece.internal_lines.values()
+    assert abs(drawn[0, 0] - piece.grain[0, 0]) > 0.003
+    np.testing.assert_allclose(np.diff(piece.grain, axis=0), [[0.0, 0.2]], atol=1e-12)
+    # A line across it moves nothing.
+    crossed = draft_piece(square(internal_lines={"level": np.array([[0.0, 0.1], [0.2, 0.1]])}, grain=grain))
+    plain = draft_piece(square(grain=grain))
+    np.testing.assert_array_equal(crossed.grain, plain.grain)
+
+
+def test_a_nest_on_paper_has_one_fold():
+    def half(size: str, grown: float) -> Piece:
+        corners = np.array([(0, 0), (0.2, 0), (0.2, 0.3), (0, 0.3), (0, 0)]) * [1.0, grown]
+        edges = [
+            Edge(name=name, points=corners[i : i + 2], kind="fold" if name == "left" else "seam")
+            for i, name in enumerate(("bottom", "right", "top", "left"))
+        ]
+        return Piece(name="front", size=size, edges=edges)
+
+    pieces = {size: [half(size, grown)] for size, grown in (("36", 1.0), ("38", 1.1), ("40", 1.05))}
+    drafted = draft_garment(Pattern(name="skirt", pieces=pieces))
+    drawings = draw_nest(tuple(row[0] for row in drafted.pieces.values()), OnPaper())
+    seen = [
+        drawing.piece.size
+        for drawing in drawings
+        for stroke in drawing.strokes
+        if stroke.role == "fold" and not stroke.hidden
+    ]
+    assert seen == ["38"]

@@ -300,6 +300,7 @@ class WornEntry(Entry):
     views: dict[Literal["front", "back"], list[ViewEntry]] = Field(default_factory=dict)
     measures: dict[Text, list[MeasureEntry]] = Field(default_factory=dict)
     needed: list[NeededEntry] = Field(default_factory=list)
+    knits: list[Text] = Field(default_factory=list)
 
 
 class FoundSeamEntry(Entry):
@@ -580,6 +581,7 @@ def _worn(worn: Worn) -> dict[str, Any]:
         },
         "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},
         "needed": [asdict(each) for each in worn.needed],
+        "knits": list(worn.knits),
     }
 
 
@@ -597,6 +599,7 @@ def _read_worn(data: WornEntry) -> Worn:
         },
         measures={size: tuple(Measure(**each.model_dump()) for each in row) for size, row in data.measures.items()},
         needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
+        knits=tuple(data.knits),
     )
 
 

@@ -146,8 +146,9 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
             page.y = y
         page.y -= 3 * 0.0038
     widths: dict[str, list[float]] = {"seam": [], "hem": []}
-    for edge in (edge for piece in pieces for edge in piece.edges if edge.kind in widths and edge.width > 0):
-        widths[edge.kind].append(round(edge.width, 4))
+    for edge in (edge for piece in pieces for edge in piece.edges if edge.kind in ("seam", "hem", "cut")):
+        if edge.width > 0:
+            widths["hem" if edge.kind == "hem" else "seam"].append(round(edge.width, 4))
     allowances = [
         translate(f"{kind}s {{width}}", width=listed([length_words(width, units) for width in sorted(set(row))]))
         for kind, row in widths.items()

@@ -70,7 +70,8 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
         for ring in garment.rings
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
-    return Worn(views=views, measures=measures, needed=needed)
+    knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
+    return Worn(views=views, measures=measures, needed=needed, knits=tuple(knits))
 
 
 def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatArray:

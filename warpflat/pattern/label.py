@@ -168,10 +168,12 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     lines += [
         f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
     ]
-    # The legs of a dart that is cut away are sewn as a seam.
+    # The legs of a dart that is cut away are sewn as a seam, and what is turned in has as much.
     allowances = []
     for kind in ("seam", "hem"):
-        alike = [e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind == "dart" and e.width > 0)]
+        alike = [
+            e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind in ("dart", "cut") and e.width > 0)
+        ]
         values = [length_words(width, piece.units) for width in sorted({round(e.width, 4) for e in alike})]
         if values:
             # The unit once: "6/10 mm".

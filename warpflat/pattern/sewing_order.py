@@ -513,6 +513,8 @@ def tools(garment: DraftedGarment, size: str) -> str:
         needed.append("zip foot")
     if _buttons(garment.pieces[size]) or any(map(_buttons_at_one_end, garment.pieces[size])):
         needed.append("buttonhole foot")
+    if garment.garment.worn is not None and garment.garment.worn.knits:
+        needed.append("needle and stitch for knits")
     return ", ".join(translate(word) for word in needed)
 
 

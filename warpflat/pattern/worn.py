@@ -64,8 +64,10 @@ class Worn:
         views: "front" and "back", the farthest piece first; x to the right, y up [m].
         measures: by size.
         needed: openings that are missing, of the sample size.
+        knits: names of its cloths that are knits.
     """
 
     views: Mapping[str, tuple[ViewedPiece, ...]] = field(default_factory=dict)
     measures: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
     needed: tuple[NeededOpening, ...] = ()
+    knits: tuple[str, ...] = ()
