@@ -1,11 +1,12 @@
 """How far flat pieces lie from the panels that a garment was sewn from.
 
-    WARPFLAT_DATA=DIR python benchmarks/truth.py [FILE ...] [--fabric jersey] [--bands "as worn"]
+    WARPFLAT_DATA=DIR python benchmarks/truth.py [FILE ...] [--fabric jersey] [--bands "as worn"] [--hang 0.0165]
 
 A worn garment whose texture is its sewn pattern (Style3D, CLO, GarmentCode) says what its flat pieces should be. Each island is flattened
 and laid on its panel, turned, moved and perhaps mirrored, never scaled; the distances of all vertices are measured in millimetres. Rows:
-the whole garment as `warpflat flatten` leaves it ("sewn"), each panel on its own by springs and by the membrane, and beside them
-libigl's ARAP and LSCM, where it is installed. Columns of a panel: mean, 95 % of its vertices, 95 % of those on its outline. The last
+the whole garment as `warpflat flatten` leaves it ("sewn"), with `--hang` the same after the weight of the cloth below is
+taken off ("unhung"), each panel on its own by springs and by the membrane, and beside them libigl's ARAP and
+LSCM, where it is installed. Columns of a panel: mean, 95 % of its vertices, 95 % of those on its outline. The last
 lines are means over all panels, weighted by their areas; and without bands, which lie far off where they are not cut straight.
 """
 
@@ -15,6 +16,7 @@ import argparse
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -25,15 +27,20 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.flattening.as_cut import distances_laid
 from warpflat.flattening.flatten_all import flatten_all
+from warpflat.flattening.result import Flattening
 from warpflat.garment.sew_pieces import Bands, sew_pieces
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.io.read import read_mesh_file
 from warpflat.surface.io.sewn_panels import SewnPanel, mesh_area, sewn_panels
+from warpflat.surface.mesh import Surface
+from warpflat.surface.triangles import triangulate
 
 FloatArray = NDArray[np.float64]
 
 # A panel is a band where the square of its outline is so many times its area.
 _BAND = 40.0
+# Heights at which the weight below is summed up, and the least length that carries it [m].
+_STEPS, _LEAST_AROUND = 200, 0.05
 
 
 def outline(panel: SewnPanel) -> NDArray[np.int32]:
@@ -76,13 +83,54 @@ def peers(panel: SewnPanel) -> dict[str, FloatArray]:
     return {"ARAP": np.asarray(igl.arap_solve(lscm[pin].copy(), data, lscm))[:, :2], "LSCM": lscm}
 
 
-def layouts(panels: Sequence[SewnPanel], fabric: str, bands: Bands = "auto") -> dict[str, list[FloatArray]]:
+def unhung(panels: Sequence[SewnPanel], hang: float) -> list[Surface]:
+    """Return the worn panels lower and shorter by what the weight of the cloth below each height has stretched them.
+
+    What hangs below a height is carried along the line of the garment at that height, whose length follows from the area between two
+    heights and its slope (coarea formula). What body and friction carry is not known.
+
+    Args:
+        panels: of one garment, Y up.
+        hang: strain of a strip under its own weight for each metre of it [1/m]: weight over stiffness.
+    """
+    corners = [panel.surface.vertices[triangulate(panel.surface.faces)[0]] for panel in panels]
+    a, b, c = np.concatenate(corners).transpose(1, 0, 2)
+    vector = 0.5 * np.cross(b - a, c - a)
+    area = np.linalg.norm(vector, axis=1)
+    slope = np.sqrt(np.maximum(1.0 - (vector[:, 1] / np.maximum(area, 1e-30)) ** 2, 0.0))
+    ends = np.stack([a[:, 1], b[:, 1], c[:, 1]])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    steps = np.linspace(low.min(), high.max(), _STEPS + 1)
+    below = np.zeros((2, _STEPS + 1))
+    for k, step in enumerate(steps):
+        share = np.clip((step - low) / np.maximum(high - low, 1e-12), 0.0, 1.0)
+        below[:, k] = share @ area, share @ (area * slope)
+    around = np.diff(below[1]) / (steps[1] - steps[0])
+    strain = hang * 0.5 * (below[0, 1:] + below[0, :-1]) / np.maximum(around, _LEAST_AROUND)
+    lower = np.append(0.0, np.cumsum((steps[1] - steps[0]) / (1.0 + strain)))
+    return [
+        replace(
+            panel.surface,
+            vertices=np.column_stack([x := panel.surface.vertices, np.interp(x[:, 1], steps, lower)])[:, [0, 3, 2]],
+        )
+        for panel in panels
+    ]
+
+
+def layouts(
+    panels: Sequence[SewnPanel], fabric: str, bands: Bands = "auto", hang: float | None = None
+) -> dict[str, list[FloatArray]]:
     """Return each way of flattening with its layout of every panel; `bands` of those that are sewn are cut straight."""
     surfaces = [panel.surface for panel in panels]
     alone = flatten_all(surfaces, fabric=fabric)
-    sewn = sew_pieces(alone, eased=True, bands=bands)
+
+    def sewn(pieces: Sequence[Flattening]) -> list[FloatArray]:
+        garment = sew_pieces(pieces, eased=True, bands=bands)
+        return [garment.pieces[surface.name].positions for surface in surfaces]
+
     found = {
-        "sewn": [sewn.pieces[surface.name].positions for surface in surfaces],
+        "sewn": sewn(alone),
+        **({} if hang is None else {"unhung": sewn(flatten_all(unhung(panels, hang), fabric=fabric))}),
         "springs": [piece.positions for piece in alone],
         "membrane": [piece.positions for piece in flatten_all(surfaces, fabric=fabric, model="membrane")],
     }
@@ -121,6 +169,11 @@ def main() -> int:
     parser.add_argument("--units", help="of the files, where they do not say")
     parser.add_argument("--fabric", default="woven")
     parser.add_argument("--bands", default="auto", choices=get_args(Bands), help="that are cut straight")
+    parser.add_argument(
+        "--hang",
+        type=float,
+        help="weight over warp stiffness: strain for each metre of cloth below [1/m]",
+    )
     given = parser.parse_args()
     files = given.files
     if not files:
@@ -135,7 +188,7 @@ def main() -> int:
             print(f"{file.name}: left out: {error}")
             continue
         print(f"{file.name}: mean, 95 %, 95 % of the outline [mm], fabric {given.fabric}, bands {given.bands}")
-        print("\n".join(table(panels, layouts(panels, given.fabric, given.bands))), flush=True)
+        print("\n".join(table(panels, layouts(panels, given.fabric, given.bands, given.hang))), flush=True)
         done += 1
     if not done:
         print("no garment whose texture is its pattern; give files, or set WARPFLAT_DATA", file=sys.stderr)

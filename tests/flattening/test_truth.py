@@ -11,7 +11,8 @@ import pytest
 
 from warpflat.core.errors import InputError
 from warpflat.surface.io.read import RawMesh, read_mesh_file
-from warpflat.surface.io.sewn_panels import sewn_panels
+from warpflat.surface.io.sewn_panels import SewnPanel, sewn_panels
+from warpflat.surface.repair.validate import make_surface
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
@@ -81,3 +82,18 @@ def test_a_worn_sleeve_lies_on_its_panel():
     for name, (layout,) in truth.layouts(panels[2:3], "woven").items():
         # Its cloth is worn stretched: all ways are as far off, but for LSCM.
         assert truth.measure(panels[2], layout)[0] < (2.5 if name == "LSCM" else 1.9), name
+
+
+def test_cloth_that_hangs_is_taken_off_its_weight() -> None:
+    """A strip of .6 m in rest, hung up: at a height y of its rest it is strained by its share of what hangs below."""
+    hang = 0.03
+    u, y = (each.ravel() for each in np.meshgrid(np.linspace(0.0, 0.2, 11), np.linspace(0.0, 0.6, 241)))
+    at = np.arange(2651).reshape(241, 11)
+    faces = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+    worn = np.column_stack([u, y + 0.5 * hang * y**2, np.zeros(len(u))])
+    panel = SewnPanel(surface=make_surface(worn, faces), cut=np.column_stack([u, y]), unit="m")
+    (freed,) = truth.unhung([panel], hang)
+    # The weight is that of the worn area, which is longer than the cloth by a share of the second order.
+    assert np.ptp(worn[:, 1]) == pytest.approx(0.6054, abs=1e-6)
+    assert np.ptp(freed.vertices[:, 1]) == pytest.approx(0.6, abs=1.2e-4)
+    assert np.array_equal(freed.vertices[:, [0, 2]], worn[:, [0, 2]])
