@@ -68,28 +68,54 @@ def step_bytes(network: SpringNetwork) -> float:
 
 
 _CHILD = """
-import pickle, sys, threading, time
+import pickle, sys, time
 sys.path.insert(0, sys.argv[1])
-import speed, meshes, warpflat
-surface, datum, name = pickle.load(sys.stdin.buffer)
+import speed, warpflat
+warm, mesh, name, repeats = pickle.load(sys.stdin.buffer)
 def status(key):
     for line in open("/proc/self/status"):
         if line.startswith(key):
             return 1024 * int(line.split()[1])
-warm = meshes.KINDS["irregular"]("dome", 200)
-warpflat.flatten(warm.surface, fabric=speed.CLOTH, datum=warm.datum, device="cpu", **speed.OURS[name])
-before = status("VmRSS")
+def flatten(surface, datum):
+    return warpflat.flatten(surface, fabric=speed.CLOTH, datum=datum, device="cpu", **speed.OURS[name])
+flatten(*warm)
+surface, datum = pickle.loads(mesh)
+before, taken = status("VmRSS"), []
 open("/proc/self/clear_refs", "w").write("5")
-warpflat.flatten(surface, fabric=speed.CLOTH, datum=datum, device="cpu", **speed.OURS[name])
-print(status("VmHWM") - before)
+for _ in range(repeats):
+    begun = time.process_time()
+    flat = flatten(surface, datum)
+    taken.append(time.process_time() - begun)
+    if len(taken) == 1:
+        most = status("VmHWM") - before
+    del flat
+    surface, datum = pickle.loads(mesh)
+print(most, min(taken))
 """
 
 
 def memory_of_flatten(mesh: Mesh, solver: str) -> float:
     """Bytes by which `warpflat.flatten` raises the peak memory of a fresh process (Linux), kernels already loaded."""
-    given = pickle.dumps((mesh.surface, mesh.datum, solver))
+    return cost_of_flatten(mesh, solver)[0]
+
+
+def cost_of_flatten(mesh: Mesh, solver: str, *, warm: Mesh | None = None, repeats: int = 1) -> tuple[float, float]:
+    """Return what `warpflat.flatten` takes in a fresh process (Linux): growth of its peak memory [bytes], processor time [s].
+
+    Args:
+        mesh: it is flattened `repeats` times, from copies of which nothing is known; the fastest counts.
+        solver: a name of `speed.OURS`.
+        warm: flattened before, so that kernels are loaded; a small irregular dome by default.
+    """
+    from meshes import KINDS
+
+    warm = warm or KINDS["irregular"]("dome", 200)
+    given = pickle.dumps(
+        ((warm.surface, warm.datum), pickle.dumps((mesh.surface, mesh.datum)), solver, repeats), protocol=5
+    )
     here = str(Path(__file__).parent)
     done = subprocess.run([sys.executable, "-c", _CHILD, here], input=given, capture_output=True, env=os.environ.copy())
     if done.returncode:
         raise RuntimeError(done.stderr.decode().strip().splitlines()[-1])
-    return float(done.stdout.decode().split()[-1])
+    memory, seconds = done.stdout.decode().split()[-2:]
+    return float(memory), float(seconds)

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, KDTree
 
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface
@@ -93,10 +94,46 @@ def irregular(shape: str, size: int) -> Mesh:
     return Mesh(name=f"{shape}, irregular", surface=surface, datum=_line_at(surface, vertices[: len(middle)]))
 
 
+def garment(file: str | Path, size: int, *, units: str = "m") -> Mesh:
+    """About `size` vertices of an irregular triangle mesh on the surface of a garment's piece: jittered hexagonal points in its flat
+    piece, within its outline, by Delaunay, and lifted smoothly (Clough and Tocher 1965)."""
+    from scipy.interpolate import CloughTocher2DInterpolator
+    from shapely import LineString, Polygon, contains_xy, prepare
+
+    import warpflat
+
+    flat = warpflat.flatten(read_surface(file, units=units), fabric="isotropic", device="cpu")
+    surface, layout = flat.surface, flat.positions
+    outline = Polygon(layout[max(border_loops(surface.faces), key=len)])
+    spacing = (outline.area / size * 2.0 / 3.0**0.5) ** 0.5
+    ring = LineString(outline.exterior.coords)
+    around = np.array([ring.interpolate(s).coords[0] for s in np.arange(0.0, ring.length - 0.5 * spacing, spacing)])
+    (west, south, east, north) = outline.bounds
+    rows, columns = np.arange(south, north, spacing * 3.0**0.5 / 2.0), np.arange(west, east, spacing)
+    inner = np.stack(np.meshgrid(columns, rows), axis=-1)
+    inner[1::2, :, 0] += 0.5 * spacing
+    inner = inner.reshape(-1, 2)
+    inner = inner + np.random.default_rng(size).uniform(-0.25, 0.25, inner.shape) * spacing
+    within = outline.buffer(-0.6 * spacing)
+    prepare(within)
+    points = np.concatenate([around, inner[contains_xy(within, inner[:, 0], inner[:, 1])]])
+    triangles = Delaunay(points).simplices
+    middle = points[triangles].mean(axis=1)
+    prepare(outline)
+    triangles = triangles[contains_xy(outline, middle[:, 0], middle[:, 1])]
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    triangles = np.where(doubled[:, None] < 0, triangles[:, ::-1], triangles)[np.abs(doubled) > 1e-3 * spacing**2]
+    vertices = CloughTocher2DInterpolator(layout, surface.vertices)(points)
+    # Points of the outline lie on the border of what is interpolated, and by rounding beyond it.
+    outside = np.isnan(vertices[:, 0])
+    vertices[outside] = surface.vertices[KDTree(layout).query(points[outside])[1]]
+    lifted = make_surface(vertices, triangles, name=f"{Path(file).stem}_{size}")
+    return Mesh(name=f"{Path(file).stem}, garment", surface=lifted, datum=None)
+
+
 def _line_at(surface: Surface, points: FloatArray) -> NDArray[np.int32]:
     """Vertices at the given points (in case the door has renumbered them)."""
-    from scipy.spatial import KDTree
-
     return KDTree(surface.vertices).query(points)[1].astype(np.int32)
 
 

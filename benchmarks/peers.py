@@ -1,15 +1,20 @@
 """The peers: libigl's ARAP and SLIM, SciPy's L-BFGS, and majorization with a sparse Cholesky factor.
 
 Each takes a `Problem` and a first layout and shows every iterate to a `Clock`, which stands while it looks. Packages that are
-not installed leave their rows out.
+not installed leave their rows out. Programs that show no iterate (boundary first flattening, Blender, xatlas) give their layout and
+the processor seconds that it took.
 """
 
 from __future__ import annotations
 
 import math
+import resource
+import subprocess
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -142,11 +147,15 @@ def lscm(problem: Problem) -> FloatArray:
     second = border[np.argmax(np.linalg.norm(v[border] - v[first], axis=1))]
     length = float(np.linalg.norm(v[second] - v[first]))
     layout = np.asarray(igl.lscm(v, t, np.array([first, second]), np.array([[0.0, 0.0], [length, 0.0]]))[0])
+    return as_cloth(problem, layout)
+
+
+def as_cloth(problem: Problem, layout: FloatArray) -> FloatArray:
+    """Return a layout (#V by 2) scaled to the surface's area, and mirrored where most of it lies face down."""
+    v, t = problem.vertices, problem.triangles
     area = 0.5 * np.linalg.norm(np.cross(v[t[:, 1]] - v[t[:, 0]], v[t[:, 2]] - v[t[:, 0]]), axis=1).sum()
     flat = signed_cell_areas(problem.triangles, layout).sum()
-    if flat < 0.0:
-        layout[:, 1] *= -1.0
-    return np.ascontiguousarray(layout * (area / abs(flat)) ** 0.5)
+    return np.ascontiguousarray(layout * np.array([1.0, math.copysign(1.0, flat)]) * (area / abs(flat)) ** 0.5)
 
 
 def turn_upright(layout: FloatArray, datum: IntArray) -> FloatArray:
@@ -330,3 +339,91 @@ def majorize_with(factor: str) -> Solver:
             clock.look(positions)
 
     return majorize
+
+
+def bff(problem: Problem, program: str) -> tuple[FloatArray, float]:
+    """Flatten by boundary first flattening (Sawhney and Crane 2017): a program that is called as its `bff-command-line IN.obj OUT.obj`.
+
+    Seconds are those of the program's process, reading and writing its files included.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        given, made = Path(folder) / "in.obj", Path(folder) / "out.obj"
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in problem.vertices.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (problem.triangles + 1).tolist()]
+        given.write_text("\n".join(lines) + "\n")
+        begun = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([program, str(given), str(made)], check=True, capture_output=True)
+        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+        rows = [line.split() for line in made.read_text().splitlines()]
+    places = np.array([row[1:3] for row in rows if row[:1] == ["vt"]], dtype=float)
+    corners = (
+        np.array([corner.split("/")[:2] for row in rows if row[:1] == ["f"] for corner in row[1:4]], dtype=int) - 1
+    )
+    layout = np.zeros((len(problem.vertices), 2))
+    layout[corners[:, 0]] = places[corners[:, 1]]
+    return as_cloth(problem, layout), ended.ru_utime + ended.ru_stime - begun.ru_utime - begun.ru_stime
+
+
+# `bpy` as a module, in a Python of its own: it asks for another NumPy.
+_BLENDER = """
+import sys, time
+import bpy
+import numpy as np
+given = np.load(sys.argv[1])
+mesh = bpy.data.meshes.new("piece")
+mesh.from_pydata(given["vertices"].tolist(), [], given["triangles"].tolist())
+mesh.uv_layers.new(name="st")
+made = bpy.data.objects.new("piece", mesh)
+bpy.context.scene.collection.objects.link(made)
+bpy.context.view_layer.objects.active = made
+made.select_set(True)
+bpy.ops.object.mode_set(mode="EDIT")
+bpy.ops.mesh.select_all(action="SELECT")
+begun = time.process_time()
+bpy.ops.uv.unwrap(method="MINIMUM_STRETCH", iterations=int(sys.argv[3]), margin=0.0)
+seconds = time.process_time() - begun
+bpy.ops.object.mode_set(mode="OBJECT")
+places = np.empty(2 * len(mesh.loops))
+mesh.uv_layers["st"].data.foreach_get("uv", places)
+corner = np.empty(len(mesh.loops), dtype=int)
+mesh.loops.foreach_get("vertex_index", corner)
+np.savez(sys.argv[2], places=places.reshape(-1, 2), corner=corner, seconds=seconds)
+"""
+
+
+def blender(problem: Problem, python: str, iterations: int = 50) -> tuple[FloatArray, float]:
+    """Flatten by Blender's minimum stretch, its SLIM, in a Python that has `bpy`; seconds are those of the operator alone."""
+    with tempfile.TemporaryDirectory() as folder:
+        given, made = Path(folder) / "in.npz", Path(folder) / "out.npz"
+        np.savez(given, vertices=problem.vertices, triangles=problem.triangles)
+        command = [python, "-c", _BLENDER, str(given), str(made), str(iterations)]
+        subprocess.run(command, check=True, capture_output=True)
+        found = np.load(made)
+        layout = np.zeros((len(problem.vertices), 2))
+        layout[found["corner"]] = found["places"]
+        if np.ptp(layout[found["corner"]] - found["places"]) > 0.0:
+            raise RuntimeError("a vertex lies at several places: it was cut into islands")
+        return as_cloth(problem, layout), float(found["seconds"])
+
+
+def xatlas(problem: Problem) -> tuple[int, FloatArray, FloatArray, float]:
+    """Flatten by xatlas, which cuts a piece into charts.
+
+    Returns:
+        The number of charts, lengths of the triangles' sides on the surface and in their chart, scaled to the surface's area
+        (#T by 3 each), and seconds.
+    """
+    import xatlas as package
+
+    atlas = package.Atlas()
+    atlas.add_mesh(problem.vertices.astype(np.float32), problem.triangles.astype(np.uint32))
+    begun = now()
+    atlas.generate()
+    seconds = now() - begun
+    origin, triangles, places = atlas[0]
+    area = np.abs(signed_cell_areas(triangles.astype(np.int32), places.astype(float))).sum()
+    surface = problem.vertices[origin[triangles]]
+    whole = 0.5 * np.linalg.norm(np.cross(surface[:, 1] - surface[:, 0], surface[:, 2] - surface[:, 0]), axis=1).sum()
+    flat = places[triangles].astype(float) * (whole / area) ** 0.5
+    sides = [np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2) for corner in (surface, flat)]
+    return atlas.chart_count, sides[0], sides[1], seconds

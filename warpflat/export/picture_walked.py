@@ -65,9 +65,9 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
             # The pieces lie to the left of their seam: above it, where it runs to the right.
             cloth = shapely.LineString(on_page).buffer(CLOTH + MARGIN, single_sided=True, join_style="round")
             for part in shapely.get_parts(shapely.intersection(cloth, room)):
-                axis.add_patch(
-                    Polygon(shapely.get_coordinates(part.exterior), facecolor=colour, alpha=_CLOTH_ALPHA, linewidth=0)
-                )
+                # As an artist it moves no limits, which would be looked for along each of its sides.
+                outline = shapely.get_coordinates(part.exterior)
+                axis.add_artist(Polygon(outline, facecolor=colour, alpha=_CLOTH_ALPHA, linewidth=0))
             axis.add_artist(Line2D(*on_page.T, color=colour, linewidth=1.6, alpha=0.85))
             axis.add_artist(Line2D(*(notches + centre).T, color=colour, marker="|", markersize=9, linestyle=""))
         notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"

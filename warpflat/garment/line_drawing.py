@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +31,8 @@ __all__ = ["describe_worn"]
 _WITHIN, _LEAST_AREA = 0.001, 1e-5
 # Slits and spikes of an outline are narrower than twice this [m].
 _SLIT = 1e-4
+# A triangle of less than twice this area [m2] in the view is seen edge on: it covers nothing.
+_SEEN_EDGE_ON = 1e-12
 # A face whose normal points away from the viewer by more than this cosine is on the far side.
 _NEAR_SIDE, _EDGE_ON = -0.1, -0.6
 # Teeth of a zip are drawn so far apart; the bar at its end, and a circle of radius 1 [m].
@@ -140,6 +143,22 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
             yield ViewedPiece(outlines=(), lines=tuple(lines))
 
 
+def _merged(shown: FloatArray) -> list[Any]:
+    """Return polygons that together cover triangles (#T by 3 by 2 [m]) which face one way: those that do not cover each other are merged
+    as a coverage, by their shared sides, at a twentieth of the cost of a union."""
+    import shapely
+
+    if not len(shown):
+        return []
+    with suppress(shapely.errors.GEOSException):
+        merged = shapely.coverage_union_all(shapely.polygons(shown))
+        if merged.is_valid or len(shown) == 1:
+            return [merged]
+    middle = shown.mean(axis=1)
+    order = np.argsort(middle[:, np.argmax(np.ptp(middle, axis=0))], kind="stable")
+    return [part for half in np.array_split(order, 2) for part in _merged(shown[half])]
+
+
 def _views(flat: Flattening, *, half: bool) -> tuple[ViewedPiece, ViewedPiece]:
     """Return a piece as it is seen from the front and from the back; of a half garment with its mirror image."""
     import shapely
@@ -147,9 +166,14 @@ def _views(flat: Flattening, *, half: bool) -> tuple[ViewedPiece, ViewedPiece]:
     faces, space = flat.faces, flat.surface.vertices[flat.vertex_origin]
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
     mirrored = [space[:, :2], space[:, :2] * [-1.0, 1.0]] if half else [space[:, :2]]
-    shown = np.concatenate([points[triangles] for points in mirrored])
+    shown = space[triangles][:, :, :2]
+    turn = shown[:, 1:] - shown[:, :1]
+    doubled = turn[:, 0, 0] * turn[:, 1, 1] - turn[:, 0, 1] * turn[:, 1, 0]
+    merged = [part for side in (1.0, -1.0) for part in _merged(shown[side * doubled > _SEEN_EDGE_ON])]
+    if half:
+        merged += [shapely.transform(part, lambda xy: xy * [-1.0, 1.0]) for part in merged]
     # What it covers from the back is the mirror image of what it covers from the front.
-    covered = shapely.union_all(shapely.polygons(shown), grid_size=1e-6)
+    covered = shapely.union_all(merged, grid_size=1e-6)
     # Slits and spikes between faces that rounding has parted are no lines of the garment.
     for grown in (_SLIT, -2.0 * _SLIT, _SLIT):
         covered = covered.buffer(grown, join_style="mitre")

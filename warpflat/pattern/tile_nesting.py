@@ -125,9 +125,7 @@ def nest_on_tiles(
             grid = _Grid(cell=cell, per_tile=(per_tile[0], per_tile[1]), shared=shared, tiles=tiles)
             sheet = Places((tiles[0] * per_tile[0] + shared[0], tiles[1] * per_tile[1] + shared[1]))
             for order in orders(masks)[: None if coarser == 1.0 else 2]:
-                laid = _lay(masks, order, grid, sheet)
-                if laid is not None and (best is None or laid[0] < best[0]):
-                    best = laid
+                best = _lay(masks, order, grid, sheet, np.inf if best is None else best[0]) or best
     assert best is not None
     # Places on the sheet [m], y upwards, and its size, without unused rows and columns at its end.
     shapes_laid = best[1]
@@ -223,9 +221,12 @@ def orders(masks: Sequence[Sequence[Mask]]) -> list[list[int]]:
 
 
 def _lay(
-    masks: Sequence[Sequence[Mask]], order: Sequence[int], grid: _Grid, sheet: Places
+    masks: Sequence[Sequence[Mask]], order: Sequence[int], grid: _Grid, sheet: Places, below: float
 ) -> tuple[float, list[tuple[Mask, int, int]]] | None:
-    """Lay shapes in an order; return the price in tiles and each one's mask, row and column; None if one finds no room."""
+    """Lay shapes in an order; return the price in tiles and each one's mask, row and column.
+
+    None if one finds no room, or as soon as the price is no longer `below` what was had before: it only grows.
+    """
     sheet.clear()
     used = np.zeros(grid.tiles, dtype=bool)
     places: dict[int, tuple[Mask, int, int]] = {}
@@ -259,8 +260,10 @@ def _lay(
         places[k] = best[1:]
         sheet.take(*best[1:])
         used |= _touched(best[1].cells, best[2], best[3], grid)
-    spread = SPREAD * (int(used.any(axis=1).sum()) + int(used.any(axis=0).sum()))
-    return float(used.sum()) + spread, [places[k] for k in range(len(masks))]
+        total = float(used.sum()) + SPREAD * (int(used.any(axis=1).sum()) + int(used.any(axis=0).sum()))
+        if total >= below:
+            return None
+    return total, [places[k] for k in range(len(masks))]
 
 
 def _blocks(size: int, per_tile: int, shared: int) -> tuple[IntArray, IntArray]:
