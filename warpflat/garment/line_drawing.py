@@ -99,13 +99,13 @@ def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
         # Pieces meet at their ends, and their points run on across the view.
         points = points[np.argsort(points[:, 0], kind="stable")]
         above = 1.0 if points[:, 1].mean() > np.mean(inside) else -1.0
-        shift = above * wish.width * (-1.0 if wish.shaped or wish.shorten > 0.0 else 1.0)
+        shift = above * wish.width * (-1.0 if wish.shaped or wish.shorten else 1.0)
         ring = np.concatenate([points, points[::-1] + np.array([0.0, shift])])
         yield ViewedPiece(outlines=(ring,), lines=(np.concatenate([ring, ring[:1]]),))
 
 
 def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
-    """Yield zips, as teeth and a bar at the lower end, the upper end of slits and vents, as a bar, and buttons."""
+    """Yield zips, as teeth and a bar at the lower end, the upper end of slits, vents and godets, as a bar, buttons, and edges of wraps."""
     assert garment.form is not None
     assert garment.mannequin is not None
     bust = garment.mannequin.layout.lines["bust"]
@@ -120,6 +120,11 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
             seen = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
             # A side seam is the outline of both views.
             if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
+                continue
+            if opening.kind == "wrap":
+                # The edge of the upper half: from the neckline to the waist, and on beside the line.
+                to_waist = arc / arc[-1] if "neck" in garment.form.pieces[part.piece].edges else np.ones(len(arc))
+                lines.append(seen + np.outer(opening.width * np.minimum(to_waist, 1.0), [sign, 0.0]))
                 continue
             # Where something lies, and its shape about there.
             shapes = [(end, _BAR)]

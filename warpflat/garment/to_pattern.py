@@ -164,8 +164,9 @@ def pattern_of_garment(
     ):
         side = (SeamSide(piece=piece, edge=edge),)
         seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
-    # One pattern cannot serve for both sides where just one of them has an opening.
-    pairs = () if one_sided(sample.openings) else find_mirror_pairs(garments, pieces, seams)
+    # One pattern cannot serve for both sides where just one of them has an opening, or a hem slants to one side.
+    apart = one_sided(sample.openings) or any(wish.is_one_sided for wish in sample.finishing)
+    pairs = () if apart else find_mirror_pairs(garments, pieces, seams)
     drawn, notes = _drawn_once(pieces, pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
@@ -200,6 +201,9 @@ def pattern_of_garment(
             girths[size] |= {} if head is None else {"head": head}
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
     pattern = add_pockets(pattern, sample.pockets)
+    # Godets of one size are equal, unless a slanted hem cuts them.
+    pattern, equal = draw_equal_pieces_once(pattern, called="godet")
+    notes += equal
     return replace(pattern, worn=describe_worn(garments, pattern.sample)), notes
 
 
