@@ -175,3 +175,13 @@ def test_line_that_meets_no_hem_is_named(skirt: Garment):
         finish_edges(pattern_of(skirt), [slanted({"cuff": 0.1})])
     with pytest.raises(InputError, match="are shorter than 700 mm"):
         finish_edges(pattern_of(skirt), [slanted({"side left": 0.7})])
+
+
+def test_line_drawing_shows_the_slanted_hem(skirt: Garment):
+    worn = pattern_of(replace(skirt, finishing=(slanted({"side left": 0.2, "side right": 0.0}),))).worn
+    assert worn is not None
+    for side, sign in (("front", 1.0), ("back", -1.0)):
+        points = np.concatenate([ring for piece in worn.views[side] for ring in piece.outlines])
+        # The body's left is at positive x in front, and at negative x behind.
+        left, right = (points[sign * turn * points[:, 0] > 0.15] for turn in (1.0, -1.0))
+        assert left[:, 1].min() - right[:, 1].min() > 0.13

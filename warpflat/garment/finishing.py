@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import find_unused_name, other_side, without_side
 from warpflat.garment.button_stand import buttonhole
@@ -15,11 +16,11 @@ from warpflat.garment.facings import Stand, centre_notch, is_beside, with_facing
 from warpflat.garment.flounces import with_flounce
 from warpflat.garment.free_edges import Break, FreeChain, chain_length, free_chains
 from warpflat.garment.plackets import with_placket, with_slits
-from warpflat.garment.shaped_band import shortened, with_shaped_waistband
+from warpflat.garment.shaped_band import shortened, slant_rises, with_shaped_waistband
 from warpflat.garment.strips import Strip, strip_edges, swept
 from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamSide
 
-__all__ = ["FINISHES", "Finishing", "finish_edges", "with_plackets"]
+__all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
 
 #: By kind the width of a finishing piece [m]; of what is folded that of the finished piece, which is cut twice as wide.
 FINISHES = {
@@ -173,6 +174,16 @@ def finish_edges(
         except InputError as error:
             raise InputError(f"finishing[{number}]: {error}") from None
     return pattern
+
+
+def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[tuple[str, str], tuple[FloatArray, FloatArray]]:
+    """Return how wide a strip slanted hems lose in the sample size, as :func:`slant_rises` gives it."""
+    found = dict[tuple[str, str], tuple[FloatArray, FloatArray]]()
+    for wish in finishing:
+        if isinstance(wish.shorten, Mapping):
+            places = _opened_up(pattern, wish.edge, sewn=False)[1]
+            found |= slant_rises(pattern, places, wish.shorten, pattern.sample)
+    return found
 
 
 def with_plackets(opened: Mapping[str, float], finishing: Sequence[Finishing]) -> dict[str, float]:

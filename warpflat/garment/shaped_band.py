@@ -22,7 +22,7 @@ _ON_EDGE = 1e-3
 # A slanted edge has so many points at least, and is moved by so much [m] where it stays: a strip has two ends.
 _SLANTED, _LEAST_RISE = 33, 2e-5
 
-__all__ = ["shortened", "with_shaped_waistband", "without_strip"]
+__all__ = ["shortened", "slant_rises", "with_shaped_waistband", "without_strip"]
 
 
 def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
@@ -145,7 +145,7 @@ def shortened(pattern: Pattern, places: Sequence[tuple[str, str]], width: float 
     pieces, cut = {size: list(row) for size, row in pattern.pieces.items()}, dict[tuple[str, str], tuple[str, bool]]()
     widths = dict[tuple[str, str], float]()
     for size, row in pieces.items():
-        rises = {} if isinstance(width, float) else _rises(pattern, places, width, size)
+        rises = {} if isinstance(width, float) else slant_rises(pattern, places, width, size)
         for name, edge in places:
             at = next(k for k, piece in enumerate(row) if piece.name == name)
             order = [each.name for each in row[at].edges]
@@ -169,7 +169,7 @@ def shortened(pattern: Pattern, places: Sequence[tuple[str, str]], width: float 
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def _rises(
+def slant_rises(
     pattern: Pattern, places: Sequence[tuple[str, str]], by_line: Mapping[str, float], size: str
 ) -> dict[tuple[str, str], tuple[FloatArray, FloatArray]]:
     """Return how wide a strip is along each of some edges (lengths from its start and widths there [m]), from its widths at lines.
