@@ -292,8 +292,8 @@ def _form_section() -> list[str]:
         ),
         _row(
             "`sleeve`",
-            "How sleeves are cut: `set-in`, `raglan` (to the neck; `front_cm` and `back_cm` from the shoulder its seam meets the armhole) or "
-            "`kimono` (in one with front and back).",
+            "How sleeves are cut: `set-in`, `dropped` (the armhole lies `drop_cm` down the arm), `raglan` (to the neck; `front_cm` and "
+            "`back_cm` from the shoulder its seam meets the armhole) or `kimono` (in one with front and back).",
             '`sleeve = { cut = "raglan", front_cm = 9.0, back_cm = 10.0 }`',
         ),
         "", inspect.cleandoc(Adjustment.__doc__ or "").split("\n\n")[0], "",

@@ -44,6 +44,19 @@ def test_raglan_seam_meets_the_armhole_where_it_is_asked_to(mannequin: Mannequin
     assert np.abs(form.vertices[layout.mirror] - form.vertices * [-1.0, 1.0, 1.0]).max() < 2e-3
 
 
+def test_dropped_shoulder_is_wider_and_its_armhole_stays_under_the_arm(mannequin: Mannequin):
+    layout = mannequin.layout
+    before, form = (mannequin.form(tshirt(cut)) for cut in ({"cut": "set-in"}, {"cut": "dropped", "drop_cm": 4.0}))
+    shoulder, underarm = layout.lines["shoulder left"], layout.arms["left"][0, 0]
+    longer = polyline_length(form.vertices[shoulder]) - polyline_length(before.vertices[shoulder])
+    assert longer == pytest.approx(0.04, abs=5e-3)
+    assert np.array_equal(form.vertices[underarm], before.vertices[underarm])
+    assert list(form.pieces) == list(before.pieces)
+    assert np.abs(form.vertices[layout.mirror] - form.vertices * [-1.0, 1.0, 1.0]).max() < 2e-3
+    with pytest.raises(InputError, match=r"drop_cm = 20: a shoulder can drop by at most \d+\.\d cm"):
+        mannequin.form(tshirt({"cut": "dropped", "drop_cm": 20.0}))
+
+
 def test_kimono_is_a_front_and_a_back(mannequin: Mannequin):
     form = mannequin.form(tshirt({"cut": "kimono"}))
     assert list(form.pieces) == ["front", "back"]
@@ -66,8 +79,9 @@ def test_sleeves_are_cut_once(mannequin: Mannequin):
     ("sleeve", "like", "why"),
     [
         ({"cut": "raglan"}, "skirt", "has no sleeves"),
-        ({"cut": "ragaln"}, "tshirt", "one of set-in, raglan, kimono is needed"),
+        ({"cut": "ragaln"}, "tshirt", "one of set-in, dropped, raglan, kimono is needed"),
         ({"cut": "kimono", "front_cm": 9.0}, "tshirt", "front_cm belongs to a raglan sleeve"),
+        ({"cut": "raglan", "drop_cm": 9.0}, "tshirt", "drop_cm belongs to a dropped sleeve"),
         ({"cut": "raglan", "side_cm": 9.0}, "tshirt", "side_cm.*is unknown"),
     ],
 )

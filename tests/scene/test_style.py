@@ -82,6 +82,7 @@ def test_hem_lies_higher_at_its_lines():
         ("circle_skirt", {"hem_side_left": "9"}, "its length is that of the part sewn to its lower edge"),
         ("shirt", {"hem_outseam": "9"}, "--hem-outseam makes no sense on a shirt"),
         ("shirt", {"hem_side_left": "-9"}, "a number from 0 to 80"),
+        ("tshirt", {"sleeve": "none", "armhole": "raglan"}, "do not go together: .* the form has no sleeves"),
         ("tote", {"length": "knee"}, "lies on no body"),
     ],
 )

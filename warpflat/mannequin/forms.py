@@ -26,7 +26,15 @@ from warpflat.mannequin.neckline import Neckline, widen_neck
 from warpflat.mannequin.outside import push_outside
 from warpflat.mannequin.pieces import FormPiece, cut_pieces
 from warpflat.mannequin.profiles import convex_girth
-from warpflat.mannequin.sleeves import RAGLAN_LINES, SET_IN, SLEEVE_CUTS, SleeveCut, recut_sleeves, slide_raglan
+from warpflat.mannequin.sleeves import (
+    RAGLAN_LINES,
+    SET_IN,
+    SLEEVE_CUTS,
+    SleeveCut,
+    drop_shoulders,
+    recut_sleeves,
+    slide_raglan,
+)
 
 if TYPE_CHECKING:
     from warpflat.mannequin.layout import Layout
@@ -233,13 +241,16 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     sleeve = SET_IN if base is None else base.sleeve
     if "sleeve" in data:
         values = _table(data["sleeve"], f"{where}: sleeve")
-        _check_keys(values, {"cut", "front_cm", "back_cm"}, f"{where}: sleeve")
+        _check_keys(values, {"cut", "front_cm", "back_cm", "drop_cm"}, f"{where}: sleeve")
         if values.get("cut") not in SLEEVE_CUTS:
             cuts = ", ".join(SLEEVE_CUTS)
             raise InputError(f"{where}: sleeve: cut = {quote_value(values.get('cut'))}: one of {cuts} is needed")
-        depths = {k: _number(v, f"{where}: sleeve: {k}", 2.0, 30.0) for k, v in values.items() if k != "cut"}
-        if depths and values["cut"] != "raglan":
-            raise InputError(f"{where}: sleeve: {next(iter(depths))} belongs to a raglan sleeve")
+        depths = {k: _number(v, f"{where}: sleeve: {k}", 0.5, 30.0) for k, v in values.items() if k != "cut"}
+        for key in depths:
+            if values["cut"] != ("dropped" if key == "drop_cm" else "raglan"):
+                raise InputError(
+                    f"{where}: sleeve: {key} belongs to a {'dropped' if key == 'drop_cm' else 'raglan'} sleeve"
+                )
         sleeve = SleeveCut(cut=str(values["cut"]), **depths)
         try:
             cut = recut_sleeves({piece: (each.bricks, each.open) for piece, each in pieces.items()}, sleeve.cut)
@@ -276,6 +287,8 @@ def realise(
         vertices = _surface(layout, body, form, np.unique(layout.faces[faces]), form.neckline)
         if form.sleeve.cut == "raglan":
             vertices = slide_raglan(layout, vertices, form.sleeve)
+        elif form.sleeve.cut == "dropped":
+            vertices = drop_shoulders(layout, vertices, form.sleeve)
     else:
         vertices = before.vertices
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}

@@ -83,6 +83,10 @@ def with_style(tables: Mapping[str, Any], style: Mapping[str, str], garment: str
         InputError: an unknown key or value (gives the nearest), or one that makes no sense on this garment.
     """
     found = dict(tables)
+    try:
+        _form(found)
+    except InputError as error:
+        raise InputError(f"{garment}: these choices do not go together: {error}") from None
     for key, text in style.items():
         known = style_options(found)
         if key.startswith("ease-"):
