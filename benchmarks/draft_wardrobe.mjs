@@ -65,10 +65,14 @@ function trousers(given) {
   const pattern = draft(Charlie, given)
   const parts = pattern.parts[0], { front, back } = { front: parts['titan.front'], back: parts['titan.back'] }
   const f = front.points, b = back.points, path = () => new front.Path()
+  // As the design draws it: by the seat where the waist lies outside of that.
+  const outseam = path().move(b.floorOut).line(b.kneeOut)
+  if (b.waistOut.x > b.seatOut.x) outseam.curve(b.kneeOutCp2, b.seatOut, b.styleWaistOut)
+  else outseam.curve(b.kneeOutCp2, b.seatOutCp1, b.seatOut).curve_(b.seatOutCp2, b.styleWaistOut)
   return {
     seat: 2 * (Math.abs(f.cfSeat.x - f.seatOut.x) + Math.abs(b.cbSeat.x - b.seatOut.x)),
     inseam: path().move(b.fork).curve(b.forkCp2, b.kneeInCp1, b.kneeIn).line(b.floorIn).length(),
-    outseam: path().move(b.styleWaistOut).curve_(b.seatOutCp1, b.seatOut).curve(b.seatOutCp2, b.kneeOutCp2, b.kneeOut).line(b.floorOut).length(),
+    outseam: outseam.length(),
     'crotch front': path().move(f.styleWaistIn).line(f.crotchSeamCurveStart).curve(f.crotchSeamCurveCp1, f.crotchSeamCurveCp2, f.fork).length(),
     'crotch back': path().move(b.styleWaistIn).line(b.crossSeamCurveStart).curve(b.crossSeamCurveCp1, b.crossSeamCurveCp2, b.fork).length(),
     hem: f.floorIn.dist(f.floorOut) + b.floorIn.dist(b.floorOut),

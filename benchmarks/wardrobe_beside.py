@@ -6,10 +6,14 @@ FreeSewing's public designs `teagan` (T-shirt), `simon` (shirt) and `charlie` (t
 measurements of the package's own bodies, and for the ease of its garments where a design asks for that (`draft_wardrobe.mjs`;
 `--inputs` prints what it is given). They are drafts for men; of women they have no bust. All lengths are of the whole garment [mm].
 
-Differences of more than 15 mm in men 50 (`*`), as far as they are understood. Sleeves have 60 and 80 mm of ease at the biceps here,
-15 % of it there, 47 mm; with them go longer armholes. A woven cap has 5.5 % more than its armhole here, none there. A cuff is 85 % of
-a wrist with 70 mm of ease, and its overlap of 25 mm. Trousers end at the ankle here, at the floor there; they taper down to the hem
-here, from the knee on they are straight there. Not understood: the chest of the T-shirt, and the rest of the trousers' lengths.
+Differences of more than 15 mm in men 50 (`*`). Sleeves have 60 and 80 mm of ease at the biceps here, 15 % of it there, 47 mm; with them
+go longer armholes. A woven cap has 5.5 % more than its armhole here, none there. A cuff is 85 % of a wrist with 70 mm of ease, and its
+overlap of 25 mm. A knit with ease is not held to its girth: the T-shirt's chest, 1,080 mm on the form, is 1,058 at rest in the plane,
+because a surface without darts that bulges comes out 2 % narrower and the cloth gives that back. Trousers end at the ankle here, 106 mm
+above the floor, and at the floor there. The crotch lies 15 mm below the body's here, 6 mm there, and the waist seam there lies 11 mm
+lower, under a waistband. So crotch seams are 19 to 21 mm longer here (8 for the crotch, 11 for the waistband), the outseam is 92 mm
+shorter (-106 + 11), the inseam 131 (-106, -9 for the crotch, -12 for the slant of a fork that reaches farther there, and -4). They taper
+down to the hem here; from the knee on they are straight there, as wide as that hem.
 """
 
 from __future__ import annotations

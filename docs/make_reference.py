@@ -290,6 +290,12 @@ def _form_section() -> list[str]:
             "neckline, 1 for a V, 6 for one that is nearly square.",
             "`neckline = { side_cm = 2.0, front_cm = 5.0, back_cm = 1.5 }`",
         ),
+        _row(
+            "`sleeve`",
+            "How sleeves are cut: `set-in`, `dropped` (the armhole lies `drop_cm` down the arm), `raglan` (to the neck; `front_cm` and "
+            "`back_cm` from the shoulder its seam meets the armhole) or `kimono` (in one with front and back).",
+            '`sleeve = { cut = "raglan", front_cm = 9.0, back_cm = 10.0 }`',
+        ),
         "", inspect.cleandoc(Adjustment.__doc__ or "").split("\n\n")[0], "",
         _row("key", "meaning", "range", "default"), "|---|---|---|---|",
     ]  # fmt: skip

@@ -56,6 +56,15 @@ def test_neckline_ease_flare_and_closure():
     assert tables_of("tshirt", neck_depth="9")["form"]["neckline"]["side_cm"] == 2
 
 
+def test_hem_lies_higher_at_its_lines():
+    tables = tables_of("a_line_skirt", hem_side_left="20", hem_centre_front="5")
+    rises = {"side left": 200, "side right": 0, "centre front": 50, "centre back": 0}
+    assert tables["finishing"][1:] == [{"kind": "hem", "edge": "knee", "shorten_mm": rises}]
+    assert tables_of("unitard", hem_outseam="4")["finishing"][-1]["shorten_mm"] == {"outseam": 40, "inseam": 0}
+    # It follows the hem to another level.
+    assert tables_of("shift_dress", hem_side_left="9", length="thigh")["finishing"][-1]["edge"] == "thigh"
+
+
 @pytest.mark.parametrize(
     ("name", "style", "message"),
     [
@@ -70,6 +79,10 @@ def test_neckline_ease_flare_and_closure():
         ("shirt", {"ease_knee": "3"}, "--ease-knee makes no sense on a shirt"),
         ("shirt", {"neck_depth": "40"}, "a number from 0 to 15"),
         ("shirt", {"neck_depth": "nan"}, "a number from 0 to 15"),
+        ("circle_skirt", {"hem_side_left": "9"}, "its length is that of the part sewn to its lower edge"),
+        ("shirt", {"hem_outseam": "9"}, "--hem-outseam makes no sense on a shirt"),
+        ("shirt", {"hem_side_left": "-9"}, "a number from 0 to 80"),
+        ("tshirt", {"sleeve": "none", "armhole": "raglan"}, "do not go together: .* the form has no sleeves"),
         ("tote", {"length": "knee"}, "lies on no body"),
     ],
 )

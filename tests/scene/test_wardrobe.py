@@ -50,6 +50,10 @@ def test_every_option_makes_a_valid_scene_of_its_own(name: str):
         ("polo", {}, {"neck_placket", "collar"}),
         ("jeans", {}, {"front_left_pocket_facing", "front_left_pocket_bag", "back_left_pocket", "yoke_left"}),
         ("leggings", {}, {"leg_left", "abdomen_band"}),
+        ("wrap_dress", {"sleeve": "short"}, {"front_bodice_left", "front_skirt_left", "tie", "neck_binding"}),
+        ("gored_skirt", {"hem": "slanted"}, {"godet", "godet_2", "front_side_left", "back_side_right"}),
+        ("leotard", {}, {"thigh_band", "neck_band"}),
+        ("sweatshirt", {"armhole": "raglan"}, {"sleeve_left", "wrist_band"}),
     ],
 )
 def test_garment_comes_out_whole(name: str, chosen: dict[str, str], pieces: set[str]):
@@ -88,6 +92,7 @@ def test_unknown_names_are_told_with_the_nearest():
             "pyjama_trousers",
         ),
         *("polo", "chinos", "jeans", "waistcoat", "jacket", "leggings", "unitard", "jumpsuit", "pleated_skirt"),
+        *("wrap_dress", "gored_skirt", "leotard", "pyjama_jacket"),
         *("apron", "tote", "sun_hat"),
     ],
 )

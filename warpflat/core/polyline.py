@@ -14,6 +14,7 @@ from warpflat.core.arrays import FloatArray
 __all__ = [
     "arc_lengths",
     "nearest_on_polyline",
+    "part_between",
     "points_at_lengths",
     "polyline_length",
     "project_on_segments",
@@ -56,6 +57,14 @@ def points_at_lengths(points: FloatArray, lengths: ArrayLike) -> FloatArray:
     """
     arc, at = arc_lengths(points), np.asarray(lengths, dtype=np.float64)
     return np.stack([np.interp(at, arc, column) for column in points.T], axis=-1)
+
+
+def part_between(points: FloatArray, begin: float, end: float) -> FloatArray:
+    """The part of an open polyline (#P by 2 or 3) between two lengths along it; its ends lie on the polyline's where they are those."""
+    arc = arc_lengths(points)
+    ends = points_at_lengths(points, [max(begin, 0.0), min(end, float(arc[-1]))])
+    # Points beside an end would make segments without a direction.
+    return np.vstack([ends[:1], points[(arc > begin + 1e-6) & (arc < end - 1e-6)], ends[1:]])
 
 
 def resample(points: FloatArray, shares: ArrayLike, *, closed: bool = False) -> FloatArray:

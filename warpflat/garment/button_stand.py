@@ -1,4 +1,4 @@
-"""Button stands: cloth beyond the centre line, marked buttonholes and buttons."""
+"""Cloth beyond the centre line: button stands with marked buttonholes and buttons, and wraps."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core.polyline import arc_lengths, part_between, points_at_lengths
 from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import STAND, STAND_END
 from warpflat.garment.openings import Buttons, Opening
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT, Edge
 from warpflat.pattern.pieces import Piece
 
-__all__ = ["bust_depth", "button_depths", "buttonhole", "with_button_stand"]
+__all__ = ["bust_depth", "button_depths", "buttonhole", "with_button_stand", "with_wrap"]
 
 # The first button lies this far below the edge, beside half of its own width [m], and the last at least this share of
 # the spacing above the lower end.
@@ -24,6 +24,8 @@ _BELOW, _LEFT_BELOW = 0.010, 0.6
 _THICKNESS, _SHANK = 0.003, 0.003
 # Half the length of the bars at the ends of a buttonhole [m].
 _BAR = 0.004
+# Allowance of the edge of a wrap, which is turned in twice [m], and the least of an edge that is left beside it.
+_WRAP_HEM, _LEAST_LEFT = 0.020, 0.020
 
 
 def button_depths(buttons: Buttons, length: float, bust: float | None, count: int | None = None) -> FloatArray:
@@ -67,22 +69,12 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
     Raises:
         InputError: the edge is not straight.
     """
-    edges, names = list(piece.edges), [edge.name for edge in piece.edges]
-    at = names.index(name)
-    edge, before, after = edges[at], edges[at - 1], edges[(at + 1) % len(edges)]
-    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
-    down = bool((edge.points[-1] - edge.points[0]) @ grain < 0.0)
-    top, low = (edge.points[0], edge.points[-1]) if down else (edge.points[-1], edge.points[0])
+    edges, upper, lower, down, out = _beside(piece, name, "have a button stand")
+    at = [edge.name for edge in edges].index(name)
+    edge = edges[at]
+    top, low = edge.points[[0, -1] if down else [-1, 0]]
     along = (low - top) / np.linalg.norm(low - top)
-    out = np.array([along[1], -along[0]]) if down else np.array([-along[1], along[0]])
-    stray = float(np.abs((edge.points - top) @ out).max())
-    if stray > FOLD_STRAIGHT:
-        raise InputError(
-            f"{piece.name}.{name} strays {1e3 * stray:.1f} mm from straight and cannot have a button stand; constrain it, "
-            f'[[constraints]] line = "{name}", straight = "warp"'
-        )
     whole = end > edge.length - 1e-6
-    upper, lower = (before, after) if down else (after, before)
     reach = _mirrored(upper.points[::-1] if down else upper.points, top, out, opening.width)
     if whole:
         foot = _mirrored(lower.points if down else lower.points[::-1], low, out, opening.width)
@@ -122,6 +114,87 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         for end in ends:
             lines[find_unused_name("buttonhole end", lines)] = end + np.outer([-_BAR, _BAR], along)
     return replace(piece, edges=edges, internal_lines=lines, marks=marks)
+
+
+def with_wrap(piece: Piece, name: str, opening: Opening) -> Piece:
+    """Return a half that runs beyond a centre line, all along it, to lie over the other half.
+
+    Its new edge, "wrap edge", ends as far beyond the line as the wrap is wide, measured along the mirror images of the half's upper and
+    lower edge. Where the upper edge is the neckline, that becomes a straight line from the shoulder to the waist, or to the lower end of
+    a bodice.
+
+    Args:
+        piece: one half.
+        name: of its straight edge.
+        opening: width of the wrap, and length of its ties.
+
+    Raises:
+        InputError: the edge is not straight, or one beside it is shorter than the wrap is wide.
+    """
+    import shapely
+
+    edges, upper, lower, down, out = _beside(piece, name, "be wrapped")
+    centre = _turned(piece.edge(name).points, down)
+
+    def mirrored(edge: Edge, corner: FloatArray) -> FloatArray:
+        line = edge.points if np.array_equal(edge.points[0], corner) else edge.points[::-1]
+        if edge.length < opening.width + _LEAST_LEFT:
+            raise InputError(
+                f"{piece.name}.{edge.name} is {1e3 * edge.length:.0f} mm long up to its next corner or dart, too short for a wrap of "
+                f"{1e3 * opening.width:.0f} mm"
+            )
+        part = part_between(line, 0.0, opening.width)
+        return np.asarray(part + 2.0 * np.outer((corner - part) @ out, out))
+
+    foot = mirrored(lower, centre[-1])
+    if upper.name == "neck":
+        waists = [line for key, line in piece.internal_lines.items() if key.startswith("waist")]
+        crossed = [
+            end
+            for line in waists
+            for end in line[[0, -1]]
+            if shapely.LineString(centre).distance(shapely.Point(end)) < 1e-3
+        ]
+        corner = crossed[0] + opening.width * out if crossed else foot[-1]
+        head = np.array([_turned(upper.points, down)[0], corner])
+    else:
+        head = np.vstack([_turned(upper.points, down), mirrored(upper, centre[0])[1:]])
+    new = {upper.name: replace(upper, points=_turned(head, down), vertices=None)}
+    if np.linalg.norm(foot[-1] - head[-1]) > _LEAST_LEFT:
+        new[name] = Edge(name="wrap edge", points=_turned([head[-1], foot[-1]], down), kind="hem", allowance=_WRAP_HEM)
+    tail = np.vstack([foot[::-1], _turned(lower.points, down)[1:]])
+    new[lower.name] = replace(lower, points=_turned(tail, down), vertices=None)
+    lines = dict(piece.internal_lines)
+    lines[find_unused_name(name, lines)] = centre
+    marks = (
+        {**piece.marks, "tie": head[-1]}
+        if opening.tie and (upper.name != "neck" or len(new) == 3)
+        else dict(piece.marks)
+    )
+    kept = [new.get(edge.name, edge) for edge in edges if edge.name != name or name in new]
+    return replace(piece, edges=kept, internal_lines=lines, marks=marks)
+
+
+def _beside(piece: Piece, name: str, what: str) -> tuple[list[Edge], Edge, Edge, bool, FloatArray]:
+    """Return the edges of a half, those above and below its straight edge, whether that runs down, and the direction beyond it.
+
+    Raises:
+        InputError: the edge is not straight, so that the piece cannot do `what`.
+    """
+    edges = list(piece.edges)
+    at = [edge.name for edge in edges].index(name)
+    points, before, after = edges[at].points, edges[at - 1], edges[(at + 1) % len(edges)]
+    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
+    down = bool((points[-1] - points[0]) @ grain < 0.0)
+    along = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
+    out = np.array([along[1], -along[0]])
+    stray = float(np.abs((points - points[0]) @ out).max())
+    if stray > FOLD_STRAIGHT:
+        raise InputError(
+            f"{piece.name}.{name} strays {1e3 * stray:.1f} mm from straight and cannot {what}; constrain it, "
+            f'[[constraints]] line = "{name}", straight = "warp"'
+        )
+    return edges, *((before, after) if down else (after, before)), down, out
 
 
 def buttonhole(centre: FloatArray, along: FloatArray, diameter: float = 0.012) -> dict[str, FloatArray]:

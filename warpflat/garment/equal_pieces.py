@@ -46,7 +46,7 @@ class _Copy:
     apart: float
 
 
-def draw_equal_pieces_once(pattern: Pattern) -> tuple[Pattern, tuple[str, ...]]:
+def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern, tuple[str, ...]]:
     """Return the pattern with one piece drawn for several that are equal, and a note on each such piece.
 
     Equal are pieces of one name, up to left, right and a number, whose outlines lie on each other within 1.5 mm after a rigid
@@ -55,6 +55,7 @@ def draw_equal_pieces_once(pattern: Pattern) -> tuple[Pattern, tuple[str, ...]]:
 
     Args:
         pattern: in one size.
+        called: how the names of the pieces begin that may be drawn once.
     """
     (size, pieces), *others = pattern.pieces.items()
     if others or len(pieces) < 2:
@@ -64,7 +65,11 @@ def draw_equal_pieces_once(pattern: Pattern) -> tuple[Pattern, tuple[str, ...]]:
     unlike |= {
         side.piece for seam in pattern.seams if max(map(len, seam.sides)) > 1 for row in seam.sides for side in row
     }
-    free = [piece for piece in pieces if not (piece.darts or piece.holes or piece.on_fold or piece.name in unlike)]
+    free = [
+        piece
+        for piece in pieces
+        if piece.name.startswith(called) and not (piece.darts or piece.holes or piece.on_fold or piece.name in unlike)
+    ]
     at_seams = {(side.piece, side.edge) for side in sewn}
     copies: dict[str, _Copy] = {}
     for number, head in enumerate(free):

@@ -1,4 +1,4 @@
-"""Finishing pieces derived from a pattern's own free edges: facings, bands, waistbands, cuffs, ruffles, collars, hoods and casings."""
+"""Finishing of a pattern's own free edges: facings, bands, waistbands, cuffs, ruffles, collars, hoods, casings and slanted hems."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import find_unused_name, without_side
+from warpflat.core.text import find_unused_name, other_side, without_side
 from warpflat.garment.button_stand import buttonhole
 from warpflat.garment.collars import Collar, with_collar, with_hood
 from warpflat.garment.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
 from warpflat.garment.flounces import with_flounce
 from warpflat.garment.free_edges import Break, FreeChain, chain_length, free_chains
 from warpflat.garment.plackets import with_placket, with_slits
-from warpflat.garment.shaped_band import shortened, with_shaped_waistband
+from warpflat.garment.shaped_band import shortened, slant_rises, with_shaped_waistband
 from warpflat.garment.strips import Strip, strip_edges, swept
 from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamSide
 
-__all__ = ["FINISHES", "Finishing", "finish_edges", "with_plackets"]
+__all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
 
 #: By kind the width of a finishing piece [m]; of what is folded that of the finished piece, which is cut twice as wide.
 FINISHES = {
@@ -33,6 +34,7 @@ FINISHES = {
     "casing": 0.03,
     "collar": 0.032,
     "hood": 0.0,
+    "hem": 0.0,
 }
 #: Strips by kind: whether they are folded, the direction of their grain, their role.
 _STRIPS = {
@@ -60,7 +62,7 @@ class Finishing:
             and a ruffle is gathered itself.
         overlap: by how much a waistband or cuff runs past one end [m].
         shaped: whether a waistband is cut from the upper strip of the pieces, as curved as they are, not straight.
-        shorten: by how much the pieces end before the edge, since the strip takes the place [m].
+        shorten: by how much the pieces end before the edge, since the strip takes the place [m]; by line, where lines meet the edge.
         elastic: length of the elastic in a folded strip or casing, as a share of the body's girth there; 0 where there is none.
         placket: length of a slit that opens the edge [m]; below a collar in the centre front.
         pleat: visible width of a pleat of a ruffle that is laid in pleats, not gathered [m]; 0 for none.
@@ -74,12 +76,20 @@ class Finishing:
     share: float = 1.0
     overlap: float = 0.0
     shaped: bool = False
-    shorten: float = 0.0
+    shorten: float | Mapping[str, float] = 0.0
     elastic: float = 0.0
     placket: float = 0.0
     pleat: float = 0.0
     turns: float = 0.5
     collar: Collar | None = None
+
+    @property
+    def is_one_sided(self) -> bool:
+        """Whether it makes one side of the body unlike the other."""
+        by_line = self.shorten if isinstance(self.shorten, Mapping) else {}
+        return any(
+            by_line.get(other_side(line)) != wide for line, wide in by_line.items() if without_side(line) != line
+        )
 
     @property
     def name(self) -> str:
@@ -112,7 +122,7 @@ def finish_edges(
     faced = set[Stand]()
     for number, wish in enumerate(finishing):
         try:
-            pattern, places = _opened_up(pattern, wish.edge)
+            pattern, places = _opened_up(pattern, wish.edge, sewn=wish.kind != "hem")
             if wish.shorten:
                 pattern = shortened(pattern, places, wish.shorten)
             if wish.kind == "facing":
@@ -121,6 +131,8 @@ def finish_edges(
             raise InputError(f"finishing[{number}]: {error}") from None
     pattern = with_stand_facings(pattern, [stand for stand in stands if stand not in faced])
     for number, wish in enumerate(finishing):
+        if wish.kind == "hem":
+            continue
         try:
             pattern, places = _opened_up(pattern, wish.edge)
             if wish.elastic:
@@ -164,6 +176,16 @@ def finish_edges(
     return pattern
 
 
+def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[tuple[str, str], tuple[FloatArray, FloatArray]]:
+    """Return how wide a strip slanted hems lose in the sample size, as :func:`slant_rises` gives it."""
+    found = dict[tuple[str, str], tuple[FloatArray, FloatArray]]()
+    for wish in finishing:
+        if isinstance(wish.shorten, Mapping):
+            places = _opened_up(pattern, wish.edge, sewn=False)[1]
+            found |= slant_rises(pattern, places, wish.shorten, pattern.sample)
+    return found
+
+
 def with_plackets(opened: Mapping[str, float], finishing: Sequence[Finishing]) -> dict[str, float]:
     """Return what openings add to rings [m], with both edges of the plackets below collars."""
     found = dict(opened)
@@ -173,18 +195,18 @@ def with_plackets(opened: Mapping[str, float], finishing: Sequence[Finishing]) -
     return found
 
 
-def _opened_up(pattern: Pattern, called: str) -> tuple[Pattern, list[tuple[str, str]]]:
-    """Return the free edges of a name, and the pattern with those that were hems as edges to be sewn.
+def _opened_up(pattern: Pattern, called: str, *, sewn: bool = True) -> tuple[Pattern, list[tuple[str, str]]]:
+    """Return the free edges of a name, and the pattern with those that were hems as edges to be sewn, unless they stay hems.
 
     Raises:
         InputError: there is none; gives the nearest.
     """
-    sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
+    taken = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
     free = [
         (piece.name, edge)
         for piece in pattern.pieces[pattern.sample]
         for edge in piece.edges
-        if (piece.name, edge.name) not in sewn
+        if (piece.name, edge.name) not in taken
         and (edge.kind == "seam" or (edge.kind == "hem" and piece.role == "shell"))
     ]
     names = {edge.name: without_side(edge.name).rstrip(" 0123456789") for _, edge in free}
@@ -192,7 +214,7 @@ def _opened_up(pattern: Pattern, called: str) -> tuple[Pattern, list[tuple[str, 
     if not places:
         raise InputError(f"no free edge {called!r}; {nearest(called, set(names.values()))}")
     hems = {(piece, edge.name) for piece, edge in free if edge.kind == "hem"} & set(places)
-    if hems:
+    if hems and sewn:
         pieces = {}
         for size, row in pattern.pieces.items():
             made = []

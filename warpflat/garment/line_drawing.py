@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import groupby
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
-from warpflat.core.text import without_side
+from warpflat.core.text import other_side, without_side
 from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.garment.button_stand import button_depths
 from warpflat.garment.girths import pattern_girths
@@ -38,15 +39,22 @@ _NEAR_SIDE, _EDGE_ON = -0.1, -0.6
 # Teeth of a zip are drawn so far apart; the bar at its end, and a circle of radius 1 [m].
 _TOOTH = 0.009
 _BAR = np.array([[-0.009, 0.0], [0.009, 0.0]])
+# What a slanted hem loses is cut off so far beyond the silhouette and below the edge [m].
+_BESIDE = 0.04
 _CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos, np.sin)])
 
 
-def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
+#: By piece and edge the lengths along the edge from its start, and how wide a strip is cut off there [m].
+Rises = Mapping[tuple[str, str], tuple[FloatArray, FloatArray]]
+
+
+def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = MappingProxyType({})) -> Worn:
     """Return the line drawing of a garment in its sample size, the measures of all sizes, and the openings that it needs.
 
     Args:
         garments: flattened, by size, on their bodies.
         sample: the size that is drawn.
+        rises: of its slanted hems.
     """
     garment = garments[sample]
     pieces, half = list(garment.pieces.values()), garment.form is not None and garment.form.half
@@ -55,7 +63,10 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
     drawn = [_views(flat, half=half) for flat in pieces]
     views = {}
     for index, (name, sign) in enumerate((("front", 1.0), ("back", -1.0))):
-        seen = [drawn[k][index] for k in np.argsort(sign * depth, kind="stable")]
+        seen = [
+            _with_slanted_hems(garment, list(garment.pieces)[k], drawn[k][index], sign, rises)
+            for k in np.argsort(sign * depth, kind="stable")
+        ]
         details = [] if garment.form is None else [*_bands(garment, sign), *_openings(garment, sign)]
         views[name] = tuple(piece for piece in (*seen, *details) if piece.outlines or piece.lines)
     measures = {}
@@ -75,6 +86,39 @@ def describe_worn(garments: Mapping[str, Garment], sample: str) -> Worn:
     )  # fmt: skip
     knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
     return Worn(views=views, measures=measures, needed=needed, knits=tuple(knits))
+
+
+def _with_slanted_hems(garment: Garment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:
+    """Return a piece as it is seen without the strips that slanted hems lose, which lie above their edges."""
+    import shapely
+
+    for edge, ids in () if garment.form is None else garment.form.pieces[name].edges.items():
+        # Of a pair the left piece is drawn, which runs the other way.
+        turned = (name, edge) not in rises
+        arc, wide = rises.get((other_side(name), other_side(edge)) if turned else (name, edge), ((), ()))
+        if len(arc) == 0:
+            continue
+        at = arc_lengths(garment.positions[name][ids])
+        rise = np.interp(at[-1] - at if turned else at, arc, wide)
+        low = garment.pieces[name].surface.vertices[ids, :2] * [sign, 1.0]
+        high = low + np.outer(rise, [0.0, 1.0])
+        # Out beyond the silhouette, which curves in between.
+        out = np.outer(_BESIDE * np.sign(low[[0, -1], 0] - low[:, 0].mean()), [1.0, 0.0])
+        around = [np.vstack([row[:1] + out[0], row, row[-1:] + out[1]]) for row in (low - [0.0, _BESIDE], high)]
+        lost = shapely.union_all(
+            [
+                shapely.MultiPoint([*around[0][k : k + 2], *around[1][k : k + 2]]).convex_hull
+                for k in range(len(low) + 1)
+            ]
+        )
+        whole = shapely.union_all([shapely.Polygon(ring).buffer(0.0) for ring in view.outlines])
+        near = _towards(garment, name, ids, sign) > _NEAR_SIDE
+        rows = [shapely.LineString(line).difference(lost) for line in view.lines]
+        rows += [shapely.LineString(high[near]).intersection(whole)] if near.sum() > 1 else []
+        parts = [part for part in shapely.get_parts(whole.difference(lost)) if part.area > _LEAST_AREA]
+        lines = [np.asarray(part.coords) for row in rows for part in shapely.get_parts(row) if part.length > _BAR[1, 0]]
+        view = ViewedPiece(outlines=tuple(np.asarray(part.exterior.coords)[:-1] for part in parts), lines=tuple(lines))
+    return view
 
 
 def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatArray:
@@ -105,13 +149,13 @@ def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
         # Pieces meet at their ends, and their points run on across the view.
         points = points[np.argsort(points[:, 0], kind="stable")]
         above = 1.0 if points[:, 1].mean() > np.mean(inside) else -1.0
-        shift = above * wish.width * (-1.0 if wish.shaped or wish.shorten > 0.0 else 1.0)
+        shift = above * wish.width * (-1.0 if wish.shaped or wish.shorten else 1.0)
         ring = np.concatenate([points, points[::-1] + np.array([0.0, shift])])
         yield ViewedPiece(outlines=(ring,), lines=(np.concatenate([ring, ring[:1]]),))
 
 
 def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
-    """Yield zips, as teeth and a bar at the lower end, the upper end of slits and vents, as a bar, and buttons."""
+    """Yield zips, as teeth and a bar at the lower end, the upper end of slits, vents and godets, as a bar, buttons, and edges of wraps."""
     assert garment.form is not None
     assert garment.mannequin is not None
     bust = garment.mannequin.layout.lines["bust"]
@@ -126,6 +170,11 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
             seen = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
             # A side seam is the outline of both views.
             if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
+                continue
+            if opening.kind == "wrap":
+                # The edge of the upper half: from the neckline to the waist, and on beside the line.
+                to_waist = arc / arc[-1] if "neck" in garment.form.pieces[part.piece].edges else np.ones(len(arc))
+                lines.append(seen + np.outer(opening.width * np.minimum(to_waist, 1.0), [sign, 0.0]))
                 continue
             # Where something lies, and its shape about there.
             shapes = [(end, _BAR)]

@@ -1,4 +1,4 @@
-"""Openings on a pattern: a zip's line and the notch at its end, the edges of slits and vents, button stands, keyholes."""
+"""Openings on a pattern: a zip's line and the notch at its end, edges of slits and vents, godets, button stands, wraps, keyholes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
+from warpflat.core.polyline import part_between, polyline_length
 from warpflat.core.text import find_unused_name
-from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand
+from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand, with_wrap
 from warpflat.garment.openings import Opening, OpeningPart
+from warpflat.garment.strips import Strip, strip_edges, swept
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 
 __all__ = ["lines_inside", "mark_openings", "with_notches"]
 
@@ -24,6 +25,8 @@ _INSIDE = 0.004
 _CLEAR, _SPACING = 0.030, 0.200
 # A slit or vent closer to the whole seam than this [m] leaves nothing to sew.
 _LEAST_SEWN = 0.02
+# Finished width of the ties of a wrap [m].
+_TIE = 0.025
 
 #: By size and opening, the seams that the opening runs along.
 Placed = Mapping[str, Sequence[Sequence[OpeningPart]]]
@@ -33,8 +36,8 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
     """Return a pattern with its openings drawn.
 
     A zip is a line along its edges with its name, and a notch at its end. A slit or a vent is an edge of its own, which
-    is not sewn and has an allowance of its width. Where it buttons, a piece runs beyond its edge, which is not sewn. A keyhole is
-    drawn on its piece.
+    is not sewn and has an allowance of its width; a godet is sewn into it. Where it buttons or wraps, a piece runs beyond its edge,
+    which is not sewn. A keyhole is drawn on its piece.
 
     Args:
         pattern: pieces and seams, without mirror images.
@@ -59,12 +62,16 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
             seam = next((each for each in pattern.seams if each.name == part.seam), None)
             if seam is None:
                 raise InputError(f"openings[{number}]: the pattern has no seam {part.seam!r} of its own")
-            opened = SeamOpening(
-                kind=opening.kind, length=min(opening.length, sum(each.whole for each in placed[pattern.sample][number])),
-                begin=begin, whole=end >= part.whole, style=opening.style if opening.kind == "zip" else "",
-            )  # fmt: skip
-            seam = replace(seam, openings=(*seam.openings, opened))
-            pattern = replace(pattern, seams=[seam if each.name == seam.name else each for each in pattern.seams])
+            if opening.kind == "wrap":
+                pattern = _with_wrap(pattern, seam, opening)
+                continue
+            if opening.kind != "godet":
+                opened = SeamOpening(
+                    kind=opening.kind, length=min(opening.length, sum(each.whole for each in placed[pattern.sample][number])),
+                    begin=begin, whole=end >= part.whole, style=opening.style if opening.kind == "zip" else "",
+                )  # fmt: skip
+                seam = replace(seam, openings=(*seam.openings, opened))
+                pattern = replace(pattern, seams=[seam if each.name == seam.name else each for each in pattern.seams])
             if opening.kind == "zip":
                 pattern = _with_zip(pattern, seam, opening, end if end < part.whole else None, number, placed)
             elif opening.kind == "buttons":
@@ -89,6 +96,8 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
                             for piece in pieces[size]
                         ]
                 pattern = replace(pattern, pieces=pieces)
+                if opening.kind == "godet":
+                    pattern = _with_godet(pattern, seam, opening)
     return pattern
 
 
@@ -119,7 +128,7 @@ def _with_zip(
                 line = line[::-1]
             drawn = dict(row[at].internal_lines)
             title = replace(opening, length=min(opening.length, sum(each.whole for each in placed[size][number]))).title
-            drawn[find_unused_name(title, drawn)] = _between(line, begin, min(stop, polyline_length(line)))
+            drawn[find_unused_name(title, drawn)] = part_between(line, begin, min(stop, polyline_length(line)))
             row[at] = replace(row[at], internal_lines=drawn)
             pieces[size] = row
     if end is None:
@@ -160,13 +169,6 @@ def _runs_down(piece: Piece, points: FloatArray) -> bool:
     return bool((points[-1] - points[0]) @ grain < 0.0)
 
 
-def _between(line: FloatArray, begin: float, end: float) -> FloatArray:
-    """Return the part of a line between two lengths along it."""
-    at = arc_lengths(line)
-    ends = points_at_lengths(line, np.array([begin, end]))
-    return np.vstack([ends[:1], line[(at > begin + 1e-6) & (at < end - 1e-6)], ends[1:]])
-
-
 def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, placed: Placed) -> Pattern:
     """Return a pattern with a button stand on both sides of a seam, which is sewn only below it."""
     sides = {(side.piece, side.edge) for row in seam.sides for side in row}
@@ -195,6 +197,78 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, p
     return replace(pattern, pieces=pieces, seams=seams)
 
 
+def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
+    """Return a pattern with a wedge, a sector of a circle, in the lower end of a seam, whose edges have that end as edges of their own.
+
+    On the fold a seam stands for both sides of the body.
+    """
+    first = seam.sides[0][0]
+    shell, freed = pattern.piece(first.piece, pattern.sample), f"{first.edge} godet"
+    order = [edge.name for edge in shell.edges]
+    # The edge beyond its lower end is the hem, which runs on along the wedge.
+    down = _runs_down(shell, shell.edge(freed).points)
+    hem = shell.edges[(order.index(freed) + (1 if down else -1)) % len(order)]
+    half = 0.5 * opening.width / opening.length
+    turn = np.linspace(-half, half, 2 * max(8, round(np.degrees(half) / 2.5)) + 1)
+    arc = opening.length * np.column_stack([np.sin(turn), -np.cos(turn)])
+    known = {piece.name.replace("_", " ") for piece in pattern.pieces[pattern.sample]}
+    apex, name = np.zeros((1, 2)), find_unused_name("godet", known).replace(" ", "_")
+    both = 2 if all(pattern.piece(row[0].piece, pattern.sample).on_fold for row in seam.sides) else 1
+    pieces = {}
+    for size, row in pattern.pieces.items():
+        sewn = pattern.piece(first.piece, size).edge(freed).allowance
+        wedge = Piece(
+            name=name, size=size, fabric=shell.fabric, quantity=both, paired=False, title="godet",
+            edges=[
+                Edge(name="left", points=np.vstack([apex, arc[:1]]), allowance=sewn),
+                Edge(name=hem.name, points=arc, kind=hem.kind, allowance=hem.allowance),
+                Edge(name="right", points=np.vstack([arc[-1:], apex]), allowance=sewn),
+            ],
+            grain=np.array([[0.0, -0.8 * opening.length], [0.0, -0.3 * opening.length]]),
+        )  # fmt: skip
+        pieces[size] = [*row, wedge]
+    seams, taken = list(pattern.seams), {each.name for each in pattern.seams}
+    for (side,) in seam.sides:
+        piece = pattern.piece(side.piece, pattern.sample)
+        runs_down = _runs_down(piece, piece.edge(f"{side.edge} godet").points)
+        # A piece whose edge runs up lies to the left of it; its mirror image to the right.
+        edge = "left" if runs_down == side.mirrored else "right"
+        title = find_unused_name(f"{seam.name} godet", taken)
+        taken.add(title)
+        rows = (
+            (replace(side, edge=f"{side.edge} godet", reversed=not runs_down),),
+            (SeamSide(piece=name, edge=edge, reversed=edge == "right"),),
+        )
+        seams.append(Seam(name=title, sides=rows))
+    return replace(pattern, pieces=pieces, seams=seams)
+
+
+def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
+    """Return a pattern whose halves run beyond a centre line, each over the other; they are not sewn there, but tied."""
+    sides, tied = {(side.piece, side.edge) for row in seam.sides for side in row}, "tie"
+    pieces = {}
+    for size, row in pattern.pieces.items():
+        made = []
+        for piece in row:
+            edge = next((edge for name, edge in sides if name == piece.name), None)
+            if edge is not None:
+                piece = with_wrap(piece, edge, opening)
+                piece = replace(piece, internal_lines=lines_inside(piece.internal_lines, piece.outline))
+            made.append(piece)
+        if opening.tie and not any(piece.name == tied for piece in row):
+            edges = strip_edges(*swept(Strip(length=opening.tie, height=2.0 * _TIE)))
+            fold = np.array([[0.0, _TIE], [opening.tie, _TIE]])
+            grain = np.array([[0.2, 0.5], [0.8, 0.5]]) * [opening.tie, _TIE]
+            made.append(
+                Piece(
+                    name=tied, size=size, fabric=row[0].fabric, quantity=2, role="strip", paired=False, grain=grain,
+                    edges=[replace(edge, kind="cut", allowance=0.010) for edge in edges], internal_lines={"fold line": fold},
+                )
+            )  # fmt: skip
+        pieces[size] = made
+    return replace(pattern, pieces=pieces, seams=[each for each in pattern.seams if each.name != seam.name])
+
+
 def _keyhole(piece: Piece, opening: Opening) -> Piece:
     import shapely
 
@@ -203,7 +277,7 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     if line is None:
         raise InputError(f"a keyhole is cut along a line inside its piece; {piece.name} has no {opening.line!r} inside")
     line = line if _runs_down(piece, line) else line[::-1]
-    slit = _between(line, 0.0, opening.length)
+    slit = part_between(line, 0.0, opening.length)
     along = (slit[-1] - slit[0]) / np.linalg.norm(slit[-1] - slit[0])
     across, radius = np.array([along[1], -along[0]]), 0.5 * opening.width
     turn = np.radians(np.linspace(-150.0, 150.0, 33))
@@ -244,14 +318,14 @@ def _with_free_end(piece: Piece, name: str, opening: Opening) -> Piece:
         down, whole = _runs_down(piece, edge.points), edge.length
         at = whole - opening.length if down else opening.length
         free = find_unused_name(f"{name} {opening.kind}", taken)
-        parts = [_between(edge.points, 0.0, at), _between(edge.points, at, whole)]
+        parts = [part_between(edge.points, 0.0, at), part_between(edge.points, at, whole)]
         # Corners are shared bit for bit.
         parts[0][0], parts[1][-1], parts[1][0] = edge.points[0], edge.points[-1], parts[0][-1]
         names = (name, free) if down else (free, name)
         edges += [
             Edge(
-                name=part, points=points, kind="hem" if part == free else edge.kind,
-                allowance=opening.width if part == free else edge.allowance,
+                name=part, points=points, kind="hem" if part == free and opening.kind != "godet" else edge.kind,
+                allowance=opening.width if part == free and opening.kind != "godet" else edge.allowance,
             )
             for part, points in zip(names, parts, strict=True)
         ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Openings along the lines of a form, from their upper or lower end: zips, buttons, slits, vents and keyholes."""
+"""Openings along the lines of a form, from their upper or lower end: zips, buttons, wraps, slits, vents, godets and keyholes."""
 
 from __future__ import annotations
 
@@ -62,14 +62,15 @@ class Opening:
     """A stretch of a seam that can be opened, or is never closed.
 
     Attributes:
-        kind: "zip", "buttons" or "keyhole" from the upper end of the line; "slit" or "vent" from its lower end.
+        kind: "zip", "buttons", "wrap" or "keyhole" from the upper end of the line; "slit", "vent" or "godet" from its lower end.
         line: of the seam, as "centre back" or "side left"; pieces that run across a centre line are parted there, except
             by a keyhole, which is cut into the piece.
-        length: [m]; infinite for buttons or a zip all along the line.
+        length: [m]; infinite for a wrap, and for buttons or a zip all along the line.
         start: how far from that end it begins [m].
         style: of a zip, "invisible" or "lapped".
-        width: of a vent's flap, of the button stand beyond its line, or of a keyhole's round end [m].
+        width: of a vent's flap, of the button stand or the wrap beyond its line, of a godet's hem, or of a keyhole's round end [m].
         buttons: of a button stand.
+        tie: length of the ties of a wrap [m]; 0 for none.
     """
 
     kind: str
@@ -79,11 +80,12 @@ class Opening:
     style: str = "invisible"
     width: float = 0.04
     buttons: Buttons | None = None
+    tie: float = 0.0
 
     @property
     def from_below(self) -> bool:
         """Whether it is measured from the lower end of its line."""
-        return self.kind in ("slit", "vent")
+        return self.kind in ("slit", "vent", "godet")
 
     @property
     def parts_pieces(self) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core.polyline import arc_lengths, part_between, points_at_lengths
 from warpflat.core.text import find_unused_name, other_side
 from warpflat.garment.mark_openings import lines_inside, with_notches
 from warpflat.garment.strips import Strip, strip_edges, swept
@@ -254,7 +254,10 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
             inside[name] = max(float(both.length), cuts[name] + 0.01)
             if inside[name] > float(arc_lengths(line)[-1]) - 1e-3:
                 raise InputError(f"the bag of a hip pocket is deeper than {name!r} of {piece.name!r} is long")
-        parts = {name: _parted(line, [cuts[name], inside[name]]) for name, line in lines.items()}
+        parts = {
+            name: [part_between(line, *ends) for ends in pairwise([0.0, cuts[name], inside[name], np.inf])]
+            for name, line in lines.items()
+        }
         ring = np.asarray(region.exterior.coords)[:-1]
         ends = [parts[name][1][-1] for name in (upper, front.edge)]
         rim = _between_ends(ring, ends[0], ends[1], corner)
@@ -340,18 +343,6 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def _parted(points: FloatArray, places: Sequence[float]) -> list[FloatArray]:
-    """Return the parts of a line between some lengths along it [m]."""
-    at = arc_lengths(points)
-    ends = [0.0, *places, float(at[-1])]
-    corners = points_at_lengths(points, ends)
-    corners[[0, -1]] = points[[0, -1]]
-    return [
-        np.vstack([corners[k], points[(at > begin + 1e-7) & (at < end - 1e-7)], corners[k + 1]])
-        for k, (begin, end) in enumerate(pairwise(ends))
-    ]
-
-
 def _between_ends(ring: FloatArray, start: FloatArray, end: FloatArray, beside: FloatArray) -> FloatArray:
     """Return the part of a closed line (#P by 2 [m]) from one of its points to another that keeps away from a third."""
     import shapely
@@ -362,8 +353,7 @@ def _between_ends(ring: FloatArray, start: FloatArray, end: FloatArray, beside: 
     line = np.vstack([ring, ring[:1]])
     if (c - a) % whole < forward:
         line, a, forward = line[::-1], whole - a, whole - forward
-    twice = np.vstack([line[:-1], line])
-    part = _parted(twice, [a, a + forward])[1] if a > 1e-9 else _parted(twice, [forward])[0]
+    part = part_between(np.vstack([line[:-1], line]), a, a + forward)
     part[[0, -1]] = start, end
     return part
 

@@ -24,7 +24,7 @@ from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.facings import STAND, Stand
-from warpflat.garment.finishing import finish_edges
+from warpflat.garment.finishing import finish_edges, hem_rises
 from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.line_drawing import describe_worn
 from warpflat.garment.mark_openings import mark_openings
@@ -166,8 +166,9 @@ def pattern_of_garment(
     ):
         side = (SeamSide(piece=piece, edge=edge),)
         seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
-    # One pattern cannot serve for both sides where just one of them has an opening.
-    pairs = () if one_sided(sample.openings) else find_mirror_pairs(garments, pieces, seams)
+    # One pattern cannot serve for both sides where just one of them has an opening, or a hem slants to one side.
+    apart = one_sided(sample.openings) or any(wish.is_one_sided for wish in sample.finishing)
+    pairs = () if apart else find_mirror_pairs(garments, pieces, seams)
     drawn, notes = _drawn_once(pieces, pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
@@ -200,9 +201,13 @@ def pattern_of_garment(
             girths[size] = {level: each.girth for level, each in garment.mannequin.levels().items()}
             head = garment.mannequin.extremity("head")
             girths[size] |= {} if head is None else {"head": head}
+    rises = hem_rises(pattern, sample.finishing)
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
     pattern = add_pockets(pattern, sample.pockets)
-    return replace(pattern, worn=describe_worn(garments, pattern.sample)), notes
+    # Godets of one size are equal, unless a slanted hem cuts them.
+    pattern, equal = draw_equal_pieces_once(pattern, called="godet")
+    notes += equal
+    return replace(pattern, worn=describe_worn(garments, pattern.sample, rises)), notes
 
 
 def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:

@@ -168,7 +168,9 @@ def _move_rings(
     from scipy.interpolate import PchipInterpolator
 
     rows = np.array([layout.level_row[level] for level in RING_LEVELS])
-    moves = _level_moves(body, layout.rings, layout.level_row, RING_LEVELS, changes, _ring_move)
+    moves = _level_moves(
+        body, layout.rings, layout.level_row, RING_LEVELS, changes, lambda row, *how: _changed(row, *how) - row
+    )
     for pair in ruled:
         if set(pair) <= set(RING_LEVELS):
             _hang_below_belly(moves, body, layout, sorted(map(RING_LEVELS.index, pair)))
@@ -237,10 +239,6 @@ def _level_moves(
         other = body[grid[row_of[change.like]]] if change.like else None
         found.append(move(row, other, change, ease_cm))
     return found
-
-
-def _ring_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
-    return _changed(row, other, change, ease_cm) - row
 
 
 def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[Adjustment, float] | None) -> None:

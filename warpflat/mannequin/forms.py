@@ -26,6 +26,15 @@ from warpflat.mannequin.neckline import Neckline, widen_neck
 from warpflat.mannequin.outside import push_outside
 from warpflat.mannequin.pieces import FormPiece, cut_pieces
 from warpflat.mannequin.profiles import convex_girth
+from warpflat.mannequin.sleeves import (
+    RAGLAN_LINES,
+    SET_IN,
+    SLEEVE_CUTS,
+    SleeveCut,
+    drop_shoulders,
+    recut_sleeves,
+    slide_raglan,
+)
 
 if TYPE_CHECKING:
     from warpflat.mannequin.layout import Layout
@@ -70,6 +79,7 @@ class Form:
         darts: slits in its pieces.
         ease: by level, how much more than around the body a tape reads around the garment [cm]; negative for knits.
         neckline: wider than the base of the neck; None lies on it.
+        sleeve: how its sleeves are cut; the pieces are cut so already.
 
     Raises:
         InputError: a piece's name that cannot name a file, or two that would be one file on some system.
@@ -84,6 +94,7 @@ class Form:
     darts: tuple[FormDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
     neckline: Neckline | None = None
+    sleeve: SleeveCut = SET_IN
 
     def __post_init__(self) -> None:
         files: dict[str, str] = {}
@@ -168,13 +179,14 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
         name: of the form.
         data: keys ``pieces`` (by name, which names a file, too: ``bricks``, ``datum``, ``open``), ``profiles`` (by level, see
             :class:`Adjustment`), ``ruled`` (pairs of levels), ``blend`` (``with``: a form's name, ``weight``), ``ease`` (see
-            :func:`ease_from`), ``neckline`` (see :class:`Neckline`), ``like`` (a shipped form, taken over where this one gives nothing).
+            :func:`ease_from`), ``neckline`` (see :class:`Neckline`), ``sleeve`` (see :class:`SleeveCut`), ``like`` (a shipped
+            form, taken over where this one gives nothing).
 
     Raises:
         InputError: for an unknown key, a value of the wrong kind, or a piece's name that cannot name a file.
     """
     where = f"form {name}"
-    _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like", "ease", "neckline"}, where)
+    _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like", "ease", "neckline", "sleeve"}, where)
     base = shipped_form(str(data["like"])) if "like" in data else None
     pieces = {}
     for piece, recipe in _table(data.get("pieces", {}), f"{where}: pieces").items():
@@ -226,9 +238,29 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
         values, ranges = _table(data["neckline"], f"{where}: neckline"), Neckline.ranges()
         _check_keys(values, set(ranges), f"{where}: neckline")
         neckline = Neckline(**{k: _number(v, f"{where}: neckline: {k}", *ranges[k]) for k, v in values.items()})
+    sleeve = SET_IN if base is None else base.sleeve
+    if "sleeve" in data:
+        values = _table(data["sleeve"], f"{where}: sleeve")
+        _check_keys(values, {"cut", "front_cm", "back_cm", "drop_cm"}, f"{where}: sleeve")
+        if values.get("cut") not in SLEEVE_CUTS:
+            cuts = ", ".join(SLEEVE_CUTS)
+            raise InputError(f"{where}: sleeve: cut = {quote_value(values.get('cut'))}: one of {cuts} is needed")
+        depths = {k: _number(v, f"{where}: sleeve: {k}", 0.5, 30.0) for k, v in values.items() if k != "cut"}
+        for key in depths:
+            if values["cut"] != ("dropped" if key == "drop_cm" else "raglan"):
+                raise InputError(
+                    f"{where}: sleeve: {key} belongs to a {'dropped' if key == 'drop_cm' else 'raglan'} sleeve"
+                )
+        sleeve = SleeveCut(cut=str(values["cut"]), **depths)
+        try:
+            cut = recut_sleeves({piece: (each.bricks, each.open) for piece, each in pieces.items()}, sleeve.cut)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        pieces = {piece: replace(pieces[piece], bricks=bricks, open=opened) for piece, (bricks, opened) in cut.items()}
     return Form(
-        name=name, pieces=pieces, profiles=profiles, ruled=tuple(ruled), blend=blend, ease=ease, neckline=neckline
-    )
+        name=name, pieces=pieces, profiles=profiles, ruled=tuple(ruled), blend=blend, ease=ease, neckline=neckline,
+        sleeve=sleeve,
+    )  # fmt: skip
 
 
 def realise(
@@ -253,6 +285,10 @@ def realise(
     if before is None:
         faces = layout.faces_of([brick for chosen in bricks.values() for brick in chosen])
         vertices = _surface(layout, body, form, np.unique(layout.faces[faces]), form.neckline)
+        if form.sleeve.cut == "raglan":
+            vertices = slide_raglan(layout, vertices, form.sleeve)
+        elif form.sleeve.cut == "dropped":
+            vertices = drop_shoulders(layout, vertices, form.sleeve)
     else:
         vertices = before.vertices
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
@@ -264,7 +300,8 @@ def realise(
     known = (
         {} if before is None else {name: before.pieces[name] for name in before.pieces if before.has_rows(name, rows)}
     )
-    pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half, known=known)
+    continued = RAGLAN_LINES if form.sleeve.cut == "raglan" else {}
+    pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half, known=known, continued=continued)
     # A level of the trunk with an outline of its own, neither ruled nor bridged, gets the ease that is asked of it; cloth that hangs
     # from a belly has more.
     spans = [

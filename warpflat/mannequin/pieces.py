@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -78,6 +79,7 @@ def cut_pieces(
     darts: Darts | None = None,
     half: bool = False,
     known: Mapping[str, FormPiece] | None = None,
+    continued: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, FormPiece]:
     """Join bricks into pieces.
 
@@ -89,6 +91,7 @@ def cut_pieces(
         half: the left half of the garment: pieces that lie on both sides of a centre line end there, on the fold, and
             those of the right side are left out, being the left ones' mirror images.
         known: pieces that are there already, by name.
+        continued: lines that run on as another one: a piece that has both has one edge, under the other one's name.
 
     Raises:
         InputError: for an unknown brick or line, a line that does not run through its piece, a brick in two pieces, a piece that
@@ -112,7 +115,8 @@ def cut_pieces(
         cuts = {name: cut for name, cut in cuts.items() if not all(is_side(b, "right") for b in cut[0])}
     darts, known = darts or {}, known or {}
     return {
-        name: known.get(name) or _piece(layout, vertices, name, *cut, darts.get(name, {}), half)
+        name: known.get(name)
+        or _piece(layout, vertices, name, *cut, darts.get(name, {}), half, {**_CONTINUED, **continued})
         for name, cut in cuts.items()
     }
 
@@ -142,6 +146,7 @@ def _piece(
     opened: Sequence[str],
     darts: Mapping[str, IntArray],
     half: bool,
+    continued: Mapping[str, str],
 ) -> FormPiece:
     folded = half and lies_on_both(bricks)
     if folded:
@@ -166,7 +171,7 @@ def _piece(
     if len(fisheyes) != len(holes):
         raise InputError(_not_one_disk(name, opened=bool(opened), darts=darts))
     darts = {dart: row for dart, row in darts.items() if dart not in fisheyes}
-    edges, parts = _edges(layout, loop, grid_vertices, darts)
+    edges, parts = _edges(layout, loop, grid_vertices, darts, continued)
     lines = _lines(layout, corners, grid_vertices, edges)
     lines |= {leg: ids for dart, legs in fisheyes.items() for leg, ids in zip(_legs(dart), legs, strict=True)}
     fold = fold_among(edges, opened, name) if folded else None
@@ -285,7 +290,11 @@ def _legs(dart: str) -> tuple[str, str]:
 
 
 def _edges(
-    layout: Layout, loop: NDArray[np.int64], grid_vertices: IntArray, darts: Mapping[str, IntArray]
+    layout: Layout,
+    loop: NDArray[np.int64],
+    grid_vertices: IntArray,
+    darts: Mapping[str, IntArray],
+    continued: Mapping[str, str],
 ) -> tuple[dict[str, IntArray], dict[str, str]]:
     """Return a piece's edges, and the name of the whole edge by each part of one that darts interrupt.
 
@@ -302,7 +311,7 @@ def _edges(
     on_grid = grid_vertices[loop]
     steps = list(zip(on_grid.tolist(), np.roll(on_grid, -1).tolist(), strict=True))
     labels = [leg_of.get((a, b)) or line_of.get((min(a, b), max(a, b)), "edge") for a, b in steps]
-    labels = [_CONTINUED[label] if _CONTINUED.get(label) in labels else label for label in labels]
+    labels = [continued[label] if continued.get(label) in labels else label for label in labels]
     legs = set(leg_of.values())
     # A doubled line turns back on itself at its end, which starts a new edge though the label stays.
     turns = [labels[i] != labels[i - 1] or on_grid[i - 1] == on_grid[(i + 1) % len(loop)] for i in range(len(loop))]

@@ -31,7 +31,7 @@ from warpflat.pattern.drafted_darts import (
     fisheye_legs,
     smooth_fisheye,
 )
-from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
+from warpflat.pattern.fitting import TOLERANCES, equal_sides, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.piece_parts import Edge
@@ -281,6 +281,7 @@ def _fitted_edges(
     fitted = fit_edges(pieces, lines, seams, tolerance)
     curves = {key: curve for key, (curve, _) in fitted.items()}
     trued, corners = true_corners(pieces, seams, curves) if true else (curves, [])
+    trued = equal_sides(seams, trued)
     edges = {}
     for piece in pieces:
         keys = [(piece.name, edge.name) for edge in piece.edges]

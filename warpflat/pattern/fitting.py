@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, polyline_length, turning_angles
+from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths, turning_angles
 from warpflat.pattern.curves import TOLERANCE, Curve, chords, farthest, fit_curve
 from warpflat.pattern.piece_parts import SAME_POINT
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 
-__all__ = ["TOLERANCES", "EdgeKey", "drawn_length", "fit_edges", "is_wavy", "smooth_line"]
+__all__ = ["TOLERANCES", "EdgeKey", "drawn_length", "equal_sides", "fit_edges", "is_wavy", "smooth_line"]
 
 #: Names of a piece and of its edge.
 EdgeKey = tuple[str, str]
@@ -37,6 +38,10 @@ WAVES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 EQUAL = 1e-4
 #: Curves keep near their points where the sides of their seams then differ by at most this share of what is allowed.
 SAFE = 0.8
+#: Sides of a seam that differ by less [m] stay as they are.
+ALIKE = 5e-6
+#: A curve moves by no more than this [m] to be as long as what it is sewn to: a tenth of what a turned corner may move.
+SHIFT = 3e-4
 
 
 def fit_edges(
@@ -114,6 +119,49 @@ def fit_edges(
             ):
                 fitted[key] = chords(lines[key]), fitted[key][1]
     return fitted
+
+
+def equal_sides(seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]) -> dict[EdgeKey, Curve]:
+    """Return the curves with the sides of each seam as long as they should be, to some micrometres.
+
+    Curves that keep near their points, and turned corners, leave a seam's sides some tenths of a millimetre apart. The curve of the
+    second side that bends most takes up the difference: it moves along one direction by a smooth bump, at most by `SHIFT`. Its ends
+    stay, with their directions. What would have to move farther stays as it is.
+    """
+    found = dict(curves)
+    for seam in seams:
+        first, second = ([found[side.piece, side.edge] for side in row] for row in seam.sides)
+        one, other = (sum(polyline_length(curve.sample()) for curve in curves) for curves in (first, second))
+        more = one * (1.0 + seam.ease) - other
+        bends = {}
+        for side in seam.sides[1]:
+            curve = found[side.piece, side.edge]
+            line = curve.sample()
+            # The length grows by the bump's work on the turning tangent.
+            tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
+            shares = arc_lengths(line)[1:-1] / polyline_length(line)
+            bend = -(np.sin(np.pi * shares) ** 2) @ np.diff(tangents, axis=0) if len(line) > 2 else np.zeros(2)
+            bends[side.piece, side.edge] = bend
+        key = max(bends, key=lambda each: float(np.linalg.norm(bends[each])))
+        size = float(np.linalg.norm(bends[key]))
+        if abs(more) < ALIKE or abs(more) > SHIFT * size or found[key].straight.any():
+            continue
+        way, bezier = more / size**2 * bends[key], found[key].bezier.copy()
+        lengths = [
+            polyline_length(Curve(bezier=each[None], straight=np.zeros(1, dtype=bool)).sample()) for each in bezier
+        ]
+        joints = np.concatenate([[0.0], np.cumsum(lengths)]) / sum(lengths)
+        bump, slope = np.sin(np.pi * joints) ** 2, np.pi * np.sin(2.0 * np.pi * joints) / sum(lengths)
+        handles = np.linalg.norm(bezier[:, [1, 2]] - bezier[:, [0, 3]], axis=2)
+        # Tangents at a joint turn alike on both of its sides.
+        bezier[:, 0] += bump[:-1, None] * way
+        bezier[:, 1] += (bump[:-1] + handles[:, 0] * slope[:-1])[:, None] * way
+        bezier[:, 2] += (bump[1:] - handles[:, 1] * slope[1:])[:, None] * way
+        bezier[:, 3] += bump[1:, None] * way
+        # The ends are corners, shared bit for bit.
+        bezier[0, 0], bezier[-1, 3] = found[key].bezier[0, 0], found[key].bezier[-1, 3]
+        found[key] = replace(found[key], bezier=bezier)
+    return found
 
 
 def drawn_length(line: FloatArray) -> float:

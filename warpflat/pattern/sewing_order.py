@@ -32,6 +32,7 @@ _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Sew the shoulders", ("shoulder",)),
     ("Sew the inner leg seams", ("inseam",)),
     ("Sew the side seams", ("side", "outseam")),
+    ("Sew the godets in, from the tip to the hem", ("godet",)),
     ("Sew the sleeve seams", ("underarm", "overarm")),
     ("Sew the crotch seam", ("crotch",)),
     ("Join at the waist", ("waist", "hip", "abdomen", "underbust")),
@@ -199,6 +200,19 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         names = (place.name if isinstance(place, DraftedPiece) else place[0] for place in places)
         return ", ".join(dict.fromkeys(titles[name] for name in names))
 
+    tied = [piece for piece in pieces if "tie" in piece.piece.marks]
+    if tied:
+        ties = [piece for piece in pieces if piece.name == "tie"]
+        steps.append(
+            SewingStep.at(
+                translate(
+                    "Fold the ties lengthways, sew and turn them. One is caught in the edge of each front where it is marked; leave a gap "
+                    "in the right side seam there for the inner one: {pieces}.",
+                    pieces=called(tied),
+                ),
+                pieces=[*ties, *tied],
+            )
+        )
     fused = [piece for piece in pieces if piece.piece.also or piece.piece.role == "interfacing"]
     if fused:
         steps.append(SewingStep.at(translate("Fuse the interfacing: {pieces}.", pieces=called(fused)), pieces=fused))

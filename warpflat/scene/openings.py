@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["scene_finishing", "scene_openings", "scene_pockets", "sewn_centres", "straight_stands"]
 
-# Allowance of a slit, flap of a vent, button stand beyond its line, round end of a keyhole [mm], where none is given.
-_WIDTH_MM = {"zip": 0.0, "slit": 15.0, "vent": 40.0, "buttons": 20.0, "keyhole": 12.0}
+# Allowance of a slit, flap of a vent, button stand or wrap beyond its line, round end of a keyhole, hem of a godet [mm], if not given.
+_WIDTH_MM = {"zip": 0.0, "slit": 15.0, "vent": 40.0, "buttons": 20.0, "keyhole": 12.0, "wrap": 120.0, "godet": 250.0}
 
 
 def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
@@ -43,19 +43,20 @@ def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
             )
             if table.kind == "buttons"
             else None,
+            tie=1e-3 * table.tie_mm if table.kind == "wrap" else 0.0,
         )
         for table in tables
     ]
 
 
 def straight_stands(form: FormResult, openings: Sequence[Opening]) -> list[Constraint]:
-    """Return the constraints that lay the edges of button stands straight along the grain; a fold is so anyway."""
+    """Return the constraints that lay the edges of button stands and wraps straight along the grain; a fold is so anyway."""
     from warpflat.garment.constraints import Straight  # loads the solver
 
     return [
         Straight(piece=name, line=opening.line, along="warp")
         for opening in openings
-        if opening.kind == "buttons"
+        if opening.kind in ("buttons", "wrap")
         for name, piece in form.pieces.items()
         if opening.line in piece.edges and piece.fold != opening.line
     ]
@@ -86,7 +87,9 @@ def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
                 share=table.share,
                 overlap=1e-3 * table.overlap_mm,
                 shaped=table.shaped,
-                shorten=1e-3 * table.shorten_mm,
+                shorten={line: 1e-3 * mm for line, mm in table.shorten_mm.items()}
+                if isinstance(table.shorten_mm, dict)
+                else 1e-3 * table.shorten_mm,
                 elastic=table.elastic,
                 placket=1e-3 * table.placket_mm,
                 pleat=1e-3 * table.pleat_mm,

@@ -484,17 +484,20 @@ class PatternTable(Table):
 class OpeningTable(Table):
     """An opening along a line of a form. A piece that runs across a centre line is parted there, with a seam below the opening.
 
-    A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit` or `vent` from the lower one. Buttons
-    and a zip run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing.
+    A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit`, `vent` or `godet` from the lower one. Buttons
+    and a zip run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing. A `wrap` laps one half over
+    the other all along a centre line; its neckline runs straight from the shoulder to the waist. A `godet` is a wedge that is sewn into
+    the lower end of its seam.
     """
 
-    kind: Literal["zip", "buttons", "slit", "vent", "keyhole"]
+    kind: Literal["zip", "buttons", "wrap", "slit", "vent", "godet", "keyhole"]
     seam: Annotated[str, Field(min_length=1, max_length=100)]
     length_mm: Annotated[float, Field(ge=10, le=2000)] | None = None
     start_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
     style: Literal["invisible", "lapped"] = "invisible"
-    width_mm: Annotated[float, Field(ge=5, le=200)] | None = None
-    """Of a slit's hem (15 mm if not given), a vent's flap (40), a button stand beyond the line (20), a keyhole's round end (12)."""
+    width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
+    """Of a slit's hem (15 mm if not given), a vent's flap (40), a button stand beyond the line (20), a keyhole's round end (12), a wrap
+    beyond the line (120), a godet at its hem (250)."""
     button_mm: Annotated[float, Field(ge=5, le=60)] = 18.0
     spacing_mm: Annotated[float, Field(ge=20, le=300)] = 85.0
     """About how far buttons are apart; one lies on the bust line."""
@@ -503,15 +506,30 @@ class OpeningTable(Table):
     facing: Literal["grown-on", "separate"] = "grown-on"
     """Of a button stand."""
     facing_mm: Annotated[float, Field(ge=20, le=200)] = 60.0
+    tie_mm: Annotated[float, Field(ge=0, le=2000)] = 900.0
+    """Length of the ties of a wrap; 0 for none."""
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> OpeningTable:
         if self.kind == "zip" and self.width_mm is not None:
             raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
         if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
-            raise ValueError("start_mm and style belong to a zip; a slit or a vent begins at the lower end of its seam")
-        if self.kind not in ("buttons", "zip") and self.length_mm is None:
-            raise ValueError("length_mm is missing; only buttons and zips run all along their line without one")
+            raise ValueError(
+                "start_mm and style belong to a zip; a slit, vent or godet begins at the lower end of its seam"
+            )
+        if self.kind not in ("buttons", "zip", "wrap") and self.length_mm is None:
+            raise ValueError("length_mm is missing; only buttons, zips and wraps run all along their line without one")
+        if self.kind == "wrap" and (self.length_mm is not None or self.seam not in ("centre front", "centre back")):
+            raise ValueError('a wrap runs all along a centre line: seam = "centre front", without length_mm')
+        most = {"godet": 1500.0, "wrap": 400.0}.get(self.kind, 200.0)
+        if (self.width_mm or 0.0) > most:
+            raise ValueError(f"width_mm is at most {most:g} for a {self.kind}")
+        if self.kind == "godet" and (self.width_mm or 0.0) > 3.0 * (self.length_mm or 0.0):
+            raise ValueError(
+                "width_mm of a godet is at most three times its length_mm: more than half a circle is a flounce"
+            )
+        if self.kind != "wrap" and "tie_mm" in self.model_fields_set:
+            raise ValueError(f"tie_mm belongs to a wrap; leave it out for a {self.kind}")
         own = {"button_mm", "spacing_mm", "count", "facing", "facing_mm"} & self.model_fields_set
         if self.kind != "buttons" and own:
             raise ValueError(f"{sorted(own)[0]} belongs to buttons; leave it out for a {self.kind}")
@@ -523,7 +541,7 @@ _OF_KINDS = {
     "share": ("band", "waistband", "cuff", "ruffle", "collar"),
     "overlap_mm": ("waistband", "cuff"),
     "shaped": ("waistband",),
-    "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce"),
+    "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce", "hem"),
     "elastic": ("casing", "band", "waistband"),
     "placket_mm": ("cuff", "collar"),
     "pleat_mm": ("ruffle",),
@@ -549,10 +567,12 @@ class FinishingTable(Table):
 
     A `facing` repeats each piece. One straight strip along the whole edge is a `band` or rib, a `waistband`, a `cuff`, a `binding` or
     a gathered `ruffle`. A `collar` and a `hood` go around the neck. A `flounce` is a part of a ring below each piece. A `casing` is
-    turned in from the edge itself, for an elastic.
+    turned in from the edge itself, for an elastic. A `hem` has no piece: it is cut higher, by `shorten_mm`.
     """
 
-    kind: Literal["facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing", "collar", "hood"]
+    kind: Literal[
+        "facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing", "collar", "hood", "hem"
+    ]
     edge: Annotated[str, Field(min_length=1, max_length=100)]
     width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
     share: Annotated[float, Field(ge=0.5, le=5)] = 1.0
@@ -561,8 +581,9 @@ class FinishingTable(Table):
     overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
     shaped: bool = False
     """A waistband that is cut from the upper strip of the pieces, as curved as they are."""
-    shorten_mm: Annotated[float, Field(ge=0, le=800)] = 0.0
-    """The pieces end so far before the edge, because the strip takes the place."""
+    shorten_mm: Annotated[float, Field(ge=0, le=800)] | dict[str, Annotated[float, Field(ge=0, le=800)]] = 0.0
+    """The pieces end so far before the edge, because the strip takes the place. A table says how far where lines meet the edge, as
+    `{ "side left" = 200, "side right" = 0 }` for a hem that slants; between those lines it changes smoothly."""
     elastic: Annotated[float, Field(ge=0, le=1.5)] = 0.0
     """Length of an elastic that is threaded through it, as a share of the body's girth there; 0 for none."""
     placket_mm: Annotated[float, Field(ge=0, le=300)] = 0.0
@@ -594,6 +615,8 @@ class FinishingTable(Table):
                 raise ValueError(
                     f'{key} belongs to a {" or ".join(styles)} collar; leave it out for style = "{self.style}"'
                 )
+        if self.kind == "hem" and self.width_mm is not None:
+            raise ValueError("width_mm of a hem is hem_mm of [pattern]; leave it out")
         if self.kind == "hood" and self.width_mm is not None:
             raise ValueError("width_mm of a hood follows from the head's girth; leave it out")
         if (self.width_mm or 0.0) > 300.0 and self.kind not in ("ruffle", "flounce"):
@@ -605,6 +628,10 @@ class FinishingTable(Table):
         if self.shaped and (self.overlap_mm or self.share != 1.0 or self.elastic or self.shorten_mm):
             raise ValueError(
                 "shaped belongs to a waistband without overlap_mm, share, elastic and shorten_mm; leave them out"
+            )
+        if (self.kind == "hem" or isinstance(self.shorten_mm, dict)) and not self.shorten_mm:
+            raise ValueError(
+                'shorten_mm is missing: how much higher it lies, as shorten_mm = { "side left" = 200, "side right" = 0 }'
             )
         if self.kind == "casing" and not self.elastic:
             raise ValueError("elastic is missing: its length as a share of the body's girth there, as elastic = 0.95")

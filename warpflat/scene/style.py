@@ -24,6 +24,7 @@ STYLE_KEYS: Mapping[str, str] = {
     "neck-depth": "how deep the neckline is in front, below the base of the neck [cm]",
     "neck-width": "how far it lies outside of the base of the neck, along the shoulders [cm]",
     "closure": "how it opens: none, or zip or buttons at the front, back or side, as zip-back",
+    "hem-LINE": "how much higher the hem lies where a line meets it than elsewhere, as hem-side-left 20 [cm]",
     "ease-LEVEL": "ease at a level of its own, as ease-bust 12 [cm]",
 }
 _PARTS = {"trunk": TRUNK_LEVELS, "arm": ARM_LEVELS, "leg": LEG_LEVELS}
@@ -35,6 +36,8 @@ _LINES = {
     "trunk": {"front": "centre front", "back": "centre back", "side": "side left"},
     "leg": {"front": "crotch front", "back": "crotch back", "side": "outseam left"},
 }
+# Lines that meet a hem, by the part of the body.
+_HEM_LINES = {"trunk": ("side left", "side right", "centre front", "centre back"), "leg": ("outseam", "inseam")}
 
 
 def covered_bands(tables: Mapping[str, Any]) -> set[tuple[str, str]]:
@@ -57,6 +60,7 @@ def style_options(tables: Mapping[str, Any]) -> dict[str, str]:
         found["sleeve-width"] = "cm"
     if "length" in found:
         found["flare"] = "cm"
+        found["hem-LINE"] = "cm, at " + ", ".join(_HEM_LINES[_body_part(form)])
     if _has_neck(form):
         found |= {f"neck-{what}": "cm" for what in ("depth", "width")}
     kinds = [f"{kind}-{where}" for kind in ("zip", "buttons") for where in _closings(form)]
@@ -79,10 +83,17 @@ def with_style(tables: Mapping[str, Any], style: Mapping[str, str], garment: str
         InputError: an unknown key or value (gives the nearest), or one that makes no sense on this garment.
     """
     found = dict(tables)
+    try:
+        _form(found)
+    except InputError as error:
+        raise InputError(f"{garment}: these choices do not go together: {error}") from None
     for key, text in style.items():
         known = style_options(found)
         if key.startswith("ease-"):
             found = laid_over(found, {"ease": {_eased_level(found, key, garment): _number(key, text, -30.0, 100.0)}})
+            continue
+        if key.startswith("hem-"):
+            found = _with_risen_hem(found, key, text, garment)
             continue
         if key not in STYLE_KEYS:
             raise InputError(f"a {garment} has no choice {key!r}: {nearest(key, known)}")
@@ -233,6 +244,23 @@ def _eased_level(tables: Mapping[str, Any], key: str, garment: str) -> str:
     if name not in levels:
         raise InputError(f"--{key} makes no sense on a {garment}: {nearest(name, levels)}")
     return levels[name]
+
+
+def _with_risen_hem(tables: dict[str, Any], key: str, text: str, garment: str) -> dict[str, Any]:
+    """Return tables with a hem that lies higher where one of its lines meets it; elsewhere as before, or as at other such lines."""
+    if "hem-LINE" not in style_options(tables):
+        raise InputError(f"--{key} makes no sense on a {garment}: {_why_not(tables, key)}")
+    part = _body_part(_form(tables))
+    line, edge = key.removeprefix("hem-").replace("-", " "), _line_of(_hem(_form(tables), part), part)
+    if line not in _HEM_LINES[part]:
+        raise InputError(f"--{key} makes no sense on a {garment}: {nearest(line, _HEM_LINES[part])}")
+    wishes = [*tables.get("finishing", ())]
+    own = next((wish for wish in wishes if wish["kind"] == "hem" and wish["edge"] == edge), None)
+    # The other lines stay where they are, until they are named.
+    rises = dict.fromkeys(_HEM_LINES[part], 0.0) if own is None else dict(own["shorten_mm"])
+    rises[line] = 10.0 * _number(key, text, 0.0, 80.0)
+    kept = [wish for wish in wishes if wish is not own]
+    return {**tables, "finishing": [*kept, {"kind": "hem", "edge": edge, "shorten_mm": rises}]}
 
 
 def _with_length(tables: dict[str, Any], key: str, text: str) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def style_of(offer: GarmentOffer, chosen: Mapping[str, str]) -> tuple[dict[str, 
     style = {
         key: text
         for key, text in chosen.items()
-        if key not in offer.choices and (key in STYLE_KEYS or key.startswith("ease-"))
+        if key not in offer.choices and (key in STYLE_KEYS or key.startswith(("ease-", "hem-")))
     }
     return {key: text for key, text in chosen.items() if key not in style}, style
 
