@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -35,9 +36,9 @@ def scan(name: str) -> tuple[np.ndarray, np.ndarray]:
 _stood: dict[object, StandingBody] = {}
 
 
-def stood(vertices: np.ndarray, triangles: np.ndarray, scanned: int, **asked: bool) -> StandingBody:
+def stood(vertices: np.ndarray, triangles: np.ndarray, scanned: int, **asked: Any) -> StandingBody:
     """The body that is fitted to a scan: one fit for all that asks other things of the same scan; in place of `stand_body`."""
-    key = (vertices.tobytes(), triangles.tobytes(), scanned, tuple(sorted(asked.items())))
+    key = (vertices.tobytes(), triangles.tobytes(), scanned, repr(sorted(asked.items())))
     if key not in _stood:
         _stood[key] = stand_body(vertices, triangles, scanned, **asked)
     return _stood[key]

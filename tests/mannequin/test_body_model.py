@@ -12,10 +12,12 @@ from body_tapes import armpit_and_crotch
 from scans import needs_bodies, posed_body, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
+from warpflat.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.mannequin.fit_body import Mesh
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.stand_body import stand_body
+from warpflat.mannequin.scan_pose import LANDMARKS, ScanOptions
+from warpflat.mannequin.stand_body import StandingBody, stand_body
 
 
 def _person(random: np.random.Generator, spread: float, bend: float) -> Person:
@@ -95,6 +97,44 @@ def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     assert np.linalg.norm(model.vertices(fit.person) - wanted, axis=1)[plain].mean() < 0.012
     assert stood.unsure is None
     assert np.quantile(Mesh(wanted, model.triangles).closest(stood.posed)[2] - stood.posed, 0.9) < 0.001
+
+
+def _height(laid: StandingBody, landmark: str) -> float:
+    return float(height_weights(landmark) @ BodyModel.load().vertices(laid.fit.person)[:, 1])
+
+
+@needs_bodies
+def test_the_fit_follows_a_landmark_that_is_given() -> None:
+    points, faces = scan("female")
+    points, triangles = points - [0.0, points[:, 1].min(), 0.0], triangles_of(faces)
+    free = stand_body(points, triangles, len(triangles))
+    for name, up in {"waist": 0.03, "hip": -0.03, "elbow": 0.03, "armpit": -0.025, "crotch": -0.02}.items():
+        wanted = _height(free, name) + up
+        laid = stand_body(points, triangles, len(triangles), landmarks={name: wanted})
+        assert _height(laid, name) == pytest.approx(wanted, abs=0.004), name
+        # The body slides within its skin.
+        assert laid.unsure is None, name
+        assert laid.far < free.far + 0.002, name
+        # What lies far from it stays; what lies beside it goes along.
+        assert _height(laid, "head") == pytest.approx(_height(free, "head"), abs=0.003), name
+    assert _height(laid, "hip") < _height(free, "hip") - 0.008
+
+
+@needs_bodies
+def test_a_scan_is_measured_at_the_landmarks_that_are_given() -> None:
+    points, faces = scan("female")
+    free = scanned_body("female")
+    given = {"waist": free.measures["waist"].height + 0.03, "elbow left": free.measures["elbow left"].height + 0.02}
+    options = ScanOptions(landmarks={name.split()[0]: height for name, height in given.items()})
+    body = Mannequin.from_scan(points, faces, options=options, resolution_mm=20.0)
+    for name, height in given.items():
+        assert body.measures[name].height == pytest.approx(height, abs=0.005), name
+        assert body.measures[name].girth != pytest.approx(free.measures[name].girth, abs=0.0005), name
+    assert body.measures["waist"].guess is None
+    with pytest.raises(InputError, match=r"scan: waist \(1\.250 m\)|scan: .* with waist = 1\.25 m as given"):
+        Mannequin.from_scan(points, faces, options=ScanOptions(landmarks={"waist": 1.25}), resolution_mm=20.0)
+    # All but the places on a skirt, which are no landmarks of a body, steer the fit.
+    assert set(LANDMARKS) - set(PLACES) == {"thigh", "abdomen"}
 
 
 @needs_bodies

@@ -16,7 +16,19 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.mannequin.body_model import BodyModel, finer_body
 
-__all__ = ["ARM_PLACES", "LEVELS", "Places", "meeting", "model_places", "near_level", "near_place", "value_at"]
+__all__ = [
+    "ARM_PLACES",
+    "LEVELS",
+    "PLACES",
+    "Places",
+    "crotch_vertex",
+    "height_weights",
+    "meeting",
+    "model_places",
+    "near_level",
+    "near_place",
+    "value_at",
+]
 
 #: Heights on the mean body, which is 1 m tall, and the strip of vertices that shows each: around the trunk, in front, behind, or one leg.
 LEVELS = {
@@ -26,6 +38,8 @@ LEVELS = {
 }  # fmt: skip
 #: Distances from the elbow towards the hand on the mean body [m].
 ARM_PLACES = {"biceps": -0.0960, "elbow": -0.0024, "wrist": 0.1391, "hand": 0.1882}
+#: Every landmark that is a place of the model.
+PLACES = (*LEVELS, *ARM_PLACES, "armpit", "crotch")
 # Vertices so near to a landmark show it, on the mean body [m].
 _NEAR = 0.012
 # An arm's own sections are looked for among faces whose vertices follow it by more than this share.
@@ -138,6 +152,33 @@ def near_place(at: float, side: str) -> tuple[NDArray[np.int64], FloatArray]:
     beyond = places.along - at
     rows = np.flatnonzero(places.strips[f"arm {side}"] & (np.abs(beyond) < _NEAR))
     return rows, beyond[rows]
+
+
+@lru_cache(maxsize=32)
+def height_weights(name: str) -> FloatArray:
+    """Return how much each vertex of the body model counts in the height of a landmark, #V; left and right count alike.
+
+    Args:
+        name: one of PLACES.
+    """
+    finer, places = finer_body()[0], model_places()
+    out = np.zeros(len(places.mean))
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        if name == "armpit":
+            out[meeting(places.mean, places.mean, sign)] += 0.5
+        elif name == "crotch":
+            out[crotch_vertex(places.mean)] = 1.0
+        else:
+            rows, off = near_level(name, side) if name in LEVELS else near_place(ARM_PLACES[name], side)
+            out[rows] += 0.5 * np.linalg.pinv(np.column_stack([np.ones_like(off), off]))[0]
+    return np.asarray(out @ finer)
+
+
+def crotch_vertex(vertices: FloatArray) -> int:
+    """Return the lowest vertex between the legs, in the midplane, of a body (#V by 3 [m])."""
+    places = model_places()
+    between = places.middle[(places.mean[places.middle, 1] > 0.40) & (places.mean[places.middle, 1] < 0.52)]
+    return int(between[np.argmin(vertices[between, 1])])
 
 
 def value_at(near: tuple[NDArray[np.int64], FloatArray], values: FloatArray) -> FloatArray:

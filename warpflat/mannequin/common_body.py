@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.mannequin.body_landmarks import model_places, near_level, value_at
+from warpflat.mannequin.body_landmarks import near_level, value_at
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body
 from warpflat.mannequin.fit_body import Mesh, fit_body
 from warpflat.mannequin.fit_inside import fit_inside
@@ -22,8 +22,8 @@ from warpflat.surface.triangles import triangulate
 __all__ = ["CommonBody", "common_body_inside", "common_body_of_mannequin", "common_body_of_scan", "skin_triangles"]
 
 
-# Levels that a mannequin and the model both have, from the floor up; and how often the model is slid to them.
-_LEVELS, _SLIDES = ("ankle", "knee", "hip", "waist", "underbust", "bust"), 2
+# Levels that a mannequin and the model both have.
+_LEVELS = ("ankle", "knee", "hip", "waist", "underbust", "bust")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,8 +78,9 @@ def common_body_of_scan(
     Raises:
         InputError: it is no standing body with arms and legs.
     """
-    scan, _ = turn_scan_upright(np.asarray(vertices, float), np.asarray(faces), options or ScanOptions())
-    laid = stand_body(scan.vertices, scan.triangles, scan.scanned)
+    options = options or ScanOptions()
+    scan, _ = turn_scan_upright(np.asarray(vertices, float), np.asarray(faces), options)
+    laid = stand_body(scan.vertices, scan.triangles, scan.scanned, landmarks=options.landmarks)
     if laid.unsure is not None:
         raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
     turn, shift = scan.placed
@@ -92,25 +93,11 @@ def common_body_of_scan(
 def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
     """Return the body of a mannequin of a size or of measurements; head, hands and feet, which it lacks, are the model's."""
     triangles = triangulate(np.asarray(mannequin.layout.faces))[0].astype(np.int64)
-    fit = fit_body(mannequin.vertices, triangles)
-    model, finer = BodyModel.load(), finer_body()[0]
-    mesh, whole = Mesh(mannequin.vertices, triangles), np.zeros(len(triangles), dtype=bool)
-    vertices, _ = lay_on_scan(finer @ model.vertices(fit.person), mesh, whole)
-    # Without head and feet the model may have slid up or down: its levels go where the mannequin has them, and what lies between follows.
-    levels, heights = mannequin.levels(), vertices[:, 1]
-    places = model_places()
-    for _ in range(_SLIDES):
-        arms = places.strips["arm left"] | places.strips["arm right"]
-        own = np.array(
-            [
-                np.mean([value_at(near_level(name, side), vertices[:, 1]) for side in ("left", "right")])
-                for name in _LEVELS
-            ]
-        )
-        move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
-        vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
-        vertices, _ = lay_on_scan(vertices, mesh, whole)
-        heights = vertices[:, 1]
+    # Without head and feet the model would slide up or down.
+    levels = mannequin.levels()
+    fit = fit_body(mannequin.vertices, triangles, {name: levels[name].height for name in _LEVELS})
+    start = finer_body()[0] @ BodyModel.load().vertices(fit.person)
+    vertices, _ = lay_on_scan(start, Mesh(mannequin.vertices, triangles), np.zeros(len(triangles), dtype=bool))
     far = float(fit.distance[np.isfinite(fit.distance)].mean())
     return CommonBody(name=name, person=fit.person, vertices=vertices, far=far)
 

@@ -1,12 +1,13 @@
 """The body model fitted to a scan: shape, pose and place by Gauss-Newton steps on closest points, in both directions.
 
 Each vertex of the body is drawn to the nearest place on the scan, along the scan's normal there, and each sample of the scan draws the
-nearest place of the body to itself. A place counts less the farther it is away (Geman and McClure), and not at all where the two surfaces
+nearest place of the body to itself. A landmark whose height is known is drawn there. A place counts less the farther it is away (Geman and McClure), and not at all where the two surfaces
 face different ways: so holes, hair, clothes, floors and missing hands do little. Small shapes and small bends are preferred.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.compile import launch_quietly
 from warpflat.kernels.closest import find_closest
+from warpflat.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.mannequin.body_model import BodyModel, Person, rotation
 
 __all__ = ["FittedBody", "Mesh", "fit_body"]
@@ -34,6 +36,8 @@ _MOST_BEND = 0.35
 _THIN = 4
 # How much the body's vertices count together, however many they are.
 _VERTICES = 2_600.0
+# How much a landmark of a known height counts against them: so much that the scan's surface, along which it slides, gives way.
+_LANDMARK = 3000.0
 # Stages of the starts: steps, weight of the preferences, distance [m] at which a place counts a quarter, whether shapes may
 # change, how many starts go on; and of the best one.
 _FIRST = ((2, 0.6, 0.12, False, 3), (3, 0.6, 0.12, True, 2), (3, 0.15, 0.06, True, 1))
@@ -93,6 +97,15 @@ class _Scan:
     normals: FloatArray
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Known:
+    """Landmarks of known heights: the vertices that show them, #L by #V how much each counts, and the heights [m], #L."""
+
+    model: BodyModel
+    weights: FloatArray
+    heights: FloatArray
+
+
 def vertex_normals(vertices: FloatArray, triangles: NDArray[np.int64]) -> FloatArray:
     """Return unit normals at vertices, #V by 3, faces weighted by their areas."""
     a, b, c = vertices[triangles].transpose(1, 0, 2)
@@ -103,12 +116,15 @@ def vertex_normals(vertices: FloatArray, triangles: NDArray[np.int64]) -> FloatA
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])
 
 
-def fit_body(vertices: FloatArray, triangles: NDArray[np.int64]) -> FittedBody:
+def fit_body(
+    vertices: FloatArray, triangles: NDArray[np.int64], landmarks: Mapping[str, float] | None = None
+) -> FittedBody:
     """Fit the body model to a scan that stands upright, facing +Z.
 
     Args:
         vertices: #V by 3 [m], Y up.
         triangles: #T by 3, their normals outward.
+        landmarks: known heights [m] of landmarks by name; one that is no place of the model says nothing.
     """
     model, mesh = BodyModel.load(), Mesh(vertices, triangles)
     rng = np.random.default_rng(0)
@@ -122,17 +138,21 @@ def fit_body(vertices: FloatArray, triangles: NDArray[np.int64]) -> FittedBody:
     normals = vertex_normals(model.mean[: model.count], model.triangles)
     few = plain[:: max(1, len(plain) // _FEW)]
     coarse, fine = model.only(few), model.only(plain)
+    heights = {name: height for name, height in (landmarks or {}).items() if name in PLACES}
+    given = np.array([height_weights(name) for name in heights]).reshape(-1, model.count)
+    used = np.flatnonzero(given.any(axis=0))
+    known = _Known(model=model.only(used), weights=given[:, used], heights=np.array([*heights.values()]))
     started = [(_start(model, vertices, arms), np.inf) for arms in _ARMS]
     for steps, preference, reach, shapes, keep in _FIRST:
         for i, (person, cost) in enumerate(started):
             for _ in range(steps):
-                person, cost = _step(coarse, normals[few], scan, person, preference, reach, shapes=shapes)
+                person, cost = _step(coarse, normals[few], scan, known, person, preference, reach, shapes=shapes)
             started[i] = person, cost
         started = sorted(started, key=lambda each: each[1])[:keep]
     person, cost = started[0]
     for steps, preference, reach in _LAST:
         for _ in range(steps):
-            person, cost = _step(fine, normals[plain], scan, person, preference, reach, shapes=True)
+            person, cost = _step(fine, normals[plain], scan, known, person, preference, reach, shapes=True)
     posed = model.vertices(person)
     found, _, place = mesh.closest(posed)
     alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals[found]) > _ALIKE
@@ -163,6 +183,7 @@ def _step(
     model: BodyModel,
     normals: FloatArray,
     scan: _Scan,
+    known: _Known,
     person: Person,
     preference: float,
     reach: float,
@@ -193,6 +214,11 @@ def _step(
     flat = jacobian.reshape(3 * model.count, -1)
     matrix = flat.T @ np.matmul(pull, jacobian).reshape(flat.shape)
     gradient = flat.T @ push.ravel()
+    if len(known.heights):
+        at, moved = known.model.jacobian(person)
+        rows = known.weights @ moved[:, 1]
+        matrix += _LANDMARK * rows.T @ rows
+        gradient += _LANDMARK * rows.T @ (known.weights @ at[:, 1] - known.heights)
     count, joints = len(model.shapes), len(model.joints)
     stiffness = np.zeros(len(gradient))
     stiffness[:count] = 0.05 * preference

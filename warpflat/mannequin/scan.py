@@ -78,22 +78,27 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         scan.scanned,
         faces_ahead=options.facing is not None,
         as_scanned=options.keep_pose,
+        landmarks=options.landmarks,
     )
     if laid.unsure is not None:
-        raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
+        given = ", ".join(f"{name} = {height:g} m" for name, height in options.landmarks.items())
+        raise InputError(
+            f"scan: {laid.unsure}{f', with {given} as given' if given else ''}; a body that stands with its arms off the trunk is needed"
+        )
     if laid.turned:
         scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise, scan.scanned)
         notes.append("the scan was found to face the other way by the body model")
     try:
-        crotch = _crotch_height(scan, laid) - float(laid.posed[laid.crotch, 1])
+        crotch = options.landmarks.get("crotch") or _crotch_height(scan, laid)
+        crotch -= float(laid.posed[laid.crotch, 1])
         moved = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned) if laid.moved else scan
         stands = BodySections(laid.vertices, laid, moved, crotch)
         body = BodySections(laid.posed, laid, scan, crotch) if laid.moved else stands
         found = find_levels(body, laid, scan.noise, options.landmarks)
         levels = {name: level.height for name, level in found.items()}
         if laid.undone:
-            given = {name: laid.carried(height) for name, height in options.landmarks.items()}
-            levels = {name: level.height for name, level in find_levels(stands, laid, scan.noise, given).items()}
+            heights = {name: laid.carried(name, height) for name, height in options.landmarks.items()}
+            levels = {name: level.height for name, level in find_levels(stands, laid, scan.noise, heights).items()}
         underarms = {side: underarm_point(stands, side, levels["underbust"]) for side in ("left", "right")}
         profile = _profiles(stands, levels, underarms)
         quarters, arms, collar, neck = upper_curves(stands, levels, profile, underarms)
@@ -102,7 +107,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
             legs=leg_curves(stands, levels, profile(levels["hip"])), neck=neck, collar=collar,
             attract=_attractor(stands, levels),
         )  # fmt: skip
-        measures = body_measures(scan, body, laid, found, neck)
+        measures = body_measures(scan, body, laid, found, neck, options.landmarks)
     except InputError:
         raise
     except (ValueError, IndexError, QhullError) as error:

@@ -13,7 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.mannequin.body_landmarks import ARM_PLACES, model_places, near_level, near_place, value_at
 from warpflat.mannequin.measurements import size_tables
 from warpflat.mannequin.profiles import convex_girth
-from warpflat.mannequin.scan_pose import LANDMARKS
+from warpflat.mannequin.scan_pose import LEVELS_UP
 from warpflat.mannequin.scan_sections import OUTLINES, BodySections, smooth, tape_around
 from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.stand_body import StandingBody
@@ -197,10 +197,11 @@ def find_levels(
     found["leg_thigh"] = ScanLevel(height=body.crotch - _BELOW_CROTCH * size)
     found["thigh"] = ScanLevel(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))
     for name, height in given.items():
-        found[name] = ScanLevel(height=height)
-        if name in ("knee", "ankle"):
-            found[f"leg_{name}"] = found[name]
-    for under, over in itertools.pairwise(LANDMARKS):
+        # The thigh's level is that of a skirt, around both legs; a tape around one lies below the crotch.
+        for level in (name, f"leg_{name}" if name != "thigh" else name):
+            if level in found:
+                found[level] = ScanLevel(height=height)
+    for under, over in itertools.pairwise(LEVELS_UP):
         if found[over].height - found[under].height < 0.004 * size:
             raise InputError(
                 f"scan: {over} ({found[over].height:.3f} m) does not lie above {under} ({found[under].height:.3f} m); "
@@ -227,7 +228,12 @@ def _stretch(rows: np.ndarray, row: int) -> slice:
 
 
 def body_measures(
-    scan: Slicer, body: BodySections, laid: StandingBody, levels: Mapping[str, ScanLevel], neck: float
+    scan: Slicer,
+    body: BodySections,
+    laid: StandingBody,
+    levels: Mapping[str, ScanLevel],
+    neck: float,
+    given: Mapping[str, float],
 ) -> dict[str, ScanMeasure]:
     """Return the tapes that the scan has room for, by name, from the head down.
 
@@ -237,6 +243,7 @@ def body_measures(
         laid: that body.
         levels: of trunk and legs.
         neck: length of the neck base [m].
+        given: landmarks [m] that are taken as they are.
 
     Raises:
         InputError: for a girth that no body has, with its place.
@@ -264,9 +271,10 @@ def body_measures(
         )  # fmt: skip
     for side, arm in body.arms.items():
         places = {"elbow": arm.elbow, "wrist": arm.wrist}
-        # The wrist is narrowest near its landmark.
-        ahead = np.arange(arm.wrist - _WRIST * size, arm.wrist + _WRIST * size, 0.0015 * size)
-        places["wrist"] = float(ahead[np.argmin([arm.tape(s)[1] for s in ahead])])
+        if "wrist" not in given:
+            # It is narrowest near its landmark.
+            ahead = np.arange(arm.wrist - _WRIST * size, arm.wrist + _WRIST * size, 0.0015 * size)
+            places["wrist"] = float(ahead[np.argmin([arm.tape(s)[1] for s in ahead])])
         found[f"biceps {side}"] = _biceps(body, side, noise)
         for name, s in places.items():
             height, girth = arm.tape(s)

@@ -17,13 +17,13 @@ from warpflat.mannequin.slicer import Slicer
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
-__all__ = ["LANDMARKS", "ScanOptions", "turn_scan_upright"]
+__all__ = ["LANDMARKS", "LEVELS_UP", "ScanOptions", "turn_scan_upright"]
 
 _UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 _AXES = {s + a: sign * np.eye(3)["xyz".index(a)] for s, sign in (("+", 1.0), ("-", -1.0)) for a in "xyz"}
 _STATURE = (0.9, 2.3)
-#: Levels that a user may give, from the floor up.
-LANDMARKS = (
+#: Levels of trunk and legs, from the floor up.
+LEVELS_UP = (
     "ankle",
     "knee",
     "thigh",
@@ -36,6 +36,8 @@ LANDMARKS = (
     "front_neck",
     "side_neck",
 )
+#: Landmarks whose heights a user may give.
+LANDMARKS = (*LEVELS_UP, "calf", "crotch", "wrist", "elbow")
 # Pieces of so small a share of the faces are left out, if they are no more than so many together.
 _LOOSE, _LOOSE_TOGETHER = 0.01, 0.05
 
@@ -48,7 +50,7 @@ class ScanOptions:
         unit: ``m``, ``dm``, ``cm``, ``mm`` or ``in``.
         up: axis that points to the head, as ``+y``.
         facing: axis towards which the body looks, as ``+z``.
-        landmarks: known heights above the floor [m]: bust, waist, hip, armpit, ...
+        landmarks: known heights above the floor [m]: bust, waist, hip, armpit, elbow, ...; the body model's fit follows them.
         keep_pose: whether the mannequin keeps the scan's pose of arms and legs; else it stands as a tape asks.
         symmetric: whether the mannequin is the average of left and right; else each side is kept.
     """

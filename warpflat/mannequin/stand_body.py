@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.mannequin.body_landmarks import meeting, model_places, near_level, value_at
+from warpflat.mannequin.body_landmarks import LEVELS, crotch_vertex, meeting, model_places, near_level, value_at
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation, rotation_vector
 from warpflat.mannequin.fit_body import FittedBody, Mesh, fit_body, vertex_normals
 
@@ -111,10 +111,13 @@ class StandingBody:
         mean = float(np.mean(np.minimum(distance, 2.0 * far))) if len(distance) else 0.0
         return f"the body model lies {1000.0 * mean:.0f} mm off the scan there" if mean > far else None
 
-    def carried(self, height: float) -> float:
-        """Return the height [m] at which what lies at a height of the scan's trunk lies on the mannequin."""
-        rows = np.flatnonzero(model_places().strips["trunk"])
-        rows = rows[np.argsort(np.abs(self.posed[rows, 1] - height))[:60]]
+    def carried(self, name: str, height: float) -> float:
+        """Return the height [m] at which a landmark at a height of the scan lies on the mannequin."""
+        if name in LEVELS:
+            rows = np.concatenate([near_level(name, side)[0] for side in ("left", "right")])
+        else:
+            rows = np.flatnonzero(model_places().strips["trunk"])
+            rows = rows[np.argsort(np.abs(self.posed[rows, 1] - height))[:60]]
         return height + float(np.mean(self.vertices[rows, 1] - self.posed[rows, 1]))
 
     def stood(self, points: FloatArray) -> FloatArray:
@@ -190,6 +193,7 @@ def stand_body(
     *,
     faces_ahead: bool = False,
     as_scanned: bool = False,
+    landmarks: Mapping[str, float] | None = None,
 ) -> StandingBody:
     """Fit the model to an upright scan, lay it on the scan, and undo its pose where no tape is laid in it.
 
@@ -199,14 +203,15 @@ def stand_body(
         scanned: triangles from this one on close holes.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
         as_scanned: whether the mannequin keeps the scan's pose.
+        landmarks: known heights [m], which the fit follows.
     """
     corners = vertices[triangles]
     if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
         triangles = triangles[:, ::-1]
-    found = _stand(fit_body(vertices, triangles), vertices, triangles, scanned, as_scanned)
+    found = _stand(fit_body(vertices, triangles, landmarks), vertices, triangles, scanned, as_scanned)
     if found.unsure is not None and not faces_ahead:
         vertices = vertices * [-1.0, 1.0, -1.0]
-        fit = fit_body(vertices, triangles)
+        fit = fit_body(vertices, triangles, landmarks)
         if fit.cost < found.fit.cost:
             turned = _stand(fit, vertices, triangles, scanned, as_scanned)
             if turned.unsure is None:
@@ -253,7 +258,6 @@ def _stand(
     standing = model.rebend(fit.person, relaxed, finer, posed)
     unsure = _unsure(fit, mesh, model.vertices(fit.person), standing, finer @ model.weights, seen)
     armpits = {side: meeting(standing, places.mean, sign) for side, sign in (("left", 1.0), ("right", -1.0))}
-    between = places.middle[(places.mean[places.middle, 1] > 0.40) & (places.mean[places.middle, 1] < 0.52)]
     notes = []
     # Sleeves hang, and a tape is laid, with arms lowered and no joint bent far.
     joints = model.joints_of(fit.person)
@@ -316,7 +320,7 @@ def _stand(
         vertices=stands,
         seen=seen,
         armpits=armpits,
-        crotch=int(between[np.argmin(posed[between, 1])]),
+        crotch=crotch_vertex(posed),
         shown=shown,
         fit=fit,
         unsure=unsure,
