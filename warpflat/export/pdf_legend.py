@@ -99,6 +99,8 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
             "the half diamonds meet, and glue. {sheets} sheets; empty ones are left out.", sheets=len(tiling.tiles)
         ),
     ]
+    if len(tiling.tiles) == 1:
+        lines = [translate("One sheet holds all pieces; nothing is glued.")]
     for words in lines:
         _text(canvas, float(low[0]), y, words, 7.5)
         y -= 0.0042

@@ -131,6 +131,8 @@ def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatAr
 
 def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
     """Yield waistbands, and bands around the trunk, as they are seen: above or below their edge, or on it where they take its place."""
+    import shapely
+
     form, sides = garment.form, (1.0, -1.0) if garment.form is not None and garment.form.half else (1.0,)
     assert form is not None
     for wish in garment.finishing:
@@ -150,7 +152,9 @@ def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
         points = points[np.argsort(points[:, 0], kind="stable")]
         above = 1.0 if points[:, 1].mean() > np.mean(inside) else -1.0
         shift = above * wish.width * (-1.0 if wish.shaped or wish.shorten else 1.0)
-        ring = np.concatenate([points, points[::-1] + np.array([0.0, shift])])
+        # Across its edge everywhere: the band of a neck runs around it. Where an edge is upright its points have no order.
+        strip = shapely.LineString(points).simplify(4.0 * _WITHIN).buffer(shift, single_sided=True, join_style="bevel")
+        ring = np.asarray(max(shapely.get_parts(strip), key=lambda part: part.area).exterior.coords)[:-1]
         yield ViewedPiece(outlines=(ring,), lines=(np.concatenate([ring, ring[:1]]),))
 
 
