@@ -166,8 +166,9 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
     cloth, inside = join_ends(cloth)
     notes += [*left, *kept, *inside]
     if auto:
-        shape = anatomy.kind not in TAILORED and not is_panel(cloth)
-        cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
+        halves = anatomy.kind == "glove"
+        shape = not halves and anatomy.kind not in TAILORED and not is_panel(cloth)
+        cloth, more = part_solids(cloth, shape=shape, halves=halves, most=options.most_pieces)
         notes += more
     cloth = (mirrored(cloth, anatomy) if even else None) or cloth
     for name in list(cloth.seams):
@@ -338,7 +339,8 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
         if FACING in cloth.values and abs(float(turned.sum())) < _AROUND * float(np.abs(turned).sum()):
             face = ""
         if sleeve >= 0:
-            name = f"{side_word(side)}_sleeve"
+            of_hood = sleeve >= len(anatomy.limbs_of("sleeve"))
+            name = f"{side_word(side)}_{'hood' if of_hood else 'sleeve'}"
         elif anatomy.kind == "trousers":
             rims = [border.vertices for border in anatomy.borders if border.role == "leg"]
             part = "leg" if any(np.isin(rim, mesh.vertex_of).any() for rim in rims) else "yoke"
@@ -444,7 +446,8 @@ def _edge_lines(
             seam, other = keys[a]
             plain = seam.removesuffix(" left").removesuffix(" right")
             several = len({key[1] for key in keys if key[0] == seam}) > 1
-            title = f"{plain} {names[other].split('_')[-1]}" if several and other >= 0 else plain
+            words = [word for word in names[other].split("_") if word != plain]
+            title = f"{plain} {words[-1]}" if several and other >= 0 else plain
             lines[find_unused_name(title, lines)] = np.array(run, dtype=np.int32)
     return lines
 
