@@ -166,9 +166,8 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
     cloth, inside = join_ends(cloth)
     notes += [*left, *kept, *inside]
     if auto:
-        halves = anatomy.kind == "glove"
-        shape = not halves and anatomy.kind not in TAILORED and not is_panel(cloth)
-        cloth, more = part_solids(cloth, shape=shape, halves=halves, most=options.most_pieces)
+        shape = anatomy.kind not in TAILORED and not is_panel(cloth)
+        cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
         notes += more
     cloth = (mirrored(cloth, anatomy) if even else None) or cloth
     for name in list(cloth.seams):

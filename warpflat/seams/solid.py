@@ -8,7 +8,7 @@ left, over the area.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,22 +76,17 @@ def is_panel(cloth: Cloth) -> bool:
     return len(wide) == 1 and wide[0] ** 2 >= _PANEL * 4.0 * np.pi * float(cloth.face_areas.sum())
 
 
-def part_solids(cloth: Cloth, *, shape: bool, halves: bool = False, most: int | None = None) -> tuple[Cloth, list[str]]:
+def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[Cloth, list[str]]:
     """Return the cloth with its pieces cut until each is a disk or a tube, and notes.
 
     Args:
         cloth: with the seams that it has.
         shape: whether pieces are cut for their shape, too, until each can lie flat.
-        halves: whether it is first cut across its thickness, as a glove, whose fingers are too small to be judged by the whole.
         most: pieces at most; 16 if not given.
     """
     total = float(cloth.face_areas.sum())
     most = _MOST if most is None else most
     done, known = set[tuple[int, float]](), dict[tuple[int, float], float]()
-    whole = list(cloth.pieces())
-    if halves and len(whole) == 1 < most:
-        *_, thickness = (way for way in _ways(cloth, whole[0]) if way.name == "across")
-        cloth = _best_cut(cloth, whole[0], f"{SOLID} around", total, known, [thickness]) or cloth
     for number in range(4 * most):
         meshes = list(cloth.pieces())
         waiting = []
@@ -209,14 +204,13 @@ def _best_cut(
     name: str,
     total: float,
     known: dict[tuple[int, float], float],
-    ways: Iterable[_Way] | None = None,
 ) -> Cloth | None:
     """Return the cloth with the cut of a part after which the least is left to do; None if no cut parts it well."""
     own = np.zeros(len(cloth.faces), dtype=bool)
     own[mesh.face_of] = True
     area = float(cloth.face_areas[own].sum())
     best: tuple[float, Cloth] | None = None
-    for way in _ways(cloth, mesh) if ways is None else ways:
+    for way in _ways(cloth, mesh):
         marked = replace(
             cloth,
             values={**cloth.values, "way": way.field},
