@@ -46,7 +46,7 @@ _STEEP = 3.0
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
 # Levels between armpits and crown; a hood is wider than the neck below it by this, and the shoulders are by more. It has such a share of
 # the cloth, and its opening goes up by at least this share of its height.
-_LEVELS, _WIDER, _SHOULDERS, _HOOD, _FACE = 25, 1.12, 1.3, (0.05, 0.4), 0.5
+_LEVELS, _WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 25, 1.12, 1.35, 1.5, (0.05, 0.4), 0.5
 #: A line that the user has drawn is meant where a tailor would have cut within this.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
@@ -369,11 +369,12 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     )
     levels = np.linspace(shoulder, top, _LEVELS)[1:-1]
     girths = np.array([section(cloth, heights - level, trunk)[0] for level in levels])
-    # The narrowest level of which what is above is wider again, and the shoulders below much wider.
+    # The narrowest level above which it is wider again, and below which the shoulders are much wider.
     above, below = np.maximum.accumulate(girths[::-1])[::-1], np.maximum.accumulate(girths)
     is_neck = (above > _WIDER * girths) & (below > _SHOULDERS * girths)
     neck = int(np.where(is_neck, girths, np.inf).argmin())
-    level = float(levels[neck])
+    # Its seam lies at the neck's root, where the shoulders begin.
+    level = float(levels[1 + max(np.flatnonzero(girths[:neck] > _ROOT * girths[neck]), default=-1)])
     rim = heights[opening.vertices]
     if not is_neck[neck] or rim.max() - level < _FACE * (top - level):
         return cloth
