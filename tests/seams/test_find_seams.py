@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -52,6 +54,70 @@ def broken_by_seams(found: FoundSeams) -> list[str]:
         "seams are as long as the borders": sewn == pytest.approx(sum(seam.length for seam in found.seams), rel=1e-9),
     }
     return [what for what, is_so in holds.items() if not is_so]
+
+
+def without(surface: Surface, *beyond: Callable[[np.ndarray], np.ndarray]) -> Surface:
+    """A surface without what lies where fields of places are positive."""
+    cloth = cloth_of(surface)
+    for field in beyond:
+        cloth, outside = replace(cloth, values={"beyond": field(cloth.vertices)}).split(
+            "beyond", np.ones(len(cloth.faces), dtype=bool)
+        )
+        cloth = replace(cloth, faces=cloth.faces[~outside], values={})
+    used, place = np.unique(cloth.faces, return_inverse=True)
+    return warpflat.make_surface(cloth.vertices[used], place.reshape(-1, 3), component="largest")
+
+
+def worn(*more: solids.Distance, arm: float) -> Surface:
+    """A closed skin around trunk, neck and arms that hang, and around more."""
+    parts = [solids.rod([0, -0.05, 0], [0, 0.45, 0], 0.17, 0.65), solids.rod([0, 0.45, 0], [0, 0.75, -0.02], 0.06)]
+    for side in (1.0, -1.0):
+        way = np.array([side * np.cos(arm), -np.sin(arm), 0.0])
+        root = np.array([0.14 * side, 0.5, 0.0])
+        parts.append(solids.rod(root, root + 0.45 * way, 0.065))
+    return solids.skin(solids.joined([*parts, *more], 0.02), [-0.65, -0.25, -0.25], [0.65, 1.0, 0.25], 0.035)
+
+
+def below_hem(points: np.ndarray) -> np.ndarray:
+    return -points[:, 1]
+
+
+def test_a_hood_is_cut_off_at_the_neck_and_in_halves() -> None:
+    arm = 0.6
+    closed = worn(solids.rod([0, 0.72, -0.02], [0, 0.78, -0.02], 0.12), arm=arm)
+    found = warpflat.find_seams(
+        without(
+            closed,
+            below_hem,
+            lambda points: np.abs(points[:, 0]) * np.cos(arm) - points[:, 1] * np.sin(arm) - 0.24,
+            lambda points: np.minimum(points[:, 2] - 0.05, points[:, 1] - 0.66),
+        )
+    )
+    assert {piece.name for piece in found.pieces} == {
+        "front", "back", "left_sleeve", "right_sleeve", "left_hood", "right_hood"
+    }  # fmt: skip
+    assert {"hood", "hood centre"} < {seam.name for seam in found.seams}
+    assert broken_by_seams(found) == []
+    hood = next(piece for piece in found.pieces if piece.name == "left_hood")
+    assert hood.vertices[:, 1].min() > 0.55
+    # As the face is open, nothing of the trunk's lines runs over the crown.
+    assert max(p.vertices[:, 1].max() for p in found.pieces if not p.name.endswith("hood")) < 0.75
+
+
+def test_the_armhole_of_bare_shoulders_ends_at_the_neck() -> None:
+    arm = 0.9
+    found = warpflat.find_seams(
+        without(
+            worn(arm=arm),
+            below_hem,
+            lambda points: points[:, 1] - 0.43,
+            lambda points: np.abs(points[:, 0]) * np.cos(arm) - points[:, 1] * np.sin(arm) - 0.05,
+        )
+    )
+    assert {piece.name for piece in found.pieces} == {"front", "back", "left_sleeve", "right_sleeve"}
+    assert {seam.name.rsplit(" ", 1)[0] for seam in found.seams} == {"armhole", "side", "underarm"}
+    assert broken_by_seams(found) == []
+    assert all("neck" in piece.lines for piece in found.pieces)
 
 
 @pytest.mark.parametrize("name", SHIRTS)

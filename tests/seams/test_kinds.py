@@ -87,6 +87,18 @@ def mug() -> Surface:
     )
 
 
+def poncho() -> Surface:
+    at = np.linspace(1.0, 0.0, 20)
+    return loft([((0.0, -0.55 * t**1.2, 0.0), 0.1 + 0.5 * t**0.9, 0.08 + 0.3 * t) for t in at.tolist()])
+
+
+def halter() -> Surface:
+    """A tube around the trunk, cut out under both arms up to the neck."""
+    tube = girths((0.0, 0.16), (0.55, 0.15))
+    x, y, _ = tube.vertices[tube.faces].mean(axis=1).T
+    return warpflat.make_surface(tube.vertices, tube.faces[np.abs(x) < 0.16 - np.maximum(y - 0.3, 0.0) / 2])
+
+
 def pouch() -> Surface:
     return loft([((0.0, y, 0.0), 0.11, 0.1) for y in np.linspace(0.3, 0.0, 12)], closed=True)
 
@@ -103,6 +115,8 @@ def anatomy_of(surface: Surface) -> Anatomy:
         ("skirt", lambda: girths((0.0, 0.165), (0.4, 0.17), (0.6, 0.13))),
         ("top", lambda: girths((0.0, 0.13), (0.25, 0.165))),
         ("dress", lambda: girths((0.0, 0.3), (0.6, 0.12), (0.85, 0.165))),
+        ("top", poncho),
+        ("top", halter),
         ("hat", beanie),
         ("sock", sock),
         ("glove", mitten),
@@ -115,6 +129,8 @@ def anatomy_of(surface: Surface) -> Anatomy:
         "pencil skirt",
         "tube top",
         "strapless dress",
+        "poncho",
+        "halter",
         "beanie",
         "sock",
         "mitten",
@@ -135,6 +151,16 @@ def test_a_slanted_hem_does_not_turn_a_skirt_around() -> None:
     for surface in (straight, slanted):
         anatomy = anatomy_of(surface)
         assert (anatomy.kind, axis_name(anatomy.front)) == ("skirt", "+z")
+
+
+def test_one_sleeve_is_beside_the_trunk_though_it_comes_forward() -> None:
+    plain = solids.shirt(arm=0.5, step=0.035)
+    x = plain.vertices[:, 0]
+    forward = plain.vertices + np.outer(0.8 * np.maximum(np.abs(x) - 0.2, 0.0), [0.0, 0.0, 1.0])
+    kept = x[plain.faces[:, :3]].max(axis=1) < 0.22
+    anatomy = anatomy_of(warpflat.make_surface(forward, plain.faces[kept], component="largest"))
+    assert (describe(anatomy), axis_name(anatomy.front)) == ("top, 1 sleeve", "+z")
+    assert anatomy.limbs[0].side == -1
 
 
 def test_armholes_are_sleeves_on_both_sides_or_on_none() -> None:

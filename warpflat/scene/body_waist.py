@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.body_model import finer_body
+from warpflat.mannequin.common_body import common_body_of_scan
+from warpflat.mannequin.profiles import convex_girth
+from warpflat.mannequin.slicer import Slicer
 from warpflat.surface.io.read import read_scan
 
 __all__ = ["waist_of_body"]
 
-# The waist's height needs no finer mannequin [mm].
-_RESOLUTION = 20.0
+# The trunk is narrowest so near to where the body model has its waist, as a share of the stature; so many levels are tried.
+_REACH, _LEVELS = 0.035, 15
 
 
 def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
@@ -28,13 +31,14 @@ def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
     """
     vertices, faces = read_scan(path)
     try:
-        body = Mannequin.from_scan(vertices, faces, resolution_mm=_RESOLUTION)
+        body = common_body_of_scan(vertices, faces, name=path.stem)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    assert body.scan is not None
-    upright = body.scan[0][:, 1]
-    share = (body.levels()["waist"].height - upright.min()) / np.ptp(upright)
-    used = scale * vertices[np.unique(faces[faces >= 0])]
-    # On the way from the lowest corner of its box to the highest, whichever of the axes is up.
-    x, y, z = ((1.0 - share) * used.min(axis=0) + share * used.max(axis=0)).tolist()
+    upward, skin = np.array([0.0, 1.0, 0.0]), Slicer(body.vertices, finer_body()[1])
+    levels = body.level("waist") + _REACH * float(np.ptp(body.vertices[:, 1])) * np.linspace(-1.0, 1.0, _LEVELS)
+    trunks = [
+        max((part.points for part in skin.cut(upward, level)), key=lambda one: np.ptp(one[:, 0])) for level in levels
+    ]
+    trunk = min(trunks, key=lambda one: convex_girth(one[:, [0, 2]]))
+    x, y, z = (scale * ((trunk.mean(axis=0) - body.shift) @ np.linalg.inv(body.turn))).tolist()
     return x, y, z

@@ -50,6 +50,10 @@ _SAME_WAY = np.cos(np.radians(20.0))
 _SLIMMEST = 0.55
 # What is narrower below its upper end by this share is no skirt; if it goes on below its waist by this [m], it is a dress.
 _WAISTED, _BELOW_WAIST = 0.93, 0.3
+# A waist is no longer than the cloth below it is wide by this; what goes on farther below an armhole, or a neck, than this is a dress [m].
+_WAVES, _LONG = 1.25, 0.8
+# Around a neck that is no longer [m], this upper share of a poncho lies level by this (mean cosine).
+_NECKS, _SHOULDERS, _LIES = 0.62, 0.35, 0.5
 # Openings around heads, and around wrists and ankles, are so long [m]; a hand is no thicker than this share of its width.
 _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
 # A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
@@ -160,13 +164,16 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
     holds = asymmetry <= _SYMMETRIC * size
     side = np.cross(upward, normal)
     side /= max(float(np.linalg.norm(side)), 1e-300)
+    beside, ahead = (
+        [abs(float(border.middle @ across) - at) for border in _roles(raw, across, at, size) if border.role == "limb"]
+        for across, at in ((normal, offset), (side, float(np.median(cloth.vertices @ side))))
+    )
+    # A sleeve that comes forward is beside the plane between front and back, too, yet it is farther off to its side.
     one_sleeve = (
         holds
         and sum(one[1] >= HOLE * size for one in raw) > 2
-        and not any(border.role == "limb" for border in _roles(raw, upward, normal, offset, size))
-        and any(
-            border.role == "limb" for border in _roles(raw, upward, side, float(np.median(cloth.vertices @ side)), size)
-        )
+        and len(beside) < 2
+        and max(ahead, default=0.0) > max(beside, default=0.0)
     )
     if one_sleeve:
         # The plane lies between front and back.
@@ -193,7 +200,7 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
     if not holds or abs(normal @ left) < 0.5:
         normal, offset = left, float(np.median(cloth.vertices @ left))
     normal, offset = (normal, offset) if normal @ left > 0 else (-normal, -offset)
-    borders = _roles(raw, upward, normal, offset, size)
+    borders = _roles(raw, normal, offset, size)
     heights = cloth.vertices @ upward
     kind, borders, open_front = _kind(cloth, borders, upward, heights, size)
     limbs = _limbs(cloth, borders, upward, kind, size)
@@ -344,7 +351,6 @@ def _plane_of_symmetry(
 
 def _roles(
     raw: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
-    upward: FloatArray,
     normal: FloatArray,
     offset: float,
     size: float,
@@ -450,7 +456,7 @@ def _kind(
             kind = "band"
             roles[a], roles[b] = "border", "border"
         elif upright and girth > _SLIMMEST:
-            kind = _around_the_trunk(cloth, reach(a)[1], reach(b)[0], heights)
+            kind = _around_the_trunk(cloth, borders[b], reach(a)[1], upward)
             roles[a], roles[b] = "hem", "waist" if kind == "skirt" else "neck"
         else:
             ratio = max(borders[a].length, borders[b].length) / min(borders[a].length, borders[b].length)
@@ -469,7 +475,7 @@ def _kind(
             # From the armhole down, a dress is longer than a body is to the hip.
             above = max(level[i] for i in arms)
             top = max([level[i] for i, role in roles.items() if role == "neck"] or [above])
-            if top - reach(hem)[0] > 0.8 or (top - reach(hem)[0]) > 1.9 * _trunk_width(cloth, borders, upward):
+            if top - reach(hem)[0] > _LONG or (top - reach(hem)[0]) > 1.9 * _trunk_width(cloth, borders, upward):
                 kind = "dress"
     made = [replace(border, role=roles[i]) for i, border in enumerate(borders)]
     return kind, made, open_front
@@ -481,20 +487,33 @@ def _trunk_width(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) ->
     return 0.5 * hem.length
 
 
-def _around_the_trunk(cloth: Cloth, low: float, high: float, heights: FloatArray) -> Kind:
-    """Return what a tube around the trunk is: a skirt is narrowest at its upper end; one that widens again below a waist is a dress.
+def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArray) -> Kind:
+    """Return what a tube around the trunk is: a skirt is narrowest at its upper end, which is a waist.
+
+    A top's end runs up and down between straps and armholes, or goes around a neck from which cloth lies over the shoulders. What widens
+    again below a waist is a dress.
 
     Args:
         cloth: the tube.
-        low, high: between its borders [m].
-        heights: #V [m].
+        upper: its upper border.
+        low: the height of its hem [m].
+        upward: direction.
     """
+    heights = cloth.vertices @ upward
+    high = float(heights[upper.vertices].min())
     if high - low < 0.02:
         return "skirt"
     everywhere = np.ones(len(cloth.faces), dtype=bool)
     levels = np.linspace(high, low, 17)[1:-1]
     girths = np.array([section(cloth, heights - level, everywhere)[0] for level in levels])
     narrowest = int(girths.argmin())
+    if upper.length > _WAVES * girths[narrowest]:
+        return "dress" if high - low > _LONG else "top"
+    near = heights[cloth.faces].mean(axis=1) > high - _SHOULDERS * (high - low)
+    area = cloth.face_areas[near]
+    lies = float((np.abs(cloth.face_normals[near] @ upward) * area).sum() / max(float(area.sum()), 1e-300))
+    if upper.length < _NECKS and lies > _LIES:
+        return "dress" if high - low > _LONG else "top"
     if girths[narrowest] > _WAISTED * girths[0]:
         return "skirt"
     return "dress" if levels[narrowest] - low > _BELOW_WAIST else "top"

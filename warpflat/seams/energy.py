@@ -167,6 +167,8 @@ def cut_by_energy(
     tried = 0
     parting = _PARTED_FIRST * total < sum(piece.outside for piece in pieces)
     most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
+    if "hood" in cloth.seams and options.most_pieces is None:
+        most += 2
     tight = parting and options.most_pieces is None and anatomy.kind == "trousers"
     if tight or (parting and options.most_pieces is None and anatomy.open_front):
         # What is as tight as a skin has a panel more in each leg, a jacket two in each sleeve.

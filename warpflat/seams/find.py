@@ -338,7 +338,8 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
         if FACING in cloth.values and abs(float(turned.sum())) < _AROUND * float(np.abs(turned).sum()):
             face = ""
         if sleeve >= 0:
-            name = f"{side_word(side)}_sleeve"
+            of_hood = sleeve >= len(anatomy.limbs_of("sleeve"))
+            name = f"{side_word(side)}_{'hood' if of_hood else 'sleeve'}"
         elif anatomy.kind == "trousers":
             rims = [border.vertices for border in anatomy.borders if border.role == "leg"]
             part = "leg" if any(np.isin(rim, mesh.vertex_of).any() for rim in rims) else "yoke"
@@ -444,7 +445,8 @@ def _edge_lines(
             seam, other = keys[a]
             plain = seam.removesuffix(" left").removesuffix(" right")
             several = len({key[1] for key in keys if key[0] == seam}) > 1
-            title = f"{plain} {names[other].split('_')[-1]}" if several and other >= 0 else plain
+            words = [word for word in names[other].split("_") if word != plain]
+            title = f"{plain} {words[-1]}" if several and other >= 0 else plain
             lines[find_unused_name(title, lines)] = np.array(run, dtype=np.int32)
     return lines
 

@@ -22,6 +22,7 @@ FAMILIES = (
     "centre back",
     "centre front",
     "dart",
+    "hood",
     "inseam",
     "panel",
     "princess",

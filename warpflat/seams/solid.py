@@ -86,7 +86,7 @@ def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[
     """
     total = float(cloth.face_areas.sum())
     most = _MOST if most is None else most
-    done = set[tuple[int, float]]()
+    done, known = set[tuple[int, float]](), dict[tuple[int, float], float]()
     for number in range(4 * most):
         meshes = list(cloth.pieces())
         waiting = []
@@ -96,13 +96,13 @@ def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[
             topology = not is_open(mesh)
             if key in done or (not topology and (not shape or len(meshes) >= most)):
                 continue
-            value = _strain(cloth, mesh.face_of)
+            value = _strain(cloth, mesh.face_of, known)
             if topology or (value > _FLAT and area > _LEAST * total):
                 waiting.append((topology, value * area, key, mesh))
         if not waiting:
             break
         _, _, key, mesh = max(waiting, key=lambda one: one[:2])
-        cut = _best_cut(cloth, mesh, f"{SOLID} {number + 1}", total)
+        cut = _best_cut(cloth, mesh, f"{SOLID} {number + 1}", total, known)
         if cut is None:
             done.add(key)
         else:
@@ -112,19 +112,23 @@ def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[
     return cloth, notes
 
 
-def _strain(cloth: Cloth, faces: Ids) -> float:
-    """Return about how much some faces are strained when they are laid flat."""
+def _strain(cloth: Cloth, faces: Ids, known: dict[tuple[int, float], float]) -> float:
+    """Return about how much some faces are strained when they are laid flat; `known` remembers it by their number and area."""
+    area = float(cloth.face_areas[faces].sum())
+    key = len(faces), round(area, 12)
+    if key in known:
+        return known[key]
     normals, _ = _smoothed_normals(cloth, faces)
     a, b, c = normals.transpose(1, 0, 2)
     # The solid angle of a triangle of unit vectors, for small ones the triangle's own area.
     curvature = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    area = float(cloth.face_areas[faces].sum())
     length = _reach(cloth, faces)
     for loop in border_loops(cloth.faces[faces].astype(np.int32), cloth.vertices)[1:2]:
         # A tube is as long, laid flat, as it is around.
         ring = cloth.vertices[np.append(loop, loop[0])]
         length = max(length, float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()))
-    return curvature * area / (12.0 * max(length, 1e-300) ** 2)
+    known[key] = curvature * area / (12.0 * max(length, 1e-300) ** 2)
+    return known[key]
 
 
 def _reach(cloth: Cloth, faces: Ids) -> float:
@@ -194,7 +198,13 @@ def _ways(cloth: Cloth, mesh: PieceMesh) -> Iterator[_Way]:
             yield _Way(field=facing / np.maximum(weight, 1e-300) - _BASE, name="base", round=bool(same.any()))
 
 
-def _best_cut(cloth: Cloth, mesh: PieceMesh, name: str, total: float) -> Cloth | None:
+def _best_cut(
+    cloth: Cloth,
+    mesh: PieceMesh,
+    name: str,
+    total: float,
+    known: dict[tuple[int, float], float],
+) -> Cloth | None:
     """Return the cloth with the cut of a part after which the least is left to do; None if no cut parts it well."""
     own = np.zeros(len(cloth.faces), dtype=bool)
     own[mesh.face_of] = True
@@ -226,7 +236,7 @@ def _best_cut(cloth: Cloth, mesh: PieceMesh, name: str, total: float) -> Cloth |
             if areas[-1] < 0.3 * _LEAST * total:
                 cost = np.inf
                 break
-            cost += _strain(made, faces) * areas[-1] / area + _topology(made.faces[faces])
+            cost += _strain(made, faces, known) * areas[-1] / area + _topology(made.faces[faces])
         cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
         if np.isfinite(cost) and (best is None or cost < best[0]):
             best = cost, made

@@ -12,6 +12,7 @@ from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.seams.anatomy import Anatomy, Limb
 from warpflat.seams.cloth import Cloth, edge_components, section
 from warpflat.seams.fields import Operators
+from warpflat.surface.connectivity import components
 
 __all__ = [
     "BESIDE",
@@ -37,10 +38,15 @@ _FACES = 0.5
 _LEAN = np.radians(8.0)
 # The armhole runs outside of the armpit by this, and by more where it would not close around the sleeve.
 _OUTSIDE, _STEP, _STEPS = 0.004, 0.008, 12
+# Where it closes around the sleeve only so much farther outside, it ends at the neck, of which the sleeve then has a share.
+_BARE = 0.05
 # Its length falls by no more than this over the way outwards once it runs around the sleeve.
 _STEEP = 3.0
 # Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
+# Levels between armpits and crown; a hood is wider than the neck below it by this, and the shoulders are by more. It has such a share of
+# the cloth, and its opening goes up by at least this share of its height.
+_LEVELS, _WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 25, 1.12, 1.35, 1.5, (0.05, 0.4), 0.5
 #: A line that the user has drawn is meant where a tailor would have cut within this.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
@@ -195,24 +201,32 @@ def _facing_of_armhole(anatomy: Anatomy, limb: Limb, along: FloatArray) -> Float
 def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> tuple[float, FloatArray] | None:
     """Return how far outside of a plane through the armpit the armhole lies [m], and the middle of its loop; None if there is none."""
     rim = anatomy.borders[limb.border].vertices
-    others = np.concatenate([b.vertices for k, b in enumerate(anatomy.borders) if k != limb.border] or [rim[:0]])
+    others = [b for k, b in enumerate(anatomy.borders) if k != limb.border]
     step = _STEP * anatomy.size
     lengths, middles, offsets = list[float](), list[FloatArray](), list[float]()
+    bare: tuple[float, FloatArray] | None = None
     for number in range(60):
         offset = _OUTSIDE * anatomy.size + number * step
         beyond = _reached(cloth.faces, height > offset, rim)
         if offset >= height[rim].min():
             break
-        if not beyond[rim].all() or beyond[others].any():
+        shares = [float(beyond[border.vertices].mean()) for border in others]
+        crossed = {border.role for border, share in zip(others, shares, strict=True) if share > 0.0}
+        if bare is None and beyond[rim].all() and crossed == {"neck"} and max(shares) <= _NECK:
+            bare = offset, section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))[1]
+        if not beyond[rim].all() or crossed:
             lengths, middles, offsets = [], [], []
             continue
+        if bare is not None and offset > bare[0] + _BARE * anatomy.size:
+            # A neck that leaves the shoulders bare ends on the sleeves, and so does the armhole.
+            return bare
         length, middle = section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))
         lengths.append(length)
         middles.append(middle)
         offsets.append(offset)
         if len(lengths) > 3 and all(lengths[-4 + k] - lengths[-2 + k] < _STEEP * 2.0 * step for k in (0, 1)):
             return offsets[-4], middles[-4]
-    return (offsets[0], middles[0]) if offsets else None
+    return (offsets[0], middles[0]) if offsets else bare
 
 
 def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]:
@@ -231,6 +245,7 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]
             )
         else:
             cloth = cut
+    cloth = _cut_hood(cloth, anatomy)
     kind = anatomy.kind
     if kind in ("trousers", "jumpsuit"):
         everywhere = cloth.labels["sleeve"] < 0
@@ -334,6 +349,56 @@ def _cut_armhole(cloth: Cloth, anatomy: Anatomy, name: str, limb: Limb, number: 
         edges = trial.line_between(sleeve, np.ones(len(trial.faces), dtype=bool))
         return trial.with_seam(f"armhole {side_word(limb.side)}", edges)
     return None
+
+
+def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
+    """Return the cloth with a hood cut off where the neck is narrowest, and in halves; as it is if it has none.
+
+    A hood widens above the neck, and its opening, or the front's, goes up along the face. Its line lies in a plane from there to the
+    nape. Its faces have the label "sleeve" behind the last sleeve: lines of the trunk do not run in it.
+    """
+    opening = anatomy.border("neck") or anatomy.border("opening")
+    if opening is None or anatomy.kind not in ("top", "dress", "jumpsuit"):
+        return cloth
+    trunk = cloth.labels["sleeve"] < 0
+    heights, ahead = cloth.vertices @ anatomy.up, cloth.vertices @ anatomy.front
+    used = np.unique(cloth.faces[trunk])
+    top = float(heights[used].max())
+    shoulder = max(
+        (float(limb.fork @ anatomy.up) for limb in anatomy.limbs_of("sleeve")), default=top - 0.4 * anatomy.size
+    )
+    levels = np.linspace(shoulder, top, _LEVELS)[1:-1]
+    girths = np.array([section(cloth, heights - level, trunk)[0] for level in levels])
+    # The narrowest level above which it is wider again, and below which the shoulders are much wider.
+    above, below = np.maximum.accumulate(girths[::-1])[::-1], np.maximum.accumulate(girths)
+    is_neck = (above > _WIDER * girths) & (below > _SHOULDERS * girths)
+    neck = int(np.where(is_neck, girths, np.inf).argmin())
+    # Its seam lies at the neck's root, where the shoulders begin.
+    level = float(levels[1 + max(np.flatnonzero(girths[:neck] > _ROOT * girths[neck]), default=-1)])
+    rim = heights[opening.vertices]
+    if not is_neck[neck] or rim.max() - level < _FACE * (top - level):
+        return cloth
+    nape = used[np.abs(heights[used] - level) < 0.03 * anatomy.size]
+    nape = nape[ahead[nape].argmin()] if len(nape) else used[heights[used].argmax()]
+    low = opening.vertices[int(rim.argmin())]
+    # A plane that is no steeper than half a right angle, a little above the lowest place of the opening; level where that is far below.
+    rise, depth = float(rim.min()) + 0.01 * anatomy.size - level, float(ahead[low] - ahead[nape])
+    slope = rise / depth if depth > 0.0 and abs(rise) < depth else 0.0
+    field = heights - level - slope * (ahead - ahead[nape])
+    trial = tidied(replace(cloth, values={**cloth.values, "hood": field}), "hood", trunk)
+    trial, beyond = trial.split("hood", trunk)
+    hood = beyond & (trial.labels["sleeve"] < 0)
+    share = float(trial.face_areas[hood].sum() / trial.face_areas.sum())
+    parts = components(trial.faces[hood].astype(np.int32)) if hood.any() else np.zeros(0)
+    if not _HOOD[0] < share < _HOOD[1] or len(np.unique(parts)) != 1:
+        return cloth
+    number = len(anatomy.limbs_of("sleeve"))
+    trial = replace(trial, labels={**trial.labels, "sleeve": np.where(hood, number, trial.labels["sleeve"])})
+    trial = trial.with_seam("hood", trial.line_between(hood, np.ones(len(trial.faces), dtype=bool)))
+    trial = tidied(trial, LEFT, hood)
+    trial, is_left = trial.split(LEFT, hood)
+    trial = trial.with_seam("hood centre", trial.line_between(is_left, trial.labels["sleeve"] == number))
+    return replace(trial, values={key: value for key, value in trial.values.items() if key != "hood"})
 
 
 def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: Ids, anatomy: Anatomy) -> Cloth:
