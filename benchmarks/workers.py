@@ -6,6 +6,8 @@ Each batch runs in a process of its own, with compiled kernels: sizes EU 36 to 4
 files but the film, as `scenes/batch_sizes.toml` has them. `start` is the time until the first task begins: imports of program and
 Dask, processes of the workers, and their imports. `between` is the mean time from one task's end, as the batch sees it, to the beginning of
 the next on the same worker, the first tasks left out. Garments an hour are those of the steady state, from the first task's beginning on.
+Before that, the same sparse factors and loops of Python are run by one process, and by as many at once as there are workers: cores that
+share caches, memory or a core's own units are slower beside each other, and no batch gains more than they leave.
 """
 
 from __future__ import annotations
@@ -23,6 +25,36 @@ from typing import Any
 SCENE = Path(__file__).parents[1] / "scenes" / "basic_block.toml"
 _SIZES = (36, 38, 40, 42, 44)
 _FABRICS = ["woven", "denim", "cotton", "linen", "satin", "wool-plain", "silk", "jacket"]
+
+
+# Some seconds of what a block does: sparse factors, small arrays, Python.
+_WORK = """
+import time, numpy as np
+from scipy.sparse import diags_array, eye_array, kron
+from scipy.sparse.linalg import splu
+line = diags_array([-1.0, 2.01, -1.0], offsets=[-1, 0, 1], shape=(90, 90))
+matrix = (kron(line, eye_array(90)) + kron(eye_array(90), line)).tocsc()
+right, begun = np.ones(8100), time.process_time()
+for _ in range(20):
+    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A")
+    for _ in range(20):
+        factor.solve(right)
+    sum(float(np.dot(np.ones(50), np.full(50, number))) for number in range(10_000))
+print(time.process_time() - begun)
+"""
+
+
+def slower_beside(count: int) -> float:
+    """Return how much more processor time a process takes while others do the same, `count` in all."""
+
+    def seconds(beside: int) -> float:
+        started = [
+            subprocess.Popen([sys.executable, "-c", _WORK], stdout=subprocess.PIPE, text=True) for _ in range(beside)
+        ]
+        return sum(float(each.communicate()[0]) for each in started) / beside
+
+    alone = seconds(1)
+    return seconds(count) / alone
 
 
 def child(begun: float, tasks: int, workers: int, film: bool) -> dict[str, Any]:
@@ -64,6 +96,12 @@ def main() -> None:
         print(json.dumps(child(float(given.child[0]), given.tasks, int(given.child[1]), given.film)))
         return
     results, alone = [], None
+    for workers in given.workers:
+        if workers > 1:
+            slower = slower_beside(workers)
+            print(
+                f"machine: {workers} processes at once, each takes {slower:.2f} times as long: {workers / slower:.2f} times one"
+            )
     print(
         f"{'workers':>7} {'tasks':>5} {'all s':>7} {'start s':>8} {'a task s':>9} {'between s':>10} {'an hour':>8} {'cpu s':>7}"
     )
