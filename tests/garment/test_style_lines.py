@@ -98,6 +98,29 @@ def test_slanted_hem_cuts_godets_too(skirt: Garment):
     assert matches(pattern)
 
 
+def test_seam_has_one_opening_at_its_lower_end(skirt: Garment):
+    slit = replace(GODETS[0], kind="slit", width=0.015)
+    with pytest.raises(InputError, match=r"openings\[1\]: the lower end of 'side left' is open already"):
+        pattern_of(replace(skirt, openings=(slit, GODETS[0])))
+
+
+def test_godet_needs_a_hem(wrapped: Garment):
+    godet = Opening(kind="godet", line="bodice side left", length=0.1, width=0.1)
+    with pytest.raises(
+        InputError, match="a godet runs out into a hem; 'bodice side left' ends at 'waist', which is sewn"
+    ):
+        pattern_of(replace(wrapped, openings=(WRAP, godet)))
+
+
+def test_half_on_the_fold_has_no_hem_that_slants_to_one_side(mannequin: Mannequin):
+    form = mannequin.form(shipped_form("a_line_skirt"), half=True)
+    garment = flatten_form(mannequin, form, fabric="denim", curves_mm=0.0)
+    with pytest.raises(InputError, match="cannot be shorter on one side"):
+        pattern_of(replace(garment, finishing=(slanted({"side left": 0.2, "side right": 0.0}),)))
+    cut = pattern_of(replace(garment, finishing=(slanted({"side": 0.1, "centre front": 0.0}),)))
+    assert matches(cut)
+
+
 def test_wrap_lies_over_the_other_half(wrapped: Garment):
     pattern = pattern_of(wrapped)
     bodice, skirt = (pattern.piece(f"front_{part}_left", "") for part in ("bodice", "skirt"))

@@ -63,6 +63,10 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
             if seam is None:
                 raise InputError(f"openings[{number}]: the pattern has no seam {part.seam!r} of its own")
             if opening.kind == "wrap":
+                if seam.openings:
+                    raise InputError(
+                        f"openings[{number}]: {seam.name!r} has another opening; a wrap is open all along it"
+                    )
                 pattern = _with_wrap(pattern, seam, opening)
                 continue
             if opening.kind != "godet":
@@ -82,6 +86,10 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
                     raise InputError(
                         f"openings[{number}]: a {opening.kind} begins at the lower end of a seam between two edges"
                     )
+                for side in sides:
+                    names = {edge.name for edge in pattern.piece(side.piece, pattern.sample).edges}
+                    if names & {f"{side.edge} {kind}" for kind in ("slit", "vent", "godet")}:
+                        raise InputError(f"openings[{number}]: the lower end of {seam.name!r} is open already")
                 pieces = {size: list(row) for size, row in pattern.pieces.items()}
                 for size in pieces:
                     part = _part_of(placed, size, number, seam.name)
@@ -208,6 +216,10 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
     # The edge beyond its lower end is the hem, which runs on along the wedge.
     down = _runs_down(shell, shell.edge(freed).points)
     hem = shell.edges[(order.index(freed) + (1 if down else -1)) % len(order)]
+    if (shell.name, hem.name) in {
+        (side.piece, side.edge) for each in pattern.seams for row in each.sides for side in row
+    }:
+        raise InputError(f"a godet runs out into a hem; {seam.name!r} ends at {hem.name!r}, which is sewn")
     half = 0.5 * opening.width / opening.length
     turn = np.linspace(-half, half, 2 * max(8, round(np.degrees(half) / 2.5)) + 1)
     arc = opening.length * np.column_stack([np.sin(turn), -np.cos(turn)])
@@ -218,7 +230,7 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
     for size, row in pattern.pieces.items():
         sewn = pattern.piece(first.piece, size).edge(freed).allowance
         wedge = Piece(
-            name=name, size=size, fabric=shell.fabric, quantity=both, paired=False, title="godet",
+            name=name, size=size, fabric=shell.fabric, quantity=both, paired=False,
             edges=[
                 Edge(name="left", points=np.vstack([apex, arc[:1]]), allowance=sewn),
                 Edge(name=hem.name, points=arc, kind=hem.kind, allowance=hem.allowance),

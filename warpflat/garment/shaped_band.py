@@ -212,15 +212,16 @@ def slant_rises(
         lines = np.array(sorted(knots))
         lines = lines[np.diff(lines, prepend=-np.inf) > _ON_EDGE]
         for side, begin in zip(chain.sides, starts, strict=True):
-            if (side.piece, side.edge) in found:
-                continue
             points = pattern.piece(side.piece, size).edge(side.edge).points
             arc = arc_lengths(points)
             arc = np.unique(np.concatenate([arc, np.linspace(0.0, arc[-1], _SLANTED)]))
             along = np.clip(begin + (arc[-1] - arc if side.reversed else arc), lines[0], lines[-1])
             values = np.array([knots[each] for each in lines.tolist()])
             widths = PchipInterpolator(lines, values)(along) if len(lines) > 1 else np.full(len(arc), values[0])
-            found[side.piece, side.edge] = arc, widths
+            if np.abs(found.setdefault((side.piece, side.edge), (arc, widths))[1] - widths).max() > _ON_EDGE:
+                raise InputError(
+                    f"{side.piece} is cut on the fold or twice, and cannot be shorter on one side; with half = false it is cut whole"
+                )
     for name in by_line:
         if not any(f"{key} ".startswith(f"{each} ") for key in met for each in (name, other_side(name))):
             raise InputError(f"no line {name!r} meets {places[0][1]!r}; {nearest(name, met)}")

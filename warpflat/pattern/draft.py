@@ -5,7 +5,7 @@ Everything that the files show is worked out here once; the writers of DXF, SVG,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -279,14 +279,17 @@ def _fitted_edges(
         frame = _frame(piece)
         lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
-    curves = {key: curve for key, (curve, _) in fitted.items()}
-    trued, corners = true_corners(pieces, seams, curves) if true else (curves, [])
-    trued = equal_sides(seams, trued)
+    curves, corners = equal_sides(seams, {key: curve for key, (curve, _) in fitted.items()}), list[CornerReport]()
+    trued: Mapping[tuple[str, str], Curve] = curves
+    if true:
+        # Turned ends change lengths a little, too.
+        trued, corners = true_corners(pieces, seams, curves)
+        trued = equal_sides(seams, trued)
     edges = {}
     for piece in pieces:
         keys = [(piece.name, edge.name) for edge in piece.edges]
         edges[piece.name] = tuple(
-            _drafted_edge(edge, trued[key], fitted[key], lines[key])
+            _drafted_edge(edge, trued[key], (curves[key], fitted[key][1]), lines[key])
             for edge, key in zip(piece.edges, keys, strict=True)
         )
     return edges, corners
