@@ -122,6 +122,22 @@ def test_aliases_and_statures() -> None:
     assert tall.heights["nape"] == pytest.approx(1.522 + 2 * 0.054)
 
 
+def test_plus_sizes_are_those_of_another_table() -> None:
+    """The German DOB table (survey of 1994; Hofenbitzer, Grundschnitte und Modellentwicklungen 1, p. 20), whose steps begin with EU 54."""
+    dob = {  # size: bust, waist, hip, upper arm, wrist [cm]
+        38: (88, 72, 97, 28.0, 15.8), 42: (96, 80, 103, 30.4, 16.6), 46: (104, 88, 109, 32.8, 17.4), 48: (110, 94.5, 114, 34.6, 18.0),
+        50: (116, 101, 119, 36.4, 18.6), 52: (122, 107.5, 124, 38.2, 19.2), 54: (128, 114, 129, 40.0, 19.8),
+        56: (134, 120.5, 134, 41.8, 20.4), 58: (140, 127, 139, 43.6, 21.0), 60: (146, 133.5, 144, 45.4, 21.6),
+    }  # fmt: skip
+    for size, (bust, waist, hip, upper_arm, wrist) in dob.items():
+        ours = measurements_from_size(f"EU {size}").lengths
+        assert 100.0 * ours["bust"] == pytest.approx(bust), size
+        assert 100.0 * ours["waist"] == pytest.approx(waist, abs=1.51), size
+        assert 100.0 * ours["hip"] == pytest.approx(hip, abs=3.01), size
+        assert 100.0 * ours["upper_arm"] == pytest.approx(upper_arm, abs=1.1), size
+        assert 100.0 * ours["wrist"] == pytest.approx(wrist, abs=1.7), size
+
+
 def test_missing_measurements_are_completed_and_said() -> None:
     made = measurements_from_values(bust=0.88, waist=0.70)
     assert made.lengths["waist"] == 0.70

@@ -1,9 +1,9 @@
 """The body model fitted to a scan: shape, pose and place by Gauss-Newton steps on closest points, in both directions.
 
 Each vertex of the body is drawn to the nearest place on the scan, along the scan's normal there, and each sample of the scan draws the
-nearest place of the body to itself. A landmark whose height is known is drawn there. A place counts less the farther it is away (Geman
-and McClure), and not at all where the two surfaces face different ways: so holes, hair, clothes, floors and missing hands do little.
-Small shapes and small bends are preferred.
+nearest place of the body to itself. A landmark whose height is known is drawn there. A place counts less the farther it is away (Geman and
+McClure), and not at all where the two surfaces face different ways: so holes, hair, clothes, floors and missing hands do little. Small
+shapes and small bends are preferred.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
+from warpflat.mannequin.body_landmarks import LEVELS
 from warpflat.mannequin.body_model import finer_body
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
@@ -20,7 +22,7 @@ from warpflat.mannequin.rays import ray_radii
 from warpflat.mannequin.scan_legs import leg_curves
 from warpflat.mannequin.scan_limbs import underarm_point, upper_curves
 from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, find_levels, guess_note, missing_note
-from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
+from warpflat.mannequin.scan_pose import LEVELS_UP, ScanOptions, turn_scan_upright
 from warpflat.mannequin.scan_sections import BodySections
 from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.stand_body import StandingBody, stand_body
@@ -33,6 +35,8 @@ _UP_SIGMA = 1.5
 _HARMONICS = 28
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
+# A level of a body lies at most so far from where the mean body has it, as a share of the stature.
+_NEIGHBOUR = 0.06
 # How far a side seam follows the waves of front and back at the waist.
 _OFF_PLUMB = 0.5
 
@@ -72,6 +76,15 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     from scipy.spatial import QhullError
 
     scan, notes = turn_scan_upright(vertices, faces, options)
+    # A landmark beyond its neighbours would pull the fit off the body.
+    stature = float(scan.vertices[:, 1].max())
+    about = {name: LEVELS[name][0] * stature for name in LEVELS_UP if name in LEVELS} | dict(options.landmarks)
+    for under, over in itertools.pairwise(name for name in LEVELS_UP if name in about):
+        if about[over] < about[under] - (0.0 if {under, over} <= set(options.landmarks) else _NEIGHBOUR * stature):
+            raise InputError(
+                f"scan: {over} ({about[over]:.3f} m) does not lie above {under} ({about[under]:.3f} m) on a body {stature:.2f} m tall; "
+                "give landmarks as heights above the floor"
+            )
     laid = stand_body(
         scan.vertices,
         scan.triangles,
