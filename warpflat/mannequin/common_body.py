@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,7 @@ class CommonBody:
 
 
 def common_body_of_scan(
-    vertices: FloatArray, faces: NDArray[np.int64], *, name: str, options: ScanOptions | None = None
+    vertices: FloatArray, faces: NDArray[np.integer[Any]], *, name: str, options: ScanOptions | None = None
 ) -> CommonBody:
     """Return the body of a scan, in the scan's pose.
 
@@ -79,7 +80,7 @@ def common_body_of_scan(
         InputError: it is no standing body with arms and legs.
     """
     options = options or ScanOptions()
-    scan, _ = turn_scan_upright(np.asarray(vertices, float), np.asarray(faces), options)
+    scan, _ = turn_scan_upright(np.asarray(vertices, float), np.asarray(faces, dtype=np.int64), options)
     laid = stand_body(scan.vertices, scan.triangles, scan.scanned, landmarks=options.landmarks)
     if laid.unsure is not None:
         raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
