@@ -61,7 +61,7 @@ def pattern_handles(solution: Solution) -> list[Handle]:
     for name in plan.form.pieces:
         flat = np.asarray(solution.pieces[name].positions)
         of_piece = list[Handle]()
-        for handles in (_of_darts, _of_sides, _of_neckline):
+        for handles in (_of_darts, partial(_of_sides, solution), _of_neckline):
             # Where a dart opens at a level of the side seam, its mouth is what is dragged.
             of_piece += [
                 each
@@ -132,34 +132,55 @@ def _move_tip(plan: GarmentPlan, dart: PlacedDart, part: tuple[float, float], en
     if asked.part is None and not two_tips:
         # A bust point, or a waist, is what it was measured from.
         tip = length + moved if dart.to_point is None else max(dart.to_point - moved, 0.0)
-        return _with_dart(plan, replace(asked, tip_mm=round(1e3 * tip, 1)))
+        return _with_darts(plan, replace(asked, tip_mm=round(1e3 * tip, 1)))
     ends = [round(share, 4) for share in part]
     ends[end] += moved * (part[1] - part[0]) / length
     ends[end] = round(float(np.clip(ends[end], _INSIDE, 1.0 - _INSIDE)), 4)
-    return _with_dart(plan, replace(asked, part=(ends[0], ends[1]), tip_mm=None))
+    return _with_darts(plan, replace(asked, part=(ends[0], ends[1]), tip_mm=None))
 
 
 def _widen_mouth(plan: GarmentPlan, dart: PlacedDart, width: float, moved: float) -> dict[str, Any]:
     """Return the cuts with a dart whose mouth opens wider by twice what one of its ends was moved."""
     mouth = max(width + 2.0 * moved, _NARROWEST)
-    return _with_dart(plan, replace(dart.asked, mouth_mm=round(1e3 * mouth, 1), like=None))
+    return _with_darts(plan, replace(dart.asked, mouth_mm=round(1e3 * mouth, 1), like=None))
 
 
-def _with_dart(plan: GarmentPlan, dart: FormDart) -> dict[str, Any]:
-    """Return the cuts of a scene with a dart as it is asked for now."""
+def _with_darts(plan: GarmentPlan, *darts: FormDart) -> dict[str, Any]:
+    """Return the cuts of a scene with darts as they are asked for now."""
     cuts = [table.model_dump(exclude_unset=True, by_alias=True) for table in plan.scene.settings.cuts]
-    at = next((k for k, table in enumerate(cuts) if place_of(table) == dart.place), len(cuts))
-    return {"cuts": [*cuts[:at], cut_of_dart(dart), *cuts[at + 1 :]]}
+    for dart in darts:
+        at = next((k for k, table in enumerate(cuts) if place_of(table) == dart.place), len(cuts))
+        cuts[at : at + 1] = [cut_of_dart(dart)]
+    return {"cuts": cuts}
 
 
-def _of_sides(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
-    """A point of a side seam at a level gives the garment more or less ease there."""
+def _held_darts(solution: Solution, level: str) -> list[FormDart]:
+    """Return the darts that are widest at a level and as wide as the cloth wants, each as wide as it is now."""
+    plan, held = solution.plan, dict[tuple[str | None, ...], FormDart]()
+    assert plan is not None
+    row = plan.mannequin.layout.lines.get(level, ())
+    for name, piece in plan.form.pieces.items():
+        flat = np.asarray(solution.pieces[name].positions)
+        placed = {dart.name: dart.asked for dart in plan.form.darts if dart.piece == name}
+        for dart_name, (left, right) in piece.legs().items():
+            asked, apart = placed[dart_name], np.linalg.norm(flat[left] - flat[right], axis=1)
+            mouth = int(apart.argmax()) if dart_name in piece.fisheyes else 0
+            if asked.mouth_mm is None and asked.pleat_mm is None and piece.grid_vertices[left[mouth]] in row:
+                held[asked.place] = replace(asked, mouth_mm=round(1e3 * float(apart[mouth]), 1), like=None)
+    return list(held.values())
+
+
+def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
+    """A point of a side seam at a level gives the garment more or less ease there; darts there stay as wide as they are."""
     piece, layout = plan.form.pieces[name], plan.mannequin.layout
     asked = plan.scene.settings.ease
     table = {} if asked is None else {"preset": asked} if isinstance(asked, str) else dict(asked)
 
     def change(level: str, ease: float, share: float, moved: float) -> dict[str, Any]:
-        return {"ease": {**table, level: round(ease + 100.0 * moved / share, 1)}}
+        # Left free, the darts would close by as much as the cloth grows, and the seam would hardly move.
+        held = _held_darts(solution, level)
+        cuts = _with_darts(plan, *held) if held else {}
+        return {**cuts, "ease": {**table, level: round(ease + 100.0 * moved / share, 1)}}
 
     for edge, ids in piece.edges.items():
         share = _SHARE_OF_EASE.get(edge.split(" ")[0])
