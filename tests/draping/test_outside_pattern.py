@@ -267,6 +267,34 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
 
 
+@pytest.mark.parametrize("lower", [0.0, 0.45])
+def test_a_designed_surface_beside_the_body_is_no_start(lower: float):
+    """As that of a garment in the axes of its own file, whose shoulders lie at this body's knees."""
+    body = body_of_size(30.0)
+    hip = body.levels()["hip"].height
+
+    def lift(begin: float):
+        def places(flat: np.ndarray) -> np.ndarray:
+            angle = begin + np.pi * flat[:, 0] / 0.475
+            return np.column_stack([0.175 * np.sin(angle), hip - 0.2 + flat[:, 1] - lower, 0.125 * np.cos(angle)])
+
+        return places
+
+    placement = Placement(spacing=0.03, lifts={"front": lift(-0.5 * np.pi), "back": lift(0.5 * np.pi)})
+    worn, notes = drape_pattern(
+        tube(0.475, 0.25),
+        body,
+        fabric=warpflat.find_fabric("woven"),
+        placement=placement,
+        options=DrapeOptions(max_steps=100),
+        device=DEVICE,
+    )
+    assert [note for note in notes if "lies beside this body" in note] == notes
+    assert len(notes) == (lower > 0.0)
+    # Placed by its seams it starts at the waist.
+    assert worn.positions[:, 1].max() > hip
+
+
 def test_a_gathered_skirt_goes_around_the_body_by_its_own_width():
     """Front and back lie before and behind the body, above each other, though the skirt is 1.6 times as wide as its top."""
     body = body_of_size(30.0)

@@ -34,6 +34,8 @@ __all__ = ["Placement", "drape_pattern", "place_pieces"]
 _SIZES = (0.05, 10.0)
 # A designed surface does not belong to a body where more than this share of it lies so deep [m] within.
 _WITHIN, _DEEP = 0.05, 0.01
+# Nor where its top, from this share of its vertices on, lies so far [m] off, or less than this share of it looks as the skin does.
+_TOP, _OFF, _ALIKE = 0.9, 0.05, 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,12 +117,10 @@ def drape_pattern(
     # On another body than that of its designed surface a garment starts as one that has none, if it can.
     placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
     lifted = len(placed) == len(meshes)
-    deep = 0.0
-    if lifted and solid is not None:
-        deep = float((solid.gaps(np.concatenate(list(placed.values()))) < -_DEEP).mean())
+    elsewhere = _elsewhere(placed, meshes, solid) if lifted and solid is not None else ""
     if not lifted and body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
-    if body is not None and (not lifted or deep > _WITHIN):
+    if body is not None and (not lifted or elsewhere):
         try:
             placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
         except InputError:
@@ -128,9 +128,7 @@ def drape_pattern(
                 raise
         else:
             if lifted:
-                notes.append(
-                    f"{100 * deep:.0f} % of the designed surface lies in this body: the pieces are placed by their seams"
-                )
+                notes.append(f"{elsewhere}: the pieces are placed by their seams")
             lifted = False
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
@@ -182,6 +180,26 @@ def drape_pattern(
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
+
+
+def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh], body: Body) -> str:
+    """Return in words why a designed surface (#P by 3 [m] by piece) is not worn by a body; "" if it may be.
+
+    What is worn lies outside, looks as the skin below it does, and touches where it hangs, at its top.
+    """
+    points = np.concatenate(list(placed.values()))
+    gap = body.gaps(points)
+    deep = float((gap < -_DEEP).mean())
+    if deep > _WITHIN:
+        return f"{100 * deep:.0f} % of the designed surface lies in this body"
+    off = float(np.median(gap[points[:, 1] >= np.quantile(points[:, 1], _TOP)]))
+    corner = np.concatenate([placed[name][mesh.triangles] for name, mesh in meshes.items()])
+    vector = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    facing = np.einsum("ta,ta->t", vector, body.nearest(corner.mean(axis=1))[1])
+    alike = float(np.linalg.norm(vector[facing > 0.0], axis=1).sum() / np.linalg.norm(vector, axis=1).sum())
+    if off > _OFF or max(alike, 1.0 - alike) < _ALIKE:
+        return f"the designed surface lies beside this body, its top {100 * off:.0f} cm off"
+    return ""
 
 
 def place_pieces(
