@@ -153,7 +153,9 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         fields = draw_fields(cloth, anatomy, operators)
         tailored = auto or options.keep
         cloth, notes = (
-            cut_as_a_tailor(fields, anatomy) if tailored else (with_drawn_sleeves(fields, anatomy, anywhere=True), [])
+            cut_as_a_tailor(fields, anatomy, hood=not options.forbids("hood"))
+            if tailored
+            else (with_drawn_sleeves(fields, anatomy, anywhere=True), [])
         )
         for name in list(cloth.seams):
             if not (auto or name.startswith(HAND) or options.keeps(name)):
