@@ -415,7 +415,8 @@ def _edge_lines(
             seam, other = keys[a]
             plain = seam.removesuffix(" left").removesuffix(" right")
             several = len({key[1] for key in keys if key[0] == seam}) > 1
-            words = [word for word in names[other].split("_") if word != plain]
+            words = names[other].split("_")
+            words = words[: words.index(plain)] if plain in words[1:] else words
             title = f"{plain} {words[-1]}" if several and other >= 0 else plain
             lines[find_unused_name(title, lines)] = np.array(run, dtype=np.int32)
     return lines
