@@ -37,7 +37,8 @@ def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
     upward, skin = np.array([0.0, 1.0, 0.0]), Slicer(body.vertices, finer_body()[1])
     levels = body.level("waist") + _REACH * float(np.ptp(body.vertices[:, 1])) * np.linspace(-1.0, 1.0, _LEVELS)
     trunks = [
-        max((part.points for part in skin.cut(upward, level)), key=lambda one: np.ptp(one[:, 0])) for level in levels
+        max((part.points for part in skin.cut(upward, level)), key=lambda one: float(np.ptp(one[:, 0])))
+        for level in levels
     ]
     trunk = min(trunks, key=lambda one: convex_girth(one[:, [0, 2]]))
     x, y, z = (scale * ((trunk.mean(axis=0) - body.shift) @ np.linalg.inv(body.turn))).tolist()

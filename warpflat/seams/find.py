@@ -45,9 +45,6 @@ _ALONG = 0.2
 #: What a band is called, by the border along which it runs.
 BANDS = {"waist": "waistband", "neck": "neck_band", "sleeve": "cuff", "leg": "cuff"}
 
-# Pieces are alike if sizes, outlines and extents agree within this share.
-_ALIKE = 0.015
-
 # A piece whose parts in front and behind differ by less than this share is of neither.
 _AROUND = 0.35
 
@@ -156,7 +153,9 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         fields = draw_fields(cloth, anatomy, operators)
         tailored = auto or options.keep
         cloth, notes = (
-            cut_as_a_tailor(fields, anatomy) if tailored else (with_drawn_sleeves(fields, anatomy, anywhere=True), [])
+            cut_as_a_tailor(fields, anatomy, hood=not options.forbids("hood"))
+            if tailored
+            else (with_drawn_sleeves(fields, anatomy, anywhere=True), [])
         )
         for name in list(cloth.seams):
             if not (auto or name.startswith(HAND) or options.keeps(name)):
@@ -206,7 +205,7 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         what=describe(anatomy),
         up=axis_name(anatomy.up),
         front=axis_name(anatomy.front),
-        notes=(*notes, *turned, *_alike(pieces), *anatomy.notes),
+        notes=(*notes, *turned, *anatomy.notes),
     )
 
 
@@ -384,35 +383,6 @@ def _band(cloth: Cloth, mesh: PieceMesh) -> str:
     return BANDS[most] if along(most) > _ALONG * around else ""
 
 
-def _alike(pieces: Sequence[Surface]) -> list[str]:
-    """Return a note on pieces that are much the same, or mirror images: a maker draws them once."""
-    measures = []
-    for piece in pieces:
-        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
-        around = [piece.vertices[np.append(loop, loop[0])] for loop in border_loops(piece.faces)]
-        length = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in around)
-        axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
-        measures.append(
-            [
-                np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()),
-                length,
-                *np.ptp(piece.vertices @ axes, axis=0),
-            ]
-        )
-    left = list(range(len(pieces)))
-    notes = []
-    while left:
-        first, *others = left
-        size, around, *extents = measures[first]
-        off = _ALIKE * np.array([size, around, *[max(extents)] * 3])
-        same = [first, *(k for k in others if (np.abs(np.subtract(measures[k], measures[first])) < off).all())]
-        left = [k for k in left if k not in same]
-        names = [pieces[k].name for k in same]
-        if len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
-            notes.append(f"{', '.join(names)} are alike: cut {len(names)}, or some of them mirrored")
-    return notes
-
-
 def _edge_lines(
     piece: Surface,
     mesh: PieceMesh,
@@ -445,7 +415,8 @@ def _edge_lines(
             seam, other = keys[a]
             plain = seam.removesuffix(" left").removesuffix(" right")
             several = len({key[1] for key in keys if key[0] == seam}) > 1
-            words = [word for word in names[other].split("_") if word != plain]
+            words = names[other].split("_")
+            words = words[: words.index(plain)] if plain in words[1:] else words
             title = f"{plain} {words[-1]}" if several and other >= 0 else plain
             lines[find_unused_name(title, lines)] = np.array(run, dtype=np.int32)
     return lines

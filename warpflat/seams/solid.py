@@ -86,7 +86,7 @@ def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[
     """
     total = float(cloth.face_areas.sum())
     most = _MOST if most is None else most
-    done, known = set[tuple[int, float]](), dict[tuple[int, float], float]()
+    done, known = set[tuple[int, float]](), dict[int, float]()
     for number in range(4 * most):
         meshes = list(cloth.pieces())
         waiting = []
@@ -112,12 +112,12 @@ def part_solids(cloth: Cloth, *, shape: bool, most: int | None = None) -> tuple[
     return cloth, notes
 
 
-def _strain(cloth: Cloth, faces: Ids, known: dict[tuple[int, float], float]) -> float:
-    """Return about how much some faces are strained when they are laid flat; `known` remembers it by their number and area."""
+def _strain(cloth: Cloth, faces: Ids, known: dict[int, float]) -> float:
+    """Return about how much some faces are strained when they are laid flat; `known` remembers it by the hash of their corners."""
+    corners = hash(cloth.vertices[cloth.faces[faces]].tobytes())
+    if corners in known:
+        return known[corners]
     area = float(cloth.face_areas[faces].sum())
-    key = len(faces), round(area, 12)
-    if key in known:
-        return known[key]
     normals, _ = _smoothed_normals(cloth, faces)
     a, b, c = normals.transpose(1, 0, 2)
     # The solid angle of a triangle of unit vectors, for small ones the triangle's own area.
@@ -127,8 +127,8 @@ def _strain(cloth: Cloth, faces: Ids, known: dict[tuple[int, float], float]) -> 
         # A tube is as long, laid flat, as it is around.
         ring = cloth.vertices[np.append(loop, loop[0])]
         length = max(length, float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()))
-    known[key] = curvature * area / (12.0 * max(length, 1e-300) ** 2)
-    return known[key]
+    known[corners] = curvature * area / (12.0 * max(length, 1e-300) ** 2)
+    return known[corners]
 
 
 def _reach(cloth: Cloth, faces: Ids) -> float:
@@ -203,7 +203,7 @@ def _best_cut(
     mesh: PieceMesh,
     name: str,
     total: float,
-    known: dict[tuple[int, float], float],
+    known: dict[int, float],
 ) -> Cloth | None:
     """Return the cloth with the cut of a part after which the least is left to do; None if no cut parts it well."""
     own = np.zeros(len(cloth.faces), dtype=bool)

@@ -229,8 +229,8 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     return (offsets[0], middles[0]) if offsets else bare
 
 
-def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]:
-    """Return the cloth cut where a tailor would cut it, and notes.
+def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> tuple[Cloth, list[str]]:
+    """Return the cloth cut where a tailor would cut it, and notes; a hood in one with the trunk if it is not to be cut off.
 
     Its faces have the label "sleeve": the number of the sleeve, or -1.
     """
@@ -245,7 +245,7 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy) -> tuple[Cloth, list[str]]
             )
         else:
             cloth = cut
-    cloth = _cut_hood(cloth, anatomy)
+    cloth = _cut_hood(cloth, anatomy) if hood else cloth
     kind = anatomy.kind
     if kind in ("trousers", "jumpsuit"):
         everywhere = cloth.labels["sleeve"] < 0
@@ -389,8 +389,7 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     trial, beyond = trial.split("hood", trunk)
     hood = beyond & (trial.labels["sleeve"] < 0)
     share = float(trial.face_areas[hood].sum() / trial.face_areas.sum())
-    parts = components(trial.faces[hood].astype(np.int32)) if hood.any() else np.zeros(0)
-    if not _HOOD[0] < share < _HOOD[1] or len(np.unique(parts)) != 1:
+    if not _HOOD[0] < share < _HOOD[1] or components(trial.faces[hood].astype(np.int32)).max() > 0:
         return cloth
     number = len(anatomy.limbs_of("sleeve"))
     trial = replace(trial, labels={**trial.labels, "sleeve": np.where(hood, number, trial.labels["sleeve"])})
