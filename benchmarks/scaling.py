@@ -61,6 +61,8 @@ def draw(path: Path, rows: list[dict[str, Any]]) -> None:
             axis.loglog(
                 [row["vertices"] for row in of], each, marker="o", label=f"{kind}: total grows as V^{total:.2f}"
             )
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("{x:g}")
         axis.set_xlabel("vertices V")
         axis.set_ylabel(label)
         axis.grid(True, which="both", linewidth=0.3)
