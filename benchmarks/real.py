@@ -97,10 +97,10 @@ def default_files(folder: Path | None = None) -> list[Path]:
 
 
 def meshes_of(given: Path) -> list[str]:
-    """Return a file, the panels of a USD file, or the meshes of a folder."""
+    """Return a file or one panel of a USD file (FILE#PANEL), all panels of such a file, or the meshes of a folder."""
     if given.is_dir():
         return [*map(str, default_files(given))]
-    if given.suffix.startswith(".usd"):
+    if given.suffix.startswith(".usd") and "#" not in given.name:
         return [f"{given}#{panel.surface.name}" for panel in read_sewn_panels(given)]
     return [str(given)]
 
@@ -263,7 +263,7 @@ def measure(mesh: str, chosen: argparse.Namespace) -> list[dict[str, Any]]:
     if chosen.blender:
         rows.append(_program("Blender", result, lambda problem: blender(problem, chosen.blender)))
     rows.append(_charts(result))
-    return [{"mesh": Path(mesh).name, "vertices": len(surface.vertices), **each} for each in rows]
+    return [{"mesh": Path(mesh).name.rpartition("#")[2], "vertices": len(surface.vertices), **each} for each in rows]
 
 
 def _line(row: dict[str, Any], ours: float) -> str:
@@ -329,6 +329,8 @@ def main() -> None:
         found += rows
         for row in rows:
             print(_line(row, rows[0]["seconds"]), flush=True)
+        if chosen.json:
+            chosen.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
     ratios = [
         row["seconds"] / ours["seconds"]
         for ours in found
@@ -342,8 +344,6 @@ def main() -> None:
             f"ARAP with its start over flatten: {min(ratios):.2f} to {max(ratios):.2f}; below 1 on {behind} of {len(ratios)} meshes"
         )
     print(f"{time.perf_counter() - begun:.0f} s")
-    if chosen.json:
-        chosen.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":

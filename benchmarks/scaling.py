@@ -3,7 +3,7 @@
     WARPFLAT_DATA=DIR python benchmarks/scaling.py [--sizes 1000 4000] [--kinds grid irregular garment] [--picture docs/scaling.png]
 
 Each mesh is flattened in a fresh process of one thread, whose kernels a mesh of a thousand vertices of its kind has loaded. Seconds are
-processor time of the fastest run (three below 100,000 vertices, else one), from the surface in memory to the result, datum, checks and
+processor time of the fastest run (three below 50,000 vertices, else one), from the surface in memory to the result, datum, checks and
 contact included. Bytes are the growth of the process at its peak. `grid` and `irregular` are the bodice of `meshes.py`; `garment` is the
 draped shirt front `garment_shirtfront.obj` of WARPFLAT_DATA, meshed anew. An exponent of 1 is a cost that grows as the vertices do.
 """
@@ -61,6 +61,8 @@ def draw(path: Path, rows: list[dict[str, Any]]) -> None:
             axis.loglog(
                 [row["vertices"] for row in of], each, marker="o", label=f"{kind}: total grows as V^{total:.2f}"
             )
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("{x:g}")
         axis.set_xlabel("vertices V")
         axis.set_ylabel(label)
         axis.grid(True, which="both", linewidth=0.3)
@@ -87,7 +89,7 @@ def main() -> None:
             found = [row for row in rows if (row["kind"], row["size"]) == (kind, size)]
             if not found:
                 mesh = _KINDS[kind](size)
-                repeats = 3 if size < 100_000 else 1
+                repeats = 3 if size < 50_000 else 1
                 memory, seconds = cost_of_flatten(mesh, "warpflat", warm=warm, repeats=repeats)
                 row = {"kind": kind, "size": size, "vertices": len(mesh.surface.vertices)}
                 found = [row | {"seconds": seconds, "bytes": memory}]

@@ -122,6 +122,7 @@ def main() -> None:
             "seconds": whole,
             "start": begins[0],
             "task": sum(found["taken"]) / len(found["taken"]),
+            "each": found["taken"],
             "between": sum(waits) / max(1, len(waits)),
             "an_hour": 3600 * given.tasks / steady,
             "cpu": after.children_user + after.children_system - before.children_user - before.children_system,

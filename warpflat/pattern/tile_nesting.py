@@ -241,7 +241,8 @@ def _lay(
             down, across = free.shape
             touched, cells = grid.touched(mask), mask.cells
             over = touched.shape[1], touched.shape[3]
-            new = np.pad(np.where(used, 0.0, 1.0), ((0, over[0]), (0, over[1])))
+            new = np.zeros(np.add(used.shape, over))
+            new[: used.shape[0], : used.shape[1]] = ~used
             windows = np.lib.stride_tricks.sliding_window_view(new, over)  # by the tile where a mask starts
             cost = np.tensordot(windows, touched, axes=([2, 3], [1, 3])).transpose(0, 2, 1, 3)
             flat = cost.reshape((tile_rows + 1) * per_row, -1)[:down, :across]
