@@ -24,12 +24,33 @@ def seam(ease: float = 0.0) -> Seam:
     )
 
 
+def square(name: str, role: str = "shell") -> Piece:
+    corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1], [0.0, 0.0]])
+    edges = [Edge(name=each, points=corners[k : k + 2]) for k, each in enumerate(("e", "right", "top", "left"))]
+    return Piece(name=name, edges=edges, role=role)
+
+
+PIECES = (square("a"), square("b"))
+
+
+def test_a_straight_strip_is_stretched():
+    pieces = (square("a", "strip"), square("b"))
+    curves = {(piece.name, edge.name): chords(edge.points) for piece in pieces for edge in piece.edges}
+    curves["b", "e"] = chords(np.array([[0.0, 0.0], [0.1102, 0.0]]))
+    made = equal_sides(pieces, [seam(0.1)], curves)
+    assert made["a", "e"].length == pytest.approx(0.1102 / 1.1, abs=1e-9)
+    assert made["a", "top"].length == pytest.approx(0.1102 / 1.1, abs=1e-9)
+    assert made["a", "left"].length == pytest.approx(0.1, abs=1e-12)
+    assert np.array_equal(made["a", "e"].nodes[-1], made["a", "right"].nodes[0])
+    assert made["b", "e"] is curves["b", "e"]
+
+
 @pytest.mark.parametrize(("ease", "apart"), [(0.0, 2e-4), (0.05, -2e-4)])
 def test_the_curve_that_bends_takes_up_the_difference(ease: float, apart: float):
     second = fit_curve(arc(0.06, 2.0, 25))
     wanted = (second.length + apart) / (1.0 + ease)
     curves = {("a", "e"): chords(np.array([[0.0, 0.0], [wanted, 0.0]])), ("b", "e"): second}
-    made = equal_sides([seam(ease)], curves)
+    made = equal_sides(PIECES, [seam(ease)], curves)
     assert made["b", "e"].length == pytest.approx(second.length + apart, abs=2e-5)
     # It keeps near, and its ends and their directions stay.
     before, after = (curve.sample() for curve in (second, made["b", "e"]))
@@ -46,7 +67,7 @@ def test_the_curve_that_bends_takes_up_the_difference(ease: float, apart: float)
 def test_what_would_have_to_move_far_stays():
     second = fit_curve(arc(0.5, 0.2, 25))
     curves = {("a", "e"): chords(np.array([[0.0, 0.0], [second.length + 4e-4, 0.0]])), ("b", "e"): second}
-    assert equal_sides([seam()], curves)["b", "e"] is second
+    assert equal_sides(PIECES, [seam()], curves)["b", "e"] is second
 
 
 def test_coarse_cap_and_armhole_are_equally_long():

@@ -41,6 +41,8 @@ _TOOTH = 0.009
 _BAR = np.array([[-0.009, 0.0], [0.009, 0.0]])
 # What a slanted hem loses is cut off so far beyond the silhouette and below the edge [m].
 _BESIDE = 0.04
+# Half of what shows of a godet's hem, as a share of that.
+_FOLDED = 0.15
 _CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos, np.sin)])
 
 
@@ -159,7 +161,7 @@ def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
 
 
 def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
-    """Yield zips, as teeth and a bar at the lower end, the upper end of slits, vents and godets, as a bar, buttons, and edges of wraps."""
+    """Yield zips, as teeth and a bar at the lower end, the upper end of slits and vents, as a bar, buttons, edges of godets and wraps."""
     assert garment.form is not None
     assert garment.mannequin is not None
     bust = garment.mannequin.layout.lines["bust"]
@@ -179,6 +181,11 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
                 # The edge of the upper half: from the neckline to the waist, and on beside the line.
                 to_waist = arc / arc[-1] if "neck" in garment.form.pieces[part.piece].edges else np.ones(len(arc))
                 lines.append(seen + np.outer(opening.width * np.minimum(to_waist, 1.0), [sign, 0.0]))
+                continue
+            if opening.kind == "godet":
+                # Its edges, from the tip down to the hem, where it hangs in folds.
+                tip, half = [np.interp(end, arc, seen[:, axis]) for axis in (0, 1)], [_FOLDED * opening.width, 0.0]
+                lines.append(np.array([seen[0] - half, tip, seen[0] + half]))
                 continue
             # Where something lies, and its shape about there.
             shapes = [(end, _BAR)]

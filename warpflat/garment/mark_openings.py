@@ -86,7 +86,7 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
                     raise InputError(
                         f"openings[{number}]: a {opening.kind} begins at the lower end of a seam between two edges"
                     )
-                for side in sides:
+                for side in (side for side in sides if not side.mirrored):
                     names = {edge.name for edge in pattern.piece(side.piece, pattern.sample).edges}
                     if names & {f"{side.edge} {kind}" for kind in ("slit", "vent", "godet")}:
                         raise InputError(f"openings[{number}]: the lower end of {seam.name!r} is open already")

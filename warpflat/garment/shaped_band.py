@@ -196,29 +196,29 @@ def slant_rises(
                 for point in points[[0, -1]]
                 if line.distance(shapely.Point(point)) < _ON_EDGE
             ]
-            for key, at in crossed:
+            for key, place in crossed:
                 key = other_side(key) if side.mirrored else key
                 met.add(key)
-                here = start + (edge.length - at if side.reversed else at)
-                wide = next((by_line[name] for name in by_line if f"{key} ".startswith(f"{name} ")), None)
-                if wide is not None:
-                    knots[round(here, 3)] = wide
+                here = start + (edge.length - place if side.reversed else place)
+                asked = [rise for name, rise in by_line.items() if f"{key} ".startswith(f"{name} ")]
+                if asked:
+                    knots[round(here, 3)] = asked[0]
             starts.append(start)
             start += edge.length
         if not knots:
             continue
         if chain.closed:
-            knots = {at + turn * start: wide for turn in (-1, 0, 1) for at, wide in knots.items()}
-        lines = np.array(sorted(knots))
-        lines = lines[np.diff(lines, prepend=-np.inf) > _ON_EDGE]
+            knots = {place + turn * start: rise for turn in (-1, 0, 1) for place, rise in knots.items()}
+        at = np.array(sorted(knots))
+        at = at[np.diff(at, prepend=-np.inf) > _ON_EDGE]
+        values = np.array([knots[place] for place in at.tolist()])
         for side, begin in zip(chain.sides, starts, strict=True):
             points = pattern.piece(side.piece, size).edge(side.edge).points
             arc = arc_lengths(points)
             arc = np.unique(np.concatenate([arc, np.linspace(0.0, arc[-1], _SLANTED)]))
-            along = np.clip(begin + (arc[-1] - arc if side.reversed else arc), lines[0], lines[-1])
-            values = np.array([knots[each] for each in lines.tolist()])
-            widths = PchipInterpolator(lines, values)(along) if len(lines) > 1 else np.full(len(arc), values[0])
-            if np.abs(found.setdefault((side.piece, side.edge), (arc, widths))[1] - widths).max() > _ON_EDGE:
+            along = np.clip(begin + (arc[-1] - arc if side.reversed else arc), at[0], at[-1])
+            wide = PchipInterpolator(at, values)(along) if len(at) > 1 else np.full(len(arc), values[0])
+            if np.abs(found.setdefault((side.piece, side.edge), (arc, wide))[1] - wide).max() > _ON_EDGE:
                 raise InputError(
                     f"{side.piece} is cut on the fold or twice, and cannot be shorter on one side; with half = false it is cut whole"
                 )

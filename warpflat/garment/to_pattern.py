@@ -204,9 +204,10 @@ def pattern_of_garment(
     rises = hem_rises(pattern, sample.finishing)
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
     pattern = add_pockets(pattern, sample.pockets)
-    # Godets of one size are equal, unless a slanted hem cuts them.
-    pattern, equal = draw_equal_pieces_once(pattern, called="godet")
-    notes += equal
+    if not rises:
+        # Godets of one size are equal, unless a slanted hem cuts them.
+        pattern, equal = draw_equal_pieces_once(pattern, called="godet")
+        notes += equal
     return replace(pattern, worn=describe_worn(garments, pattern.sample, rises)), notes
 
 

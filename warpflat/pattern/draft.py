@@ -279,12 +279,15 @@ def _fitted_edges(
         frame = _frame(piece)
         lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
-    curves, corners = equal_sides(seams, {key: curve for key, (curve, _) in fitted.items()}), list[CornerReport]()
+    curves, corners = (
+        equal_sides(pieces, seams, {key: curve for key, (curve, _) in fitted.items()}),
+        list[CornerReport](),
+    )
     trued: Mapping[tuple[str, str], Curve] = curves
     if true:
         # Turned ends change lengths a little, too.
         trued, corners = true_corners(pieces, seams, curves)
-        trued = equal_sides(seams, trued)
+        trued = equal_sides(pieces, seams, trued)
     edges = {}
     for piece in pieces:
         keys = [(piece.name, edge.name) for edge in piece.edges]

@@ -38,6 +38,8 @@ WAVES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 EQUAL = 1e-4
 #: Curves keep near their points where the sides of their seams then differ by at most this share of what is allowed.
 SAFE = 0.8
+#: What is drawn for the length of an edge, by its role.
+STRIPS = ("strip", "waistband", "cuff")
 #: Sides of a seam that differ by less [m] stay as they are.
 ALIKE = 5e-6
 #: A curve moves by no more than this [m] to be as long as what it is sewn to: a tenth of what a turned corner may move.
@@ -121,18 +123,37 @@ def fit_edges(
     return fitted
 
 
-def equal_sides(seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]) -> dict[EdgeKey, Curve]:
+def equal_sides(
+    pieces: Sequence[Piece], seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]
+) -> dict[EdgeKey, Curve]:
     """Return the curves with the sides of each seam as long as they should be, to some micrometres.
 
     Curves that keep near their points, and turned corners, leave a seam's sides some tenths of a millimetre apart. The curve of the
     second side that bends most takes up the difference: it moves along one direction by a smooth bump, at most by `SHIFT`. Its ends
-    stay, with their directions. What would have to move farther stays as it is.
+    stay, with their directions. What would have to move farther stays as it is. A straight strip, such as a band or a cuff, is stretched.
     """
-    found = dict(curves)
+    found, roles = dict(curves), {piece.name: piece.role for piece in pieces}
     for seam in seams:
         first, second = ([found[side.piece, side.edge] for side in row] for row in seam.sides)
         one, other = (sum(polyline_length(curve.sample()) for curve in curves) for curves in (first, second))
         more = one * (1.0 + seam.ease) - other
+        if abs(more) < ALIKE:
+            continue
+        strip = next(
+            ((row[0], grow) for row, grow in zip(seam.sides, (-more / (1.0 + seam.ease), more), strict=True)
+             if len(row) == 1 and roles[row[0].piece] in STRIPS and found[row[0].piece, row[0].edge].straight.all()),
+            None,
+        )  # fmt: skip
+        if strip is not None:
+            side, grow = strip
+            ends = found[side.piece, side.edge].nodes[[0, -1]]
+            length = float(np.linalg.norm(ends[1] - ends[0]))
+            along = (ends[1] - ends[0]) / length
+            if abs(grow) <= 2.0 * SHIFT:
+                stretch = np.eye(2) + grow / length * np.outer(along, along)
+                for key in [key for key in found if key[0] == side.piece]:
+                    found[key] = found[key].transformed(np.column_stack([stretch, np.zeros(2)]))
+            continue
         bends = {}
         for side in seam.sides[1]:
             curve = found[side.piece, side.edge]
@@ -144,7 +165,7 @@ def equal_sides(seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]) -> dict[
             bends[side.piece, side.edge] = bend
         key = max(bends, key=lambda each: float(np.linalg.norm(bends[each])))
         size = float(np.linalg.norm(bends[key]))
-        if abs(more) < ALIKE or abs(more) > SHIFT * size or found[key].straight.any():
+        if abs(more) > SHIFT * size or found[key].straight.any():
             continue
         way, bezier = more / size**2 * bends[key], found[key].bezier.copy()
         lengths = [
