@@ -244,26 +244,8 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     if not surface.is_quad.all() or datum[0] == datum[-1]:
         return None
     grid = rows_and_columns(surface)
-    if grid is not None:
-        beside = _beside(surface, grid, datum)
-        if beside is not None:
-            return beside
-    station = arc_lengths(surface.vertices[datum])
-    positions = np.full((len(surface.vertices), 2), np.nan)
-    positions[datum] = np.column_stack([np.zeros(len(datum)), station])
-    lines = _grid_lines(surface, np.stack([datum, datum[::-1]]))
-    stations = np.stack([station, station[::-1]])
-    p = points_at(surface.vertices, lines)
-    on = lines[1:] >= 0
-    x = np.cumsum(np.where(on, norm(p[:, 1:] - p[:, :-1]), 0.0), axis=0) * np.array([[-1.0], [1.0]])
-    positions[lines[1:][on]] = np.column_stack([x[on], np.broadcast_to(stations, x.shape)[on]])
-    whole = len(datum) + np.count_nonzero(on) == len(positions)
-    return positions if whole and not np.isnan(positions).any() else None
-
-
-def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | None:
-    """Lay out the profiles of a rectangular grid whose datum is one of its columns or rows; None for another mesh."""
-    for lines, mirrored in ((grid, False), (grid.T, True)):
+    # Of a rectangular grid, where the datum is one of its columns or rows.
+    for lines, mirrored in () if grid is None else ((grid, False), (grid.T, True)):
         column = np.flatnonzero(lines[0] == datum[0])
         upwards = len(column) == 1
         if not upwards:
@@ -280,7 +262,17 @@ def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | N
         given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
         launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
         return positions
-    return None
+    station = arc_lengths(surface.vertices[datum])
+    positions = np.full((len(surface.vertices), 2), np.nan)
+    positions[datum] = np.column_stack([np.zeros(len(datum)), station])
+    lines = _grid_lines(surface, np.stack([datum, datum[::-1]]))
+    stations = np.stack([station, station[::-1]])
+    p = points_at(surface.vertices, lines)
+    on = lines[1:] >= 0
+    across = np.cumsum(np.where(on, norm(p[:, 1:] - p[:, :-1]), 0.0), axis=0) * np.array([[-1.0], [1.0]])
+    positions[lines[1:][on]] = np.column_stack([across[on], np.broadcast_to(stations, across.shape)[on]])
+    whole = len(datum) + np.count_nonzero(on) == len(positions)
+    return positions if whole and not np.isnan(positions).any() else None
 
 
 def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
