@@ -149,7 +149,8 @@ class Stage:
                 font_screen_scale=0.9,
             )  # fmt: skip
         low, high = self._boxes[1]
-        x, y = low[0], low[1] - 0.075
+        # Far enough below the names on a narrow page, where letters are large beside the pattern.
+        x, y = low[0], low[1] - 0.12
         bar = np.array([[(x, y), (x + 0.1, y)], *([(at, y - 0.008), (at, y + 0.008)] for at in (x, x + 0.05, x + 0.1))])
         self._segments("/pattern/bar", np.concatenate([bar, np.zeros((4, 2, 1))], axis=2), _THIN, 2.0)
         node = "/pattern/name_bar"
@@ -278,7 +279,7 @@ class Stage:
         """Width and height of form and pattern together, however the form is turned [m]."""
         form, pattern = np.ptp(self._boxes, axis=1)
         across = float(np.hypot(form[0], form[2]))
-        return across + _BETWEEN + float(pattern[0]), max(float(form[1]), float(pattern[1]) + 0.1)
+        return across + _BETWEEN + float(pattern[0]), max(float(form[1]), float(pattern[1]) + 0.14)
 
     def _place(self) -> None:
         """Set form and pattern beside each other, about the origin."""
