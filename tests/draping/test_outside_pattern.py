@@ -267,6 +267,35 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
 
 
+def test_a_side_that_a_corner_parts_leaves_a_symmetric_start():
+    """A flared skirt whose right side is sewn in two seams, the left one in one: both are the same mirrored."""
+    low, high = (0.1, 0.0), (0.7, 0.0)
+    front = polygon("front", [low, high, (0.62, 0.2), (0.59, 0.5), (0.21, 0.5), (0.18, 0.2)])
+    ring = np.array([low, high, (0.62, 0.2), (0.59, 0.5), (0.21, 0.5), (0.18, 0.2), low])
+    back = Piece(
+        name="back",
+        edges=[
+            *(Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(4)), Edge(name="e5", points=ring[4:7]),
+        ],
+    )  # fmt: skip
+    one = Piece(
+        name="front",
+        edges=[front.edges[0], Edge(name="e2", points=ring[1:4]), *front.edges[3:]],
+    )
+    seams = [
+        seam("side left", "front.e2", "back.e5"), seam("lower right", "back.e2", "front.e6"),
+        seam("upper right", "back.e3", "front.e5"),
+    ]  # fmt: skip
+    pieces = {"front": one, "back": back}
+    meshes, welds = mesh_pieces(pieces, seams, 0.02)
+    placed = wrap_pieces(meshes, welds, body_of_size(30.0))
+    for name, points in placed.items():
+        flat = meshes[name].points
+        order = np.lexsort((flat[:, 0], flat[:, 1]))
+        assert abs(points[order, 0].mean()) < 2e-3, name
+        assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=2e-3), name
+
+
 @pytest.mark.parametrize("lower", [0.0, 0.45])
 def test_a_designed_surface_beside_the_body_is_no_start(lower: float):
     """As that of a garment in the axes of its own file, whose shoulders lie at this body's knees."""
