@@ -41,6 +41,8 @@ _FAR = 0.25
 _ABOVE = 0.01
 # A piece that hangs beside the body starts this far from it at least [m].
 _BESIDE = 0.02
+# Pieces that hang around another place than the body, sideways or forwards by so much [m], are moved to it.
+_ASIDE = np.array([0.02, np.inf, 0.1])
 # The highest of a sleeve, whose middle is laid above the arm, is what reaches up to this share of its height.
 _CAP = 0.95
 # Rounds at most, and the mean displacement in one of them after which it is still enough for a start [m].
@@ -111,6 +113,12 @@ def wrap_pieces(
     placed = {name: row for side in ("left", "right") for name, row in _on_arm(meshes, welds, arms, side, body).items()}
     joins, width = _whole_sides(_joins(welds, trunk), {name: meshes[name].points for name in trunk}), 0.0
     is_hung = hung.keys() >= set(trunk)
+    if is_hung:
+        # A file may stand anywhere: its pieces go around the body's middle.
+        ends = np.concatenate([hung[name] for name in trunk])
+        off = 0.5 * (waist.min(axis=0) + waist.max(axis=0) - ends.min(axis=0) - ends.max(axis=0))
+        aside = np.where(np.abs(off) > _ASIDE, off, 0.0)
+        hung = {name: points + aside for name, points in hung.items()}
     # A suit of several garments hangs each by itself; what is wrapped hangs together.
     for part in _parts(joins, trunk) if is_hung else [trunk]:
         inner = [join for join in joins if set(join.pieces) <= set(part)]
