@@ -267,6 +267,56 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
 
 
+def test_a_side_that_a_corner_parts_leaves_a_symmetric_start():
+    """A flared skirt whose right side is sewn in two seams, the left one in one: both are the same mirrored."""
+    low, high = (0.1, 0.0), (0.7, 0.0)
+    front = polygon("front", [low, high, (0.62, 0.2), (0.59, 0.5), (0.21, 0.5), (0.18, 0.2)])
+    ring = np.array([low, high, (0.62, 0.2), (0.59, 0.5), (0.21, 0.5), (0.18, 0.2), low])
+    back = Piece(
+        name="back",
+        edges=[
+            *(Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(4)), Edge(name="e5", points=ring[4:7]),
+        ],
+    )  # fmt: skip
+    one = Piece(
+        name="front",
+        edges=[front.edges[0], Edge(name="e2", points=ring[1:4]), *front.edges[3:]],
+    )
+    seams = [
+        seam("side left", "front.e2", "back.e5"), seam("lower right", "back.e2", "front.e6"),
+        seam("upper right", "back.e3", "front.e5"),
+    ]  # fmt: skip
+    pieces = {"front": one, "back": back}
+    meshes, welds = mesh_pieces(pieces, seams, 0.02)
+    placed = wrap_pieces(meshes, welds, body_of_size(30.0))
+    for name, points in placed.items():
+        flat = meshes[name].points
+        order = np.lexsort((flat[:, 0], flat[:, 1]))
+        assert abs(points[order, 0].mean()) < 2e-3, name
+        assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=2e-3), name
+
+
+def test_pieces_that_hang_elsewhere_in_their_file_go_around_the_body():
+    """A garment that stands 6 cm to the side and 30 cm behind: each side of it starts as far from the body's middle."""
+    pieces, seams, _ = whole_pieces(tube(0.475, 0.25).pieces[""], tube(0.475, 0.25).seams)
+    meshes, welds = mesh_pieces(pieces, seams, 0.03)
+    body = body_of_size(30.0)
+    starts = []
+    for aside in ([0.0, 0.0, 0.0], [0.06, 0.3, -0.3]):
+        hung = {
+            name: np.column_stack(
+                [sign * (mesh.points[:, 0] - 0.2375), mesh.points[:, 1] + 0.9, np.full(len(mesh.points), 0.2 * sign)]
+            )
+            + aside
+            for (name, mesh), sign in zip(meshes.items(), (1.0, -1.0), strict=True)
+        }
+        starts.append(wrap_pieces(meshes, welds, body, hung=hung, top="waist"))
+    for name, points in starts[1].items():
+        assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=2e-3)
+        np.testing.assert_allclose(points[:, :2], starts[0][name][:, :2], atol=2e-3)
+    assert starts[1]["front"][:, 2].mean() > 0.1 > -0.1 > starts[1]["back"][:, 2].mean()
+
+
 @pytest.mark.parametrize("lower", [0.0, 0.45])
 def test_a_designed_surface_beside_the_body_is_no_start(lower: float):
     """As that of a garment in the axes of its own file, whose shoulders lie at this body's knees."""

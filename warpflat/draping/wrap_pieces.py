@@ -41,6 +41,8 @@ _FAR = 0.25
 _ABOVE = 0.01
 # A piece that hangs beside the body starts this far from it at least [m].
 _BESIDE = 0.02
+# Pieces that hang around another place than the body, sideways or forwards by so much [m], are moved to it.
+_ASIDE = np.array([0.02, np.inf, 0.1])
 # The highest of a sleeve, whose middle is laid above the arm, is what reaches up to this share of its height.
 _CAP = 0.95
 # Rounds at most, and the mean displacement in one of them after which it is still enough for a start [m].
@@ -109,8 +111,14 @@ def wrap_pieces(
     below = heights[at_level] if isinstance(at_level, str) else float(at_level)
     arms = {name: side.removesuffix(" arm") for name, side in at.items() if side.endswith(" arm")}
     placed = {name: row for side in ("left", "right") for name, row in _on_arm(meshes, welds, arms, side, body).items()}
-    joins, width = _joins(welds, trunk), 0.0
+    joins, width = _whole_sides(_joins(welds, trunk), {name: meshes[name].points for name in trunk}), 0.0
     is_hung = hung.keys() >= set(trunk)
+    if is_hung:
+        # A file may stand anywhere: its pieces go around the body's middle.
+        ends = np.concatenate([hung[name] for name in trunk])
+        off = 0.5 * (waist.min(axis=0) + waist.max(axis=0) - ends.min(axis=0) - ends.max(axis=0))
+        aside = np.where(np.abs(off) > _ASIDE, off, 0.0)
+        hung = {name: points + aside for name, points in hung.items()}
     # A suit of several garments hangs each by itself; what is wrapped hangs together.
     for part in _parts(joins, trunk) if is_hung else [trunk]:
         inner = [join for join in joins if set(join.pieces) <= set(part)]
@@ -194,6 +202,30 @@ def _joins(welds: Sequence[Sequence[Weld]], names: Sequence[str]) -> list[_Join]
                 first, second = np.array(rows, dtype=np.int32).T
                 joins.append(_Join(both, (first, second)))
     return joins
+
+
+def _whole_sides(joins: Sequence[_Join], points: Mapping[str, FloatArray]) -> list[_Join]:
+    """Join upright seams of the same two pieces on the same side of both, as those that a corner parts.
+
+    Pieces lie by the mean of a whole side. By the longest part of one side, and by the other side as a whole, a symmetric garment
+    would lie askew.
+    """
+    middle = {name: 0.5 * (row[:, 0].min() + row[:, 0].max()) for name, row in points.items()}
+    sides: dict[object, _Join] = {}
+    for number, join in enumerate(joins):
+        rows = join.points(points)
+        key: object = number
+        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in rows) and join.pieces[0] != join.pieces[1]:
+            key = (
+                join.pieces,
+                *(bool(row[:, 0].mean() > middle[name]) for name, row in zip(join.pieces, rows, strict=True)),
+            )
+        if key in sides:
+            before = sides[key].vertices
+            both = [np.concatenate(pair) for pair in zip(before, join.vertices, strict=True)]
+            join = _Join(join.pieces, (both[0], both[1]))
+        sides[key] = join
+    return list(sides.values())
 
 
 def _on_arm(

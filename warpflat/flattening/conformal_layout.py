@@ -10,11 +10,12 @@ from warpflat.core.sparse import factor_symmetric
 from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.laplacian import stiffness_matrix
-from warpflat.surface.mesh import Surface
+from warpflat.surface.mesh import Surface, once_per_surface
 
 __all__ = ["conformal_layout"]
 
 
+@once_per_surface
 def conformal_layout(surface: Surface) -> FloatArray:
     """Lay out a piece so that its Dirichlet energy exceeds its area by as little as can be (Levy et al. 2002; Mullen et al. 2008).
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.mannequin.body_landmarks import near_level, value_at
+from warpflat.mannequin.body_landmarks import model_places, near_level, value_at
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body
 from warpflat.mannequin.fit_body import Mesh, fit_body
 from warpflat.mannequin.fit_inside import fit_inside
@@ -25,6 +25,9 @@ __all__ = ["CommonBody", "common_body_inside", "common_body_of_mannequin", "comm
 
 # Levels that a mannequin and the model both have.
 _LEVELS = ("ankle", "knee", "hip", "waist", "underbust", "bust")
+# How far out an armhole's top and lowest place lie beside the model's, and how high the latter [m], of EU 38; and how far below the trunk
+# follows [m]; and how often they are moved.
+_BESIDE_ARM, _BELOW_ARM, _MOVES = (0.043, -0.010, -0.0045), 0.12, 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,10 +100,41 @@ def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
     # Without head and feet the model would slide up or down.
     levels = mannequin.levels()
     fit = fit_body(mannequin.vertices, triangles, {name: levels[name].height for name in _LEVELS})
-    start = finer_body()[0] @ BodyModel.load().vertices(fit.person)
-    vertices, _ = lay_on_scan(start, Mesh(mannequin.vertices, triangles), np.zeros(len(triangles), dtype=bool))
+    mesh, whole = Mesh(mannequin.vertices, triangles), np.zeros(len(triangles), dtype=bool)
+    vertices, _ = lay_on_scan(finer_body()[0] @ BodyModel.load().vertices(fit.person), mesh, whole)
+    # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them.
+    for _ in range(_MOVES):
+        vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh, whole)
     far = float(fit.distance[np.isfinite(fit.distance)].mean())
     return CommonBody(name=name, person=fit.person, vertices=vertices, far=far)
+
+
+def _towards_armholes(vertices: FloatArray, mannequin: Mannequin) -> FloatArray:
+    """Return the moves, #V by 3 [m], that bring the ends of shoulders sideways and underarms to where a mannequin has its armholes.
+
+    An armhole lies on the trunk, and the model's arm begins beside it, farther in at the top: as far as on a woman of EU 38. Arms go along
+    as they are; the trunk follows the more, the farther out it is, down to a hand's length below the underarm.
+    """
+    places, triangles = model_places(), finer_body()[1]
+    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    move = np.zeros_like(vertices)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        arm = places.strips[f"arm {side}"]
+        across = ends[arm[ends[:, 0]] != arm[ends[:, 1]]]
+        hole, begins = mannequin.line(f"armhole {side}"), vertices[across].mean(axis=1)
+        (top, low), (from_top, from_low) = (
+            (row[row[:, 1].argmax()], row[row[:, 1].argmin()]) for row in (hole, begins)
+        )
+        at_top = np.array([top[0] - from_top[0] - sign * _BESIDE_ARM[0], 0.0, 0.0])
+        at_low = np.array([low[0] - from_low[0] - sign * _BESIDE_ARM[1], low[1] - from_low[1] - _BESIDE_ARM[2], 0.0])
+        height = (vertices[:, 1] - from_low[1]) / max(float(from_top[1] - from_low[1]), 1e-9)
+        out = np.clip(sign * vertices[:, 0] / abs(from_top[0]), 0.0, 1.0) ** 2
+        follows = out * np.clip(1.0 - (from_low[1] - vertices[:, 1]) / _BELOW_ARM, 0.0, 1.0)
+        follows[places.strips["leg left"] | places.strips["leg right"] | places.strips["head"]] = 0.0
+        follows[arm] = 1.0
+        follows[sign * vertices[:, 0] <= 0.0] = 0.0
+        move += follows[:, None] * (at_low + np.clip(height, 0.0, 1.0)[:, None] * (at_top - at_low))
+    return move
 
 
 def common_body_inside(vertices: FloatArray, triangles: NDArray[np.int64], *, name: str) -> CommonBody:
