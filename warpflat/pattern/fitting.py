@@ -128,9 +128,10 @@ def equal_sides(
 ) -> dict[EdgeKey, Curve]:
     """Return the curves with the sides of each seam as long as they should be, to some micrometres.
 
-    Curves that keep near their points, and turned corners, leave a seam's sides some tenths of a millimetre apart. The curve of the
-    second side that bends most takes up the difference: it moves along one direction by a smooth bump, at most by `SHIFT`. Its ends
-    stay, with their directions. What would have to move farther stays as it is. A straight strip, such as a band or a cuff, is stretched.
+    Curves that keep near their points, and turned corners, leave a seam's sides some tenths of a millimetre apart. The curves of
+    the second side take up the difference, those that bend most of it: each moves along one direction by a smooth bump, at most by
+    `SHIFT`. Their ends stay, with their directions. What would have to move farther stays as it is. A straight strip, such as a
+    band or a cuff, is stretched.
     """
     found, roles = dict(curves), {piece.name: piece.role for piece in pieces}
     for seam in seams:
@@ -154,34 +155,34 @@ def equal_sides(
                 for key in [key for key in found if key[0] == side.piece]:
                     found[key] = found[key].transformed(np.column_stack([stretch, np.zeros(2)]))
             continue
-        bends = {}
-        for side in seam.sides[1]:
-            curve = found[side.piece, side.edge]
-            line = curve.sample()
-            # The length grows by the bump's work on the turning tangent.
-            tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
-            shares = arc_lengths(line)[1:-1] / polyline_length(line)
-            bend = -(np.sin(np.pi * shares) ** 2) @ np.diff(tangents, axis=0) if len(line) > 2 else np.zeros(2)
-            bends[side.piece, side.edge] = bend
-        key = max(bends, key=lambda each: float(np.linalg.norm(bends[each])))
-        size = float(np.linalg.norm(bends[key]))
-        if abs(more) > SHIFT * size or found[key].straight.any():
+        bends, total = dict[EdgeKey, FloatArray](), 0.0
+        for key in ((side.piece, side.edge) for side in seam.sides[1]):
+            line = found[key].sample()
+            if not found[key].straight.any() and len(line) > 2:
+                # The length grows by the bump's work on the turning tangent.
+                tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
+                shares = arc_lengths(line)[1:-1] / polyline_length(line)
+                bends[key] = np.asarray(-(np.sin(np.pi * shares) ** 2) @ np.diff(tangents, axis=0))
+                # Both copies of an edge that is sewn twice move.
+                total += float(bends[key] @ bends[key])
+        if not bends or abs(more) * max(float(np.linalg.norm(bend)) for bend in bends.values()) > SHIFT * total:
             continue
-        way, bezier = more / size**2 * bends[key], found[key].bezier.copy()
-        lengths = [
-            polyline_length(Curve(bezier=each[None], straight=np.zeros(1, dtype=bool)).sample()) for each in bezier
-        ]
-        joints = np.concatenate([[0.0], np.cumsum(lengths)]) / sum(lengths)
-        bump, slope = np.sin(np.pi * joints) ** 2, np.pi * np.sin(2.0 * np.pi * joints) / sum(lengths)
-        handles = np.linalg.norm(bezier[:, [1, 2]] - bezier[:, [0, 3]], axis=2)
-        # Tangents at a joint turn alike on both of its sides.
-        bezier[:, 0] += bump[:-1, None] * way
-        bezier[:, 1] += (bump[:-1] + handles[:, 0] * slope[:-1])[:, None] * way
-        bezier[:, 2] += (bump[1:] - handles[:, 1] * slope[1:])[:, None] * way
-        bezier[:, 3] += bump[1:, None] * way
-        # The ends are corners, shared bit for bit.
-        bezier[0, 0], bezier[-1, 3] = found[key].bezier[0, 0], found[key].bezier[-1, 3]
-        found[key] = replace(found[key], bezier=bezier)
+        for key, bend in bends.items():
+            way, bezier = more / total * bend, found[key].bezier.copy()
+            lengths = [
+                polyline_length(Curve(bezier=each[None], straight=np.zeros(1, dtype=bool)).sample()) for each in bezier
+            ]
+            joints = np.concatenate([[0.0], np.cumsum(lengths)]) / sum(lengths)
+            bump, slope = np.sin(np.pi * joints) ** 2, np.pi * np.sin(2.0 * np.pi * joints) / sum(lengths)
+            handles = np.linalg.norm(bezier[:, [1, 2]] - bezier[:, [0, 3]], axis=2)
+            # Tangents at a joint turn alike on both of its sides.
+            bezier[:, 0] += bump[:-1, None] * way
+            bezier[:, 1] += (bump[:-1] + handles[:, 0] * slope[:-1])[:, None] * way
+            bezier[:, 2] += (bump[1:] - handles[:, 1] * slope[1:])[:, None] * way
+            bezier[:, 3] += bump[1:, None] * way
+            # The ends are corners, shared bit for bit.
+            bezier[0, 0], bezier[-1, 3] = found[key].bezier[0, 0], found[key].bezier[-1, 3]
+            found[key] = replace(found[key], bezier=bezier)
     return found
 
 
