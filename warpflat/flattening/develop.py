@@ -244,24 +244,25 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     if not surface.is_quad.all() or datum[0] == datum[-1]:
         return None
     grid = rows_and_columns(surface)
-    # Of a rectangular grid, where the datum is one of its columns or rows.
-    for lines, mirrored in () if grid is None else ((grid, False), (grid.T, True)):
-        column = np.flatnonzero(lines[0] == datum[0])
-        upwards = len(column) == 1
-        if not upwards:
-            column = np.flatnonzero(lines[-1] == datum[0])
-        ordered = lines if upwards else lines[::-1]
-        if len(column) == 0 or not np.array_equal(ordered[:, column[0]], datum):
-            continue
-        at = int(column[0])
-        # Whether the faces go round anticlockwise where columns lie to the right of one another and rows above one another.
-        y, x = np.unravel_index([int(np.argmax(grid == vertex)) for vertex in surface.faces[0]], grid.shape)
-        turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
-        side = 1.0 if (turns == upwards) != mirrored else -1.0
-        positions = np.empty((len(surface.vertices), 2))
-        given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
-        launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
-        return positions
+    if grid is not None:
+        # Of a rectangular grid, where the datum is one of its columns or rows.
+        for lines, mirrored in ((grid, False), (grid.T, True)):
+            column = np.flatnonzero(lines[0] == datum[0])
+            upwards = len(column) == 1
+            if not upwards:
+                column = np.flatnonzero(lines[-1] == datum[0])
+            ordered = lines if upwards else lines[::-1]
+            if len(column) == 0 or not np.array_equal(ordered[:, column[0]], datum):
+                continue
+            at = int(column[0])
+            # Whether the faces go round anticlockwise where columns lie to the right of one another and rows above one another.
+            y, x = np.unravel_index([int(np.argmax(grid == vertex)) for vertex in surface.faces[0]], grid.shape)
+            turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
+            side = 1.0 if (turns == upwards) != mirrored else -1.0
+            positions = np.empty((len(surface.vertices), 2))
+            given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
+            launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
+            return positions
     station = arc_lengths(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])
