@@ -208,7 +208,7 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         what=describe(anatomy),
         up=axis_name(anatomy.up),
         front=axis_name(anatomy.front),
-        notes=(*notes, *turned, *_alike(pieces), *anatomy.notes),
+        notes=(*notes, *turned, *(() if anatomy.kind in TAILORED else _alike(pieces)), *anatomy.notes),
     )
 
 
