@@ -45,6 +45,9 @@ _ALONG = 0.2
 #: What a band is called, by the border along which it runs.
 BANDS = {"waist": "waistband", "neck": "neck_band", "sleeve": "cuff", "leg": "cuff"}
 
+# Pieces are alike if sizes, outlines and extents agree within this share.
+_ALIKE = 0.015
+
 # A piece whose parts in front and behind differ by less than this share is of neither.
 _AROUND = 0.35
 
@@ -205,7 +208,7 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         what=describe(anatomy),
         up=axis_name(anatomy.up),
         front=axis_name(anatomy.front),
-        notes=(*notes, *turned, *anatomy.notes),
+        notes=(*notes, *turned, *(() if anatomy.kind in TAILORED else _alike(pieces)), *anatomy.notes),
     )
 
 
@@ -381,6 +384,35 @@ def _band(cloth: Cloth, mesh: PieceMesh) -> str:
 
     most = max(BANDS, key=along)
     return BANDS[most] if along(most) > _ALONG * around else ""
+
+
+def _alike(pieces: Sequence[Surface]) -> list[str]:
+    """Return a note on pieces that are much the same, or mirror images: a maker draws them once."""
+    measures = []
+    for piece in pieces:
+        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+        around = [piece.vertices[np.append(loop, loop[0])] for loop in border_loops(piece.faces)]
+        length = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in around)
+        axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
+        measures.append(
+            [
+                np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()),
+                length,
+                *np.ptp(piece.vertices @ axes, axis=0),
+            ]
+        )
+    left = list(range(len(pieces)))
+    notes = []
+    while left:
+        first, *others = left
+        size, around, *extents = measures[first]
+        off = _ALIKE * np.array([size, around, *[max(extents)] * 3])
+        same = [first, *(k for k in others if (np.abs(np.subtract(measures[k], measures[first])) < off).all())]
+        left = [k for k in left if k not in same]
+        names = [pieces[k].name for k in same]
+        if len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
+            notes.append(f"{', '.join(names)} are alike: cut {len(names)}, or some of them mirrored")
+    return notes
 
 
 def _edge_lines(
