@@ -124,7 +124,7 @@ def test_a_row_or_column_of_a_grid_is_seen_at_once(line: str, reverse: bool, tur
     assert positions is not None
     assert np.linalg.norm(positions[datum[0]]) == 0.0
     assert mirrored(surface, positions) == 0
-    monkeypatch.setattr("warpflat.flattening.develop._beside", lambda *_: None)
+    monkeypatch.setattr("warpflat.flattening.develop.rows_and_columns", lambda *_: None)
     np.testing.assert_allclose(positions, profile_layout(surface, datum), atol=1e-15)
 
 

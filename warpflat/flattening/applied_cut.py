@@ -60,47 +60,35 @@ def measure_cut(surface: Surface, positions: FloatArray, cut: AppliedCut) -> dic
         positions: #P by 2, the pattern [m].
         cut: a cut of that surface.
     """
-    loops = border_loops(surface.faces)
-    return {
-        "name": cut.name,
-        "length_m": cut.length,
-        "seams": [_measure_seam(surface, positions, seam, cut.tip_back, loops) for seam in cut.seams],
-    }
-
-
-def _measure_seam(
-    surface: Surface,
-    positions: FloatArray,
-    seam: Crack,
-    tip_back: float,
-    loops: list[IntArray],
-) -> dict[str, Any]:
-    kind = seam_kind(seam)
-    found: dict[str, Any] = {"kind": kind}
-    if kind == "dart":
-        dart = dart_measure(positions, seam.left, seam.right)
-        found |= {
-            "opening_m": dart.opening,
-            "angle_deg": math.degrees(dart.angle),
-            "intake_m": dart.intake,
-            "legs_m": [dart.left_leg, dart.right_leg],
-        }
-    elif kind == "fish-eye":
-        eye = fish_eye_measure(positions, seam.left, seam.right)
-        found |= {
-            "opening_m": abs(eye.intake),
-            "angle_deg": math.degrees(min(eye.first_angle, eye.last_angle)),
-            "intake_m": eye.intake,
-            "tip_to_tip_m": eye.length,
-        }
-    else:
-        gap = np.linalg.norm(positions[seam.left] - positions[seam.right], axis=1)
-        found |= {"opening_m": float(gap[[0, -1]].max()), "widest_m": float(gap.max())}
-    for side, line in (("left", seam.left), ("right", seam.right)):
-        found[f"{side}_seam_m"] = polyline_length(positions[line])
-    if kind != "parting":
-        found["drawn"] = _drawn(positions, seam, kind, tip_back, loops)
-    return found
+    loops, seams = border_loops(surface.faces), []
+    for seam in cut.seams:
+        kind = seam_kind(seam)
+        found: dict[str, Any] = {"kind": kind}
+        if kind == "dart":
+            dart = dart_measure(positions, seam.left, seam.right)
+            found |= {
+                "opening_m": dart.opening,
+                "angle_deg": math.degrees(dart.angle),
+                "intake_m": dart.intake,
+                "legs_m": [dart.left_leg, dart.right_leg],
+            }
+        elif kind == "fish-eye":
+            eye = fish_eye_measure(positions, seam.left, seam.right)
+            found |= {
+                "opening_m": abs(eye.intake),
+                "angle_deg": math.degrees(min(eye.first_angle, eye.last_angle)),
+                "intake_m": eye.intake,
+                "tip_to_tip_m": eye.length,
+            }
+        else:
+            gap = np.linalg.norm(positions[seam.left] - positions[seam.right], axis=1)
+            found |= {"opening_m": float(gap[[0, -1]].max()), "widest_m": float(gap.max())}
+        for side, line in (("left", seam.left), ("right", seam.right)):
+            found[f"{side}_seam_m"] = polyline_length(positions[line])
+        if kind != "parting":
+            found["drawn"] = _drawn(positions, seam, kind, cut.tip_back, loops)
+        seams.append(found)
+    return {"name": cut.name, "length_m": cut.length, "seams": seams}
 
 
 def _drawn(positions: FloatArray, seam: Crack, kind: str, tip_back: float, loops: list[IntArray]) -> dict[str, Any]:
@@ -121,7 +109,17 @@ def _drawn(positions: FloatArray, seam: Crack, kind: str, tip_back: float, loops
     except InputError as reason:
         return {"not_drawn": str(reason)}
     if are_curved(*legs):
-        return {"tip_back_m": tip_back, "curved": True, **_curved(*legs)}
+        # Along its curved legs, both from the border to the tip.
+        left_end, right_end, tip = legs[0][0], legs[1][0], legs[0][-1]
+        to_left, to_right = left_end - tip, right_end - tip
+        return {
+            "tip_back_m": tip_back,
+            "curved": True,
+            "leg_m": sum(polyline_length(leg) for leg in legs) / 2,
+            "angle_deg": math.degrees(np.arctan2(abs(np.linalg.det([to_left, to_right])), to_left @ to_right)),
+            "intake_m": float(np.linalg.norm(to_left - to_right)),
+            "points_m": [p.tolist() for p in (left_end, tip, right_end)],
+        }
     return {
         "tip_back_m": tip_back,
         "curved": False,
@@ -129,17 +127,4 @@ def _drawn(positions: FloatArray, seam: Crack, kind: str, tip_back: float, loops
         "angle_deg": math.degrees(dart.angle),
         "intake_m": dart.intake,
         "points_m": [p.tolist() for p in (dart.left_end, dart.tip, dart.right_end, dart.fold_point)],
-    }
-
-
-def _curved(left: FloatArray, right: FloatArray) -> dict[str, Any]:
-    """Measure a dart along its curved legs, both from the border to the tip."""
-    tip = left[-1]
-    to_left, to_right = left[0] - tip, right[0] - tip
-    lengths = [polyline_length(leg) for leg in (left, right)]
-    return {
-        "leg_m": sum(lengths) / 2,
-        "angle_deg": math.degrees(np.arctan2(abs(np.linalg.det([to_left, to_right])), to_left @ to_right)),
-        "intake_m": float(np.linalg.norm(to_left - to_right)),
-        "points_m": [p.tolist() for p in (left[0], tip, right[0])],
     }

@@ -63,7 +63,21 @@ def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
         spread += share / 12.0 * (at * area) @ at.T
     values, axes = np.linalg.eigh(spread / area.sum())
     facing = normal.sum(axis=1)
-    long_axis, words = _long_axis(values, axes, facing)
+    up = np.array([0.0, 1.0, 0.0]) - facing * facing[1] / max(float(facing @ facing), 1e-300)
+    size = float(np.linalg.norm(up))
+    if values[1] <= _AS_WIDE * values[2] or size <= 0.5:
+        long_axis, words = axes[:, 2], "along the long axis through the middle"
+    else:
+        # Nearly as wide as long: let the grain hang down rather than run by the accident of a few millimetres.
+        leaning = np.abs(axes[:, 1:].T @ up) / size
+        nearer = int(leaning.argmax())
+        if values[1] > _ALIKE * values[2] or leaning.max() > _HANGS:
+            long_axis, words = up / size, "upright through the middle, the piece being about as wide as long"
+        else:
+            long_axis = axes[:, 1 + nearer]
+            words = (
+                f"along the {('short', 'long')[nearer]} axis through the middle, the more upright of two about as long"
+            )
     long_axis = long_axis * _upwards(long_axis, long_axis)
     across = np.cross(long_axis, facing)
     if np.linalg.norm(across) < 1e-9 * max(float(np.linalg.norm(facing)), 1e-300) or not np.any(facing):
@@ -80,28 +94,6 @@ def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
     rising = surface.vertices[line[-1]] - surface.vertices[line[0]]
     upwards = _upwards(rising, long_axis if band is None else rising)
     return np.ascontiguousarray(line if upwards > 0 else line[::-1], dtype=np.int32), words
-
-
-def _long_axis(values: FloatArray, axes: FloatArray, facing: FloatArray) -> tuple[FloatArray, str]:
-    """Return the axis along which a piece is laid, and a description of it.
-
-    Args:
-        values: variances along the principal axes, ascending [m2].
-        axes: 3 by 3, the principal axes as columns.
-        facing: sum of the face normals.
-    """
-    up = np.array([0.0, 1.0, 0.0]) - facing * facing[1] / max(float(facing @ facing), 1e-300)
-    size = float(np.linalg.norm(up))
-    if values[1] <= _AS_WIDE * values[2] or size <= 0.5:
-        return axes[:, 2], "along the long axis through the middle"
-    # Nearly as wide as long: let the grain hang down rather than run by the accident of a few millimetres.
-    leaning = np.abs(axes[:, 1:].T @ up) / size
-    if values[1] > _ALIKE * values[2] or leaning.max() > _HANGS:
-        return up / size, "upright through the middle, the piece being about as wide as long"
-    nearer = int(leaning.argmax())
-    return axes[
-        :, 1 + nearer
-    ], f"along the {('short', 'long')[nearer]} axis through the middle, the more upright of two about as long"
 
 
 def _upwards(direction: FloatArray, leading: FloatArray) -> int:

@@ -245,9 +245,24 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
         return None
     grid = rows_and_columns(surface)
     if grid is not None:
-        beside = _beside(surface, grid, datum)
-        if beside is not None:
-            return beside
+        # Of a rectangular grid, where the datum is one of its columns or rows.
+        for lines, mirrored in ((grid, False), (grid.T, True)):
+            column = np.flatnonzero(lines[0] == datum[0])
+            upwards = len(column) == 1
+            if not upwards:
+                column = np.flatnonzero(lines[-1] == datum[0])
+            ordered = lines if upwards else lines[::-1]
+            if len(column) == 0 or not np.array_equal(ordered[:, column[0]], datum):
+                continue
+            at = int(column[0])
+            # Whether the faces go round anticlockwise where columns lie to the right of one another and rows above one another.
+            y, x = np.unravel_index([int(np.argmax(grid == vertex)) for vertex in surface.faces[0]], grid.shape)
+            turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
+            side = 1.0 if (turns == upwards) != mirrored else -1.0
+            positions = np.empty((len(surface.vertices), 2))
+            given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
+            launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
+            return positions
     station = arc_lengths(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])
@@ -255,32 +270,10 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     stations = np.stack([station, station[::-1]])
     p = points_at(surface.vertices, lines)
     on = lines[1:] >= 0
-    x = np.cumsum(np.where(on, norm(p[:, 1:] - p[:, :-1]), 0.0), axis=0) * np.array([[-1.0], [1.0]])
-    positions[lines[1:][on]] = np.column_stack([x[on], np.broadcast_to(stations, x.shape)[on]])
+    across = np.cumsum(np.where(on, norm(p[:, 1:] - p[:, :-1]), 0.0), axis=0) * np.array([[-1.0], [1.0]])
+    positions[lines[1:][on]] = np.column_stack([across[on], np.broadcast_to(stations, across.shape)[on]])
     whole = len(datum) + np.count_nonzero(on) == len(positions)
     return positions if whole and not np.isnan(positions).any() else None
-
-
-def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | None:
-    """Lay out the profiles of a rectangular grid whose datum is one of its columns or rows; None for another mesh."""
-    for lines, mirrored in ((grid, False), (grid.T, True)):
-        column = np.flatnonzero(lines[0] == datum[0])
-        upwards = len(column) == 1
-        if not upwards:
-            column = np.flatnonzero(lines[-1] == datum[0])
-        ordered = lines if upwards else lines[::-1]
-        if len(column) == 0 or not np.array_equal(ordered[:, column[0]], datum):
-            continue
-        at = int(column[0])
-        # Whether the faces go round anticlockwise where columns lie to the right of one another and rows above one another.
-        y, x = np.unravel_index([int(np.argmax(grid == vertex)) for vertex in surface.faces[0]], grid.shape)
-        turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
-        side = 1.0 if (turns == upwards) != mirrored else -1.0
-        positions = np.empty((len(surface.vertices), 2))
-        given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
-        launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
-        return positions
-    return None
 
 
 def _grid_lines(surface: Surface, start: IntArray) -> IntArray:

@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 
@@ -74,19 +73,6 @@ class _Scale:
         return "max" if self.low == 0.0 else "both"
 
 
-def _scale_of(values: FloatArray, area: FloatArray, unit: str, *, from_nothing: bool, limit: float) -> _Scale:
-    low, high = (weighted_percentile(values, area, share) for share in (0.01, 0.99))
-    least = _LEAST_SCALE[unit]
-    if from_nothing or (low > 0.3 * high and high > least):
-        # All of it pulls: from the least to the most, or from nothing where that is near.
-        # Not so narrow that what is as good as even looks uneven.
-        start = 0.0 if low < 0.3 * high else min(low, 0.8 * high)
-        return _Scale(colours="YlOrRd", low=start, high=max(high, least, start + 0.1 * least))
-    # Cloth's own colour is rest; red pulls, blue is slack.
-    reach = max(abs(low), abs(high), least, limit)
-    return _Scale(colours="RdBu_r", low=-reach, high=reach)
-
-
 def _values(fit: WornFit, body: OnBody, name: str) -> FloatArray:
     """Return a map of a piece in the unit shown, #F."""
     return np.asarray(_ALL_MAPS[name][1] * (body[name] if name in _BODY_MAPS else getattr(fit, name)))
@@ -109,7 +95,17 @@ def _scales(
         limit = 1.2 * factor * max(fit.limit for fit in fits) if group[0] in _LIMITED else 0.0
         if limit > 3.0 * float(np.abs(values).max(initial=0.0)):
             limit = 0.0
-        scale = _scale_of(values, area, unit, from_nothing=group[0].endswith("pressure"), limit=limit)
+        low, high = (weighted_percentile(values, area, share) for share in (0.01, 0.99))
+        least = _LEAST_SCALE[unit]
+        if group[0].endswith("pressure") or (low > 0.3 * high and high > least):
+            # All of it pulls: from the least to the most, or from nothing where that is near.
+            # Not so narrow that what is as good as even looks uneven.
+            start = 0.0 if low < 0.3 * high else min(low, 0.8 * high)
+            scale = _Scale(colours="YlOrRd", low=start, high=max(high, least, start + 0.1 * least))
+        else:
+            # Cloth's own colour is rest; red pulls, blue is slack.
+            reach = max(abs(low), abs(high), least, limit)
+            scale = _Scale(colours="RdBu_r", low=-reach, high=reach)
         found.update(dict.fromkeys(group, scale))
     return found
 
@@ -185,15 +181,32 @@ def write_wear_sheet(
     scales = _scales(fits, [*([name] for name in maps if name in _BODY_MAPS), *_ALIKE], bodies)
     limit = max(fit.limit for fit in fits)
     top = _TOP
+    word = "lies on the form" if on_body else "fits"
     # One axis over the page, in inches: an axis for each map takes longer than all that is drawn in it.
     page = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, sheet.size[0]), ylim=(0.0, sheet.size[1]))
     page.set_axis_off()
     drawn: dict[str, ScalarMappable] = {}
     shown_names = titles([result.surface.name for result in results], is_drawn)
     for result, body, height in zip(results, bodies, sheet.rows, strict=True):
-        _write_row_label(
-            figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15), on_form=bool(on_body)
-        )
+        # Label the row.
+        fit = result.fit
+        lines = [f"{word}: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
+        measures = fit.as_dict()
+        lines += [f"{RANGES}:", *strain_words(measures)]
+        if pressure := pressure_words(measures):
+            p05, p95, most = (measures["pressure"][at] / _MMHG for at in ("p05", "p95", "max"))
+            lines += [pressure, f"= {p05:.1f} to {p95:.1f} mmHg [up to {most:.1f}]"]
+        if result.grain_angle:
+            lines.append(f"warp turned by {result.grain_angle:g} degrees")
+        if not fit.fits:
+            lines.append("")
+            lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
+            lines += [remedy_words(remedy.as_dict(), sewn=result.unsewn is not None) for remedy in result.remedies[:1]]
+        x, y = sheet.point(0.15, top + 0.15)
+        figure.text(x, y, shown_names[result.surface.name], fontsize=11, weight="bold", va="top")
+        y -= 0.22 / float(figure.get_size_inches()[1])
+        text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)
+        figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")
         # Draw all maps of a piece side by side.
         drawn = {}
         middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
@@ -215,11 +228,11 @@ def write_wear_sheet(
         bar.set_label(unit, fontsize=9)
         _mark_limit(bar, name, limit, scales[name])
         if unit == "Pa":
-            above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
+            in_mmhg = (lambda pascals: pascals / _MMHG), (lambda mmhg: mmhg * _MMHG)
+            above = bar.ax.secondary_xaxis("top", functions=in_mmhg)
             above.tick_params(labelsize=7)
             above.set_xlabel("mmHg", fontsize=8)
     unfit = [result.surface.name for result in results if not result.fit.fits]
-    word = "lies on the form" if on_body else "fits"
     verdict = (
         word
         if not unfit
@@ -298,41 +311,10 @@ class _Strokes:
         )
 
 
-def _to_mmhg(pascals: Any) -> Any:
-    return pascals / _MMHG
-
-
-def _from_mmhg(mmhg: Any) -> Any:
-    return mmhg * _MMHG
-
-
 def _shown(value: float) -> str:
     if abs(value) < 0.05:
         return "0"
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
-
-
-def _write_row_label(
-    figure: Figure, result: Flattening, title: str, x: float, y: float, *, on_form: bool = False
-) -> None:
-    fit = result.fit
-    word = "lies on the form" if on_form else "fits"
-    lines = [f"{word}: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
-    measures = fit.as_dict()
-    lines += [f"{RANGES}:", *strain_words(measures)]
-    if pressure := pressure_words(measures):
-        p05, p95, most = (measures["pressure"][at] / _MMHG for at in ("p05", "p95", "max"))
-        lines += [pressure, f"= {p05:.1f} to {p95:.1f} mmHg [up to {most:.1f}]"]
-    if result.grain_angle:
-        lines.append(f"warp turned by {result.grain_angle:g} degrees")
-    if not fit.fits:
-        lines.append("")
-        lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
-        lines += [remedy_words(remedy.as_dict(), sewn=result.unsewn is not None) for remedy in result.remedies[:1]]
-    figure.text(x, y, title, fontsize=11, weight="bold", va="top")
-    y -= 0.22 / float(figure.get_size_inches()[1])
-    text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)
-    figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")
 
 
 def _draw_map(

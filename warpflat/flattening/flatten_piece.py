@@ -141,8 +141,16 @@ def check_settings(
     if angle.ndim or angle.dtype.kind not in "iuf" or not np.isfinite(angle):
         raise InputError(f"grain_angle = {grain_angle!r} is not a number of degrees")
     check_model(model)
+    start_warp()
+    try:
+        if device == "cuda" and not wp.get_cuda_devices():
+            raise ValueError("no CUDA device")  # Warp would look for one, and print why there is none
+        chosen = wp.get_device(device)
+    except Exception as error:
+        devices: Sequence[str] = [d.alias for d in wp.get_devices()]
+        raise InputError(f"device {device!r} is not available; {nearest(str(device), devices)}") from error
     return FlattenSettings(
-        fabric=cloth, grain_angle=grain_angle, model=model, wear=wear, options=options, device=_device(device)
+        fabric=cloth, grain_angle=grain_angle, model=model, wear=wear, options=options, device=chosen
     )
 
 
@@ -243,17 +251,6 @@ def relax_developed(piece: DevelopedPiece) -> Flattening:
         wear=task.wear,
         options=task.options,
     )
-
-
-def _device(name: str | None) -> wp.Device:
-    start_warp()
-    try:
-        if name == "cuda" and not wp.get_cuda_devices():
-            raise ValueError("no CUDA device")  # Warp would look for one, and print why there is none
-        return wp.get_device(name)
-    except Exception as error:
-        devices: Sequence[str] = [d.alias for d in wp.get_devices()]
-        raise InputError(f"device {name!r} is not available; {nearest(str(name), devices)}") from error
 
 
 def nearly_closed_notes(surface: Surface) -> list[str]:

@@ -276,18 +276,29 @@ class Flattening:
         """Return the piece's row in a picture."""
         from warpflat.export.picture import PicturePiece
 
-        datum = {} if self.datum_name in self.surface.lines else {self.datum_name: self.datum}
+        there, grain = self.surface.lines, self.datum_name
+        datum = {} if grain in there else {grain: self.datum}
+        # In the pattern cuts show as cracks.
+        lines: dict[str, Any] = {
+            name: line
+            for name, line in self.network.surface.lines.items()
+            if not self.cuts or name in there or not (".left" in name or ".right" in name)
+        }
+        if grain in there and grain not in lines:
+            # A cut has parted the datum: its parts are drawn as one line.
+            parts = [name for name in lines if name.startswith(f"{grain}.")]
+            lines[grain] = [lines.pop(name) for name in parts] or self.datum
         cut = {int(v) for made in self.cuts for path in made.paths for v in path}
-        lines = {name: line for name, line in self.surface.lines.items() if not cut.issuperset(line.tolist())}
+        uncut = {name: line for name, line in there.items() if not cut.issuperset(line.tolist())}
         return PicturePiece(
             name=self.surface.name,
             surface=self.surface,
             faces=self.faces,
             positions=self.positions,
             face_energy_density=self.face_energy_density,
-            lines={**_lines_in_plane(self), **datum},
-            surface_lines={**{**lines, **{f"{made.name} (cut)": list(made.paths) for made in self.cuts}}, **datum},
-            datum=self.datum_name,
+            lines={**lines, **datum},
+            surface_lines={**uncut, **{f"{made.name} (cut)": list(made.paths) for made in self.cuts}, **datum},
+            datum=grain,
             grain_angle=self.grain_angle,
             captions=self.captions(),
         )
@@ -381,18 +392,3 @@ def write_files(
 
             write_picture(path, [result.picture_piece() for result in results], body=body, drafted=drafted)
     return files
-
-
-def _lines_in_plane(result: Flattening) -> dict[str, Any]:
-    """Return the lines that are drawn in the pattern; cuts show as cracks there."""
-    lines_there, grain = result.surface.lines, result.datum_name
-    lines: dict[str, Any] = {
-        name: line
-        for name, line in result.network.surface.lines.items()
-        if not result.cuts or name in lines_there or not (".left" in name or ".right" in name)
-    }
-    if grain in lines_there and grain not in lines:
-        # A cut has parted the datum: its parts are drawn as one line.
-        parts = [name for name in lines if name.startswith(f"{grain}.")]
-        lines[grain] = [lines.pop(name) for name in parts] or result.datum
-    return lines

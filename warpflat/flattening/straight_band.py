@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.flattening.progress import Stage
@@ -108,7 +108,8 @@ def find_band(piece: Flattening) -> Band | None:
     across = np.linalg.norm(placed[1] - placed[0], axis=1)
     if np.ptp(across) > _EVEN * across.mean():
         return None
-    area = float(np.linalg.norm(_face_normals(worn, triangles), axis=1).sum())
+    a, b, c = worn[triangles].transpose(1, 0, 2)
+    area = float(np.linalg.norm(0.5 * np.cross(b - a, c - a), axis=1).sum())
     long = lengths[first], lengths[first + 2]
     return Band(sides=sides, lengths=long, width=2.0 * area / (long[0] + long[1]))
 
@@ -173,9 +174,3 @@ def cut_straight(piece: Flattening, band: Band, *, shorter: float = 0.0) -> Flat
         unsewn=piece.unsewn or piece,
         notes=(*piece.notes, f"{note}; --bands 'as worn' cuts it curved"),
     )
-
-
-def _face_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
-    """Return normals of triangles, #T by 3, as long as half of their areas' double [m2]."""
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    return np.asarray(0.5 * np.cross(b - a, c - a))
