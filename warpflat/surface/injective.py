@@ -144,19 +144,6 @@ def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     return np.asarray(np.sign((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])))
 
 
-def _of_one_cut(surface: Surface, cut_sides: IntArray, i: IndexArray, j: IndexArray) -> BoolArray:
-    """Return whether pairs of border edges lie on both sides of one cut, or at its mouth."""
-    edges = border_edges_of(surface)
-    of_cut = crack_edges_of(surface) & np.isin(edges.tail, cut_sides) & np.isin(edges.head, cut_sides)
-    sums = np.concatenate([[0], np.cumsum(of_cut)])
-    low, high = np.minimum(i, j), np.maximum(i, j)
-    first, count = edges.first[low], edges.count[low]
-    inside, between = sums[high + 1] - sums[low], high + 1 - low
-    outside = sums[first + count] - sums[first] - (sums[high] - sums[low + 1])
-    shares = np.maximum(inside / between, outside / np.maximum(count - between + 2, 1))
-    return np.asarray((first == edges.first[high]) & (shares >= _CUT_SHARE))
-
-
 def _no_face_is_mirrored(surface: Surface, positions: FloatArray) -> bool:
     return bool(make_cells(surface).least_shares(positions).min() > 0.0)
 
@@ -199,12 +186,20 @@ def certify(surface: Surface, positions: FloatArray, cut_sides: IntArray) -> boo
         positions: #V by 2 [m].
         cut_sides: the vertices on the sides of the cuts that have been made.
     """
-    i, j = crossings(border_edges_of(surface), positions)
-    return (
-        bool(len(i) == 0 or (len(cut_sides) > 0 and _of_one_cut(surface, cut_sides, i, j).all()))
-        and _no_face_is_mirrored(surface, positions)
-        and is_wound_once(surface, positions)
-    )
+    edges = border_edges_of(surface)
+    i, j = crossings(edges, positions)
+    if len(i):
+        # Each pair of edges that cross must lie on both sides of one cut, or at its mouth.
+        of_cut = crack_edges_of(surface) & np.isin(edges.tail, cut_sides) & np.isin(edges.head, cut_sides)
+        sums = np.concatenate([[0], np.cumsum(of_cut)])
+        low, high = np.minimum(i, j), np.maximum(i, j)
+        first, count = edges.first[low], edges.count[low]
+        inside, between = sums[high + 1] - sums[low], high + 1 - low
+        outside = sums[first + count] - sums[first] - (sums[high] - sums[low + 1])
+        shares = np.maximum(inside / between, outside / np.maximum(count - between + 2, 1))
+        if not ((first == edges.first[high]) & (shares >= _CUT_SHARE)).all():
+            return False
+    return _no_face_is_mirrored(surface, positions) and is_wound_once(surface, positions)
 
 
 def overlap_area(surface: Surface, positions: FloatArray, cut_sides: IntArray) -> float:

@@ -64,9 +64,21 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
     if length >= _SHORT * reach or reach < _NARROW * width or mean < _EVEN * greatest or ring:
         return None
     weight = graph.length / (room[graph.edges].mean(axis=1) + _ROOM * width)
-    starts, ends = (_end_at(surface, loops[0], tip, 2 * width) for tip in (one, other))
-    cost, before, _ = dijkstra(graph.matrix(weight), indices=starts, return_predecessors=True, min_only=True)
-    path = [int(ends[cost[ends].argmin()])]
+    # The border vertices of either end: those from its tip to corners at most two widths away.
+    ends = []
+    for tip in (one, other):
+        ends.append([tip])
+        at = int(np.flatnonzero(loops[0] == tip)[0])
+        for loop in (np.roll(loops[0], -at), np.roll(loops[0][::-1], at + 1)):
+            step = np.diff(surface.vertices[np.append(loop, loop[0])], axis=0)
+            size = np.linalg.norm(step, axis=1)
+            ahead = step / np.maximum(size, np.finfo(float).tiny)[:, None]
+            corner = np.einsum("ij,ij->i", ahead[:-1], ahead[1:]) < _CORNER
+            near = np.flatnonzero(corner & (np.cumsum(size)[:-1] <= 2 * width))
+            if len(near):
+                ends[-1] += loop[1 : near[0] + 2].tolist()
+    cost, before, _ = dijkstra(graph.matrix(weight), indices=ends[0], return_predecessors=True, min_only=True)
+    path = [int(ends[1][cost[ends[1]].argmin()])]
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
     return np.array(path, dtype=np.int32)
@@ -76,19 +88,3 @@ def _furthest(surface: Surface, border: IntArray, place: int) -> tuple[int, floa
     """Return the vertex of the border furthest from a vertex, and its distance [m]."""
     away = distance_from(surface, [place])[border]
     return int(border[away.argmax()]), float(away.max())
-
-
-def _end_at(surface: Surface, border: IntArray, tip: int, most: float) -> IntArray:
-    """Return the border vertices of the end of a band at `tip`: those from it to corners at most `most` [m] away."""
-    end = [tip]
-    at = int(np.flatnonzero(border == tip)[0])
-    for loop in (np.roll(border, -at), np.roll(border[::-1], at + 1)):
-        p = surface.vertices[np.append(loop, loop[0])]
-        step = np.diff(p, axis=0)
-        size = np.linalg.norm(step, axis=1)
-        ahead = step / np.maximum(size, np.finfo(float).tiny)[:, None]
-        corner = np.einsum("ij,ij->i", ahead[:-1], ahead[1:]) < _CORNER
-        near = np.flatnonzero(corner & (np.cumsum(size)[:-1] <= most))
-        if len(near):
-            end += loop[1 : near[0] + 2].tolist()
-    return np.array(end, dtype=np.int32)

@@ -271,8 +271,19 @@ def _directions_at_line(
         and up [m] of it, by the angles of the triangles around it as in the plane. A straight way that passes between two
         of them has the mean of their places. Vertices not joined to that end lie beside their own place of a straight line.
     """
-    sides, angle, away, offset = _around(surface.vertices, triangles, path)
-    on_path = np.zeros(len(surface.vertices), dtype=np.int8)
+    # The triangles around each vertex of the line: their other two vertices, anticlockwise, how far these are, and the angle between.
+    vertices = surface.vertices
+    place = np.full(len(vertices), -1, dtype=np.int32)
+    place[path] = np.arange(len(path), dtype=np.int32)
+    near = triangles[(place[triangles] >= 0).any(axis=1)]
+    corner = np.concatenate([np.roll(near, -shift, axis=1) for shift in range(3)])
+    corner = corner[place[corner[:, 0]] >= 0]
+    order, offset = counting_sort(place[corner[:, 0]], len(path))
+    corner = corner[order]
+    u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
+    angle, away = np.arctan2(norm(cross(u, v)), dot(u, v)), np.stack([norm(u), norm(v)], axis=1)
+    sides = np.ascontiguousarray(corner[:, 1:])
+    on_path = np.zeros(len(vertices), dtype=np.int8)
     on_path[path] = 1
     # Each triangle may be passed from both neighbours on the line, either way.
     room, count = 4 * len(sides), np.empty(1, dtype=np.int32)
@@ -285,7 +296,7 @@ def _directions_at_line(
     side = np.concatenate([np.zeros(len(path)), np.bincount(number, right * far, minlength=len(beside))])
     nearest = np.arange(len(known))
     nearest[len(path) + number] = at
-    station = arc_lengths(surface.vertices[path])[nearest]
+    station = arc_lengths(vertices[path])[nearest]
     about_ends = []
     for end, up in ((0, 1.0), (len(path) - 1, -1.0)):
         about_end = np.column_stack([side, station - station[end]])
@@ -295,27 +306,6 @@ def _directions_at_line(
         about_end[len(path) + around] = np.stack([np.bincount(of, place, minlength=len(around)) for place in places], 1)
         about_ends.append(about_end)
     return known, side, (about_ends[0], about_ends[1])
-
-
-def _around(
-    vertices: FloatArray, triangles: IntArray, path: IntArray
-) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
-    """List the triangles around each vertex of a line.
-
-    Returns:
-        #R by 2, their other two vertices, anticlockwise; #R, the angle between these [rad]; #R by 2, how far they are [m]; #P+1, where
-        those of each vertex begin.
-    """
-    place = np.full(len(vertices), -1, dtype=np.int32)
-    place[path] = np.arange(len(path), dtype=np.int32)
-    near = triangles[(place[triangles] >= 0).any(axis=1)]
-    corner = np.concatenate([np.roll(near, -shift, axis=1) for shift in range(3)])
-    corner = corner[place[corner[:, 0]] >= 0]
-    order, offset = counting_sort(place[corner[:, 0]], len(path))
-    corner = corner[order]
-    u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
-    angle = np.arctan2(norm(cross(u, v)), dot(u, v))
-    return np.ascontiguousarray(corner[:, 1:]), angle, np.stack([norm(u), norm(v)], axis=1), offset
 
 
 def _sides(surface: Surface, path: IntArray) -> FloatArray | None:
