@@ -66,8 +66,11 @@ class Beside(Generic[Result]):
         self._pipe = -1
 
     def __enter__(self) -> Beside[Result]:
-        if not _is_allowed.get() or not _can_fork():
-            return self
+        if not _is_allowed.get() or sys.platform != "linux" or thread_count() < 2:
+            return self  # frameworks of macOS do not bear a fork
+        warp = sys.modules.get("warp")
+        if warp is not None and warp.is_cuda_available():
+            return self  # nor does a process with a CUDA device
         read, write = os.pipe()
         parent = os.getpid()
         try:
@@ -140,12 +143,6 @@ def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> 
                 yield other.result()
 
 
-def _can_fork() -> bool:
-    """Return whether a fork gains time and does no harm: frameworks of macOS do not bear it, nor does a process with a CUDA device."""
-    warp = sys.modules.get("warp")
-    return sys.platform == "linux" and thread_count() > 1 and (warp is None or not warp.is_cuda_available())
-
-
 def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
     """Run the function, write its result or error into the pipe, and end the process without any cleaning up of the parent's."""
     import ctypes
@@ -168,18 +165,15 @@ def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
                 answer: tuple[bool, Any] = True, function()
         except Exception as error:
             answer = False, error
-        content = memoryview(_pickled(*answer, read, left_out))
-        while content:
-            content = content[os.write(pipe, content) :]
+        try:
+            content = pickle.dumps((*answer, read, left_out))
+            pickle.loads(content)  # an exception may not be made again from its arguments
+        except Exception as error:
+            good, value = answer
+            what = f"{type(error).__name__}: {error}" if good else f"{type(value).__name__}: {value}"
+            content = pickle.dumps((False, RuntimeError(what), read, left_out))
+        unsent = memoryview(content)
+        while unsent:
+            unsent = unsent[os.write(pipe, unsent) :]
     finally:
         os._exit(0)
-
-
-def _pickled(good: bool, value: Any, *files: Any) -> bytes:
-    try:
-        content = pickle.dumps((good, value, *files))
-        pickle.loads(content)  # an exception may not be made again from its arguments
-    except Exception as error:
-        what = f"{type(value).__name__}: {value}" if not good else f"{type(error).__name__}: {error}"
-        content = pickle.dumps((False, RuntimeError(what), *files))
-    return content

@@ -11,7 +11,7 @@ import json
 import os
 import stat
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -152,7 +152,12 @@ def guarded(file: Path, kind: str, *, missing: str = "no such file") -> Iterator
     except FileNotFoundError as error:
         if error.filename is not None and Path(error.filename) != file:
             raise InputError(f"{file}: needs {error.filename}, which is missing") from None
-        raise InputError(f"{file}: {missing}{_similar_file(file)}") from None
+        similar = list[str]()
+        with suppress(OSError, ValueError):
+            names = [entry.name for entry in file.parent.iterdir()]
+            similar = difflib.get_close_matches(file.name, names, n=1, cutoff=0.7)
+        hint = f"; did you mean {similar[0]!r}?" if similar else ""
+        raise InputError(f"{file}: {missing}{hint}") from None
     except Exception as error:
         at = f"{place.at}: " if place.at else ""
         if is_out_of_memory(error):
@@ -258,15 +263,6 @@ def _parse_json(path: Path, kind: str, missing: str) -> Any:
         data = json.loads(stream.read().decode("utf-8-sig"))
         check_values(data, depth_only=True)
     return data
-
-
-def _similar_file(path: Path) -> str:
-    try:
-        names = [entry.name for entry in path.parent.iterdir()]
-    except (OSError, ValueError):
-        return ""
-    close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.7)
-    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def check_values(data: Any, *, depth_only: bool = False) -> None:

@@ -82,28 +82,23 @@ def answer() -> None:
         require_memory_for_usd()
         from pxr import UsdGeom, UsdUtils  # noqa: F401, as the limit counts what comes after it
 
-        call = getattr(import_module(module), name)
-        _limit(path.stat().st_size)
+        call, size = getattr(import_module(module), name), path.stat().st_size
+        if sys.platform == "linux":
+            # Limit this process's memory and time by the size of the file.
+            import resource
+
+            taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            for kind, most in (
+                (resource.RLIMIT_AS, taken + _MEMORY + _MEMORY_PER_BYTE * size),
+                (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_PER_SECOND),
+                (resource.RLIMIT_CORE, 0),
+            ):
+                soft, hard = resource.getrlimit(kind)
+                least = min(limit for limit in (most, soft, hard) if limit != resource.RLIM_INFINITY)
+                resource.setrlimit(kind, (least, hard))
         result = True, call(path, **arguments)
     except InputError as error:
         result = False, str(error)
     pickle.dump(result, out, protocol=pickle.HIGHEST_PROTOCOL)
     out.close()
     os._exit(0)  # USD and Python would clear their memory for a fifth of a second
-
-
-def _limit(size: int) -> None:
-    """Limit this process's memory and time by the size of the file [bytes], where the system can."""
-    if sys.platform != "linux":
-        return
-    import resource
-
-    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    for kind, most in (
-        (resource.RLIMIT_AS, taken + _MEMORY + _MEMORY_PER_BYTE * size),
-        (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_PER_SECOND),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        soft, hard = resource.getrlimit(kind)
-        least = min(limit for limit in (most, soft, hard) if limit != resource.RLIM_INFINITY)
-        resource.setrlimit(kind, (least, hard))

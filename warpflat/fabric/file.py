@@ -14,7 +14,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.toml_file import Table, check_table, read_toml
-from warpflat.fabric.fabric import Curve, Fabric, Provenance, fabric_called
+from warpflat.fabric.fabric import Fabric, Provenance, fabric_called
 from warpflat.fabric.instruments import (
     FAST_LOADS,
     GF_PER_CM,
@@ -269,8 +269,16 @@ def fabric_from_table(
         for key in ("curve_warp", "curve_weft"):
             curve: CurveTable | None = getattr(table, key)
             if curve is not None:
-                points = _curve(curve, _factor(name, key, curve.unit, _TENSILE))
-                given[key] = points, _provenance(curve, curve.unit, sources or {})
+                factor = _factor(name, key, curve.unit, _TENSILE)
+                points = [(strain, tension * factor) for strain, tension in curve.points or ()]
+                if curve.points is None:
+                    # Of secants, which change evenly from strain to strain.
+                    for (e0, k0), (e1, k1) in itertools.pairwise(curve.secants or []):
+                        for step in range(1, _POINTS_PER_STRETCH + 1):
+                            part = step / _POINTS_PER_STRETCH
+                            strain = e0 + part * (e1 - e0)
+                            points.append((strain, (k0 + part * (k1 - k0)) * factor * strain))
+                given[key] = tuple(points), _provenance(curve, curve.unit, sources or {})
         # A curve of the base would contradict a stiffness that is given here.
         for direction in ("warp", "weft"):
             if f"stiffness_{direction}" in given:
@@ -306,16 +314,3 @@ def _factor(name: str, key: str, unit: str, units: Mapping[str, float]) -> float
     if unit not in units:
         raise InputError(f"fabric {name!r}: {key}: unknown unit {unit!r}; {nearest(unit, units)}")
     return units[unit]
-
-
-def _curve(curve: CurveTable, factor: float) -> Curve:
-    if curve.points is not None:
-        return tuple((strain, tension * factor) for strain, tension in curve.points)
-    points: list[tuple[float, float]] = []
-    secants = curve.secants or []
-    for (e0, k0), (e1, k1) in itertools.pairwise(secants):
-        for step in range(1, _POINTS_PER_STRETCH + 1):
-            part = step / _POINTS_PER_STRETCH
-            strain = e0 + part * (e1 - e0)
-            points.append((strain, (k0 + part * (k1 - k0)) * factor * strain))
-    return tuple(points)
