@@ -186,6 +186,30 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     pressure = smooth_face_values(surface, loaded, smoothing_length)
     excess = np.maximum(np.abs(strain_warp), np.abs(strain_weft)) - fabric.strain_limit
     total_area = max(float(weight.sum()), 1e-300)
+    # Regions that are held beyond the limit, the largest first.
+    outside, misfits = np.flatnonzero(excess > 1e-9), list[Misfit]()
+    if len(outside):
+        part = components(surface.faces[outside])
+        count = int(part.max()) + 1
+        order, begin = counting_sort(part.astype(np.int32), count)
+        members = outside[order].astype(np.int32)
+        regions = np.bincount(part, weight[outside], minlength=count)
+        # Of each region the face of the largest excess, and of several the first.
+        worst = outside[np.lexsort((-excess[outside], part))[begin[:-1]]]
+        on_warp = np.abs(strain_warp[worst]) >= np.abs(strain_weft[worst])
+        largest = np.where(on_warp, strain_warp[worst], strain_weft[worst])
+        for k in np.argsort(-regions, kind="stable").tolist():
+            misfits.append(
+                Misfit(
+                    surface=surface,
+                    faces=members[begin[k] : begin[k + 1]],
+                    area=float(regions[k]),
+                    worst=float(largest[k]),
+                    limit=fabric.strain_limit,
+                    thread="warp" if on_warp[k] else "weft",
+                    vertex=int(surface.faces[worst[k], 0]),
+                )
+            )
     return WornFit(
         strain_warp=strain_warp,
         strain_weft=strain_weft,
@@ -196,37 +220,7 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         pressure=np.maximum(pressure, 0.0),
         area=weight,
         limit=fabric.strain_limit,
-        misfits=_misfits(surface, strain_warp, strain_weft, excess, weight, fabric.strain_limit),
-        outside=float(weight[excess > 1e-9].sum()) / total_area,
+        misfits=tuple(misfits),
+        outside=float(weight[outside].sum()) / total_area,
         hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
-    )
-
-
-def _misfits(
-    surface: Surface, warp: FloatArray, weft: FloatArray, excess: FloatArray, area: FloatArray, limit: float
-) -> tuple[Misfit, ...]:
-
-    outside = np.flatnonzero(excess > 1e-9)
-    if len(outside) == 0:
-        return ()
-    part = components(surface.faces[outside])
-    count = int(part.max()) + 1
-    order, begin = counting_sort(part.astype(np.int32), count)
-    faces = outside[order].astype(np.int32)
-    regions = np.bincount(part, area[outside], minlength=count)
-    # Of each region the face of the largest excess, and of several the first.
-    worst = outside[np.lexsort((-excess[outside], part))[begin[:-1]]]
-    on_warp = np.abs(warp[worst]) >= np.abs(weft[worst])
-    strain = np.where(on_warp, warp[worst], weft[worst])
-    return tuple(
-        Misfit(
-            surface=surface,
-            faces=faces[begin[k] : begin[k + 1]],
-            area=float(regions[k]),
-            worst=float(strain[k]),
-            limit=limit,
-            thread="warp" if on_warp[k] else "weft",
-            vertex=int(surface.faces[worst[k], 0]),
-        )
-        for k in np.argsort(-regions, kind="stable").tolist()
     )

@@ -320,7 +320,26 @@ def relax(
         done = not moved or state.work_units - work_before >= options.max_steps
         done |= least_gain is not None and descent.gain <= least_gain * descent.point.energy
         if done or near or descent.iterations % options.check_every == 0:
-            _check(state, descent, near, left)
+            # Converged with little left, where the tolerances are met, or free of strain.
+            state.place(descent.point.positions)
+            state.evaluate_at_rest()
+            # Of the force on the ends of a chord, what keeps it upright is no force of the cloth.
+            energies, force, largest = state.energies(), state.cloth_force(), state.largest_force()
+            for each in state.alignments:
+                across = np.array([each.direction[1], -each.direction[0]])
+                reaction = 0.5 * across * (across @ (force[each.upper] - force[each.lower]))
+                force[each.upper] -= reaction
+                force[each.lower] += reaction
+            residual = state.residual() * float(np.linalg.norm(force, axis=1).max() / max(largest, 1e-300))
+            small = left.is_small(options) or residual <= options.residual_tolerance
+            small = small or descent.is_at_rest(options, _SMALLER)
+            state.status = Status(
+                energies=energies,
+                residual=residual,
+                gain=state.status.energies.potential - energies.potential,
+                change=descent.change,
+                at_rest=(near and small) or descent.point.energy <= state.negligible_energy,
+            )
             done |= state.status.at_rest
             if watch is not None:
                 watch(state)
@@ -331,31 +350,3 @@ def relax(
     outcome = state.make_outcome(steps_before, work_before, began_at=began_at)
     left_to_do = left if np.isfinite(left.outline_mm) else None
     return replace(outcome, left=left_to_do, first_steps=first, first_layout=layout)
-
-
-def _check(state: Relaxation, descent: Descent[Point], near: bool, left: Remainder) -> None:
-    """Check convergence at the present layout: little left, or the tolerances are met, or free of strain.
-
-    Args:
-        state: holds the status afterwards.
-        descent: where it is.
-        near: whether it may be at rest.
-        left: what is left by estimate.
-    """
-    state.place(descent.point.positions)
-    state.evaluate_at_rest()
-    energies, options = state.energies(), state.options
-    # Of the force on the ends of a chord, what keeps it upright is no force of the cloth.
-    force, largest = state.cloth_force(), state.largest_force()
-    for each in state.alignments:
-        across = np.array([each.direction[1], -each.direction[0]])
-        reaction = 0.5 * across * (across @ (force[each.upper] - force[each.lower]))
-        force[each.upper] -= reaction
-        force[each.lower] += reaction
-    residual = state.residual() * float(np.linalg.norm(force, axis=1).max() / max(largest, 1e-300))
-    small = left.is_small(options) or residual <= options.residual_tolerance or descent.is_at_rest(options, _SMALLER)
-    free = descent.point.energy <= state.negligible_energy
-    gain = state.status.energies.potential - energies.potential
-    state.status = Status(
-        energies=energies, residual=residual, gain=gain, change=descent.change, at_rest=(near and small) or free
-    )
