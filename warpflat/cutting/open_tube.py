@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -72,8 +72,15 @@ def open_with_cuts(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface,
     stretches = [(number, seam.path) for number, cut in enumerate(made) for seam in cut.seams]
     apart = list(range(len(stretches)))
     for stretch in reversed(range(len(stretches))):
+        if stretches[stretch][0] >= len(plans):
+            continue
         fewer = [other for other in apart if other != stretch]
-        if stretches[stretch][0] < len(plans) and not _is_tube(drawn, [stretches[other][1] for other in fewer]):
+        still_cut = tuple(stretches[other][1] for other in fewer)
+        try:
+            surface = make_cuts(drawn, [CutPlan(name="cut", paths=still_cut)]).surface if still_cut else drawn
+        except InputError:  # one edge with both ends inside separates nothing
+            continue
+        if not tube_borders(surface):
             apart = fewer
     before = [
         CutPlan(
@@ -112,17 +119,6 @@ def without_overlaps(plans: Sequence[CutPlan]) -> tuple[list[CutPlan], list[str]
                 left.append(replace(plan, paths=tuple(paths)))
         taken.update(edges)
     return left, shorter
-
-
-def _is_tube(surface: Surface, paths: Sequence[IntArray]) -> bool:
-    """Return whether a surface with cuts is a tube, or cannot be cut by these alone."""
-    if not paths:
-        return bool(tube_borders(surface))
-    try:
-        cut = make_cuts(surface, [CutPlan(name="cut", paths=tuple(paths))]).surface
-    except InputError:  # one edge with both ends inside separates nothing
-        return True
-    return bool(tube_borders(cut))
 
 
 def _without_edges(path: IntArray, edges: Collection[tuple[int, ...]]) -> list[IntArray]:
@@ -174,7 +170,7 @@ def _draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface,
         new = np.arange(len(cut.vertices), len(split.surface.vertices))
         # New vertices lie inside the cut surface: beside a cut there are none, and its sides can be closed again.
         origin = np.append(origin, len(whole.vertices) + np.arange(len(new)))
-        between: dict[tuple[int, ...], list[tuple[float, int]]] = {}
+        between: dict[tuple[int, int], list[tuple[float, int]]] = {}
         for vertex in new.tolist():
             ends = [
                 (int(origin[v]), w)
@@ -185,7 +181,13 @@ def _draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface,
                 (low, _), (high, share) = sorted(ends)
                 between.setdefault((low, high), []).append((share, int(origin[vertex])))
         faces = split.surface.faces
-        lines = {key: _with_between(line, between) for key, line in whole.lines.items()}
+        lines = {}
+        for key, line in whole.lines.items():
+            vertices = line[:1].tolist()
+            for a, b in pairwise(line.tolist()):
+                found = [vertex for _, vertex in sorted(between.get((min(a, b), max(a, b)), []))]
+                vertices += [*(found if a < b else found[::-1]), b]
+            lines[key] = np.array(vertices, dtype=np.int32)
         whole = replace(
             split.surface,
             vertices=np.concatenate([whole.vertices, split.surface.vertices[new]]),
@@ -199,12 +201,3 @@ def _draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface,
         assert made.cut is not None
         cut, origin = made.surface, origin[made.cut.vertex_origin]
     return whole, openings
-
-
-def _with_between(line: IntArray, between: Mapping[tuple[int, ...], list[tuple[float, int]]]) -> IntArray:
-    """Return a line with new vertices on its edges, given for each edge from its lower to its higher end."""
-    vertices = line[:1].tolist()
-    for a, b in pairwise(line.tolist()):
-        found = [vertex for _, vertex in sorted(between.get(tuple(sorted((a, b))), []))]
-        vertices += [*(found if a < b else found[::-1]), b]
-    return np.array(vertices, dtype=np.int32)

@@ -7,10 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
 from warpflat.cutting.cut_plan import CutPlan, CutSurface, make_cuts
 from warpflat.cutting.refine_piece import network_on_faces
-from warpflat.flattening.applied_cut import AppliedCut
 from warpflat.flattening.datum import choose_datum
 from warpflat.flattening.result import Flattening
 from warpflat.model.strain import strain_energy
@@ -83,7 +81,16 @@ def _part(result: Flattening, piece: CutPart) -> Flattening:
     network = network_on_faces(result, cut_surface, positions, piece.face_index)
     in_piece = np.full(len(result.positions), -1, dtype=np.int32)
     in_piece[piece.vertex_index[order]] = np.arange(len(order), dtype=np.int32)
-    cuts = [_cut_within(made, in_piece, number) for made in result.cuts]
+    # The parts of cuts whose sides both lie in this piece.
+    cuts = []
+    for made in result.cuts:
+        seams = tuple(
+            Crack(path=number[seam.path], left=in_piece[seam.left], right=in_piece[seam.right])
+            for seam in made.seams
+            if (in_piece[seam.left] >= 0).all() and (in_piece[seam.right] >= 0).all()
+        )
+        if seams:
+            cuts.append(replace(made, seams=seams, paths=tuple(seam.path for seam in seams)))
     datum = glued.lines.get(result.datum_name, np.empty(0, dtype=np.int32))
     energies = Relaxation(network, RelaxOptions(), start=positions).energies()
     last = replace(
@@ -101,16 +108,6 @@ def _part(result: Flattening, piece: CutPart) -> Flattening:
         datum_name=result.datum_name if len(datum) > 1 else "datum",
         development=replace(result.development, positions=result.development.positions[used]),
         stages=(*result.stages[:-1], last),
-        cuts=tuple(made for made in cuts if made.seams),
+        cuts=tuple(cuts),
         unsewn=None if result.unsewn is None else _part(result.unsewn, piece),
     )
-
-
-def _cut_within(made: AppliedCut, in_piece: IntArray, number: IntArray) -> AppliedCut:
-    """Return the part of a cut whose sides both lie in one piece, in that piece's numbering."""
-    seams = tuple(
-        Crack(path=number[seam.path], left=in_piece[seam.left], right=in_piece[seam.right])
-        for seam in made.seams
-        if (in_piece[seam.left] >= 0).all() and (in_piece[seam.right] >= 0).all()
-    )
-    return replace(made, seams=seams, paths=tuple(seam.path for seam in seams))
