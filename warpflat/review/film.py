@@ -193,10 +193,35 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
     The entry `data` is the base64 text of what `zlib` has compressed; `pieces` says what lies in it, in its order.
     """
     shapes = {piece.name: [piece.shape(change) for change in piece.changes] for piece in pieces}
-    shown, stored = _choose_frames(pieces, shapes)
-    if not shown:
+    # Frames are taken evenly, with those before and after each change of topology, as many as there is room for.
+    times, keys = pieces[0].times, {piece.name: piece.key_frames() for piece in pieces}
+    for stride in range(1, len(times) + 1):
+        kept = {*times[::stride], times[-1]}
+        for piece in pieces:
+            kept |= {time for change in piece.changes for time in (change - 1, change) if time >= times[0]}
+        shown, stored = sorted(kept), {name: list[int]() for name in keys}
+        for name, own in keys.items():
+            for time in shown:
+                after = bisect_left(own, time)
+                # Layouts of keys, and between keys of which one is not shown.
+                if own[after] == time or not kept.issuperset(own[after - 1 : after + 1]):
+                    stored[name].append(time)
+        vertices = sum(len(stored[piece.name]) * len(shapes[piece.name][-1].surface) for piece in pieces)
+        if _VERTEX * vertices <= _ROOM:
+            break
+    else:
         return None
-    maps = _scales(pieces, shapes)
+    # The maps that all pieces have, each with its unit on the page, its state, and the upper end of its scale there.
+    maps = dict[str, dict[str, Any]]()
+    for key, (unit, factor, least) in MAPS.items():
+        if not all(key in piece.maps for piece in pieces):
+            continue
+        values = np.concatenate([piece.maps[key][0] for piece in pieces])
+        areas = np.concatenate(
+            [face_areas(shape.surface, shape.faces) for piece in pieces for shape in shapes[piece.name][:1]]
+        )
+        high = factor * weighted_percentile(np.maximum(values, 0.0), areas, _SHARE)
+        maps[key] = {"unit": unit, "high": max(high, least), "state": pieces[0].maps[key][1]}
     packer = zlib.compressobj(_LEVEL)
     parts, entries = list[bytes](), list[dict[str, Any]]()
     for piece in pieces:
@@ -220,21 +245,6 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         **({} if body is None else {"body": body}),
         "data": base64.b64encode(b"".join(parts)).decode("ascii"),
     }
-
-
-def _scales(pieces: Sequence[FilmPiece], shapes: Mapping[str, Sequence[Shape]]) -> dict[str, dict[str, Any]]:
-    """Return the maps that all pieces have, each with its unit on the page, its state, and the upper end of its scale there."""
-    found = {}
-    for key, (unit, factor, least) in MAPS.items():
-        if not all(key in piece.maps for piece in pieces):
-            continue
-        values = np.concatenate([piece.maps[key][0] for piece in pieces])
-        areas = np.concatenate(
-            [face_areas(shape.surface, shape.faces) for piece in pieces for shape in shapes[piece.name][:1]]
-        )
-        high = factor * weighted_percentile(np.maximum(values, 0.0), areas, _SHARE)
-        found[key] = {"unit": unit, "high": max(high, least), "state": pieces[0].maps[key][1]}
-    return found
 
 
 def _packed_body(stage: Any) -> dict[str, Any] | None:
@@ -265,36 +275,6 @@ def _packed_body(stage: Any) -> dict[str, Any] | None:
         "triangles": len(triangles),
         "data": base64.b64encode(data).decode("ascii"),
     }
-
-
-def _choose_frames(
-    pieces: Sequence[FilmPiece], shapes: Mapping[str, Sequence[Shape]]
-) -> tuple[list[int], dict[str, list[int]]]:
-    """Return the frames that the page shows, and those whose layouts it holds of each piece; none if there is no room for two.
-
-    Frames are taken evenly, with those before and after each change of topology.
-    """
-    times, keys = pieces[0].times, {piece.name: piece.key_frames() for piece in pieces}
-    for stride in range(1, len(times) + 1):
-        kept = {*times[::stride], times[-1]}
-        for piece in pieces:
-            kept |= {time for change in piece.changes for time in (change - 1, change) if time >= times[0]}
-        shown = sorted(kept)
-        stored = {piece.name: _stored_frames(keys[piece.name], shown) for piece in pieces}
-        vertices = sum(len(stored[piece.name]) * len(shapes[piece.name][-1].surface) for piece in pieces)
-        if _VERTEX * vertices <= _ROOM:
-            return shown, stored
-    return [], {}
-
-
-def _stored_frames(keys: Sequence[int], shown: Sequence[int]) -> list[int]:
-    """Return those frames of the shown ones that are keys, or lie between keys of which one is not shown."""
-    seen, stored = set(shown), []
-    for time in shown:
-        after = bisect_left(keys, time)
-        if keys[after] == time or not seen.issuperset(keys[after - 1 : after + 1]):
-            stored.append(time)
-    return stored
 
 
 def _packed(

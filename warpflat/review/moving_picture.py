@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import reading
 from warpflat.core.output import atomic_path, output_folder, record_file
@@ -80,6 +80,8 @@ def _evenly(times: Sequence[int], most: int) -> list[int]:
 
 def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -> list[Image.Image]:
     """Return pictures of all patterns at these frames, RGB, of one size."""
+    from PIL import Image, ImageDraw
+
     topologies = dict[str, list[_Drawn]]()
     for piece in pieces:
         for shape in map(piece.shape, piece.changes):
@@ -98,15 +100,41 @@ def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -
     low, size = everything.min(axis=0), np.ptp(everything, axis=0)
     scale = (long_side - 2 * _MARGIN - _FOOT) / float(size.max())
     wide, high = (int(2 * np.ceil((extent * scale + 2 * _MARGIN) / 2)) for extent in size)
-    first = pieces[0]
-    return [
-        _with_foot(
-            _image(frame, low, scale, (high, wide), first.scale),
-            f"{first.measure('stage', time) or 'frame'} {time}/{first.times[-1]}",
-            first.scale,
-        )
-        for frame, time in zip(frames, times, strict=True)
-    ]
+    first, images = pieces[0], list[Image.Image]()
+    for frame, time in zip(frames, times, strict=True):
+        # The patterns, coloured by energy, with their outlines.
+        colours = np.full((high, wide, 3), float(_PAPER))
+        lines = Image.new("L", (2 * wide, 2 * high))
+        pen = ImageDraw.Draw(lines)
+        for drawn, points, density in frame:
+            grid = np.zeros((len(points), 3))
+            grid[:, 0] = 2.0 * ((points[:, 0] - low[0]) * scale + _MARGIN)
+            grid[:, 1] = 2.0 * (high - (points[:, 1] - low[1]) * scale - _MARGIN)
+            samples = rasterise(grid, drawn.triangles, (2 * high, 2 * wide))
+            pixels = shade(samples, 2, grid, drawn.triangles, energy_colours(density, first.scale), face=drawn.face)
+            cover = pixels[..., 3:] / 255.0
+            colours = colours * (1.0 - cover) + pixels[..., :3] * cover
+            for begin, end in grid[drawn.edges, :2].tolist():
+                pen.line((*begin, *end), fill=_OUTLINE, width=2)
+        image = Image.fromarray(np.round(colours).astype(np.uint8))
+        image.paste(_INK, mask=lines.reduce(2))
+        # The line below: which frame it is, and the scale of its colours.
+        page = Image.new("RGB", (wide, high + _FOOT), (_PAPER,) * 3)
+        page.paste(image)
+        pen, middle = ImageDraw.Draw(page), high + _FOOT // 2 - 2
+        words = f"{first.measure('stage', time) or 'frame'} {time}/{first.times[-1]}"
+        pen.text((_MARGIN, middle), words, fill=_INK, anchor="lm")
+        if first.scale <= SMALLEST_SCALE:
+            pen.text((wide - _MARGIN, middle), "no strain", fill=_INK, anchor="rm")
+        else:
+            limit = f"{first.scale:.3g} J/m2"  # the font has no superscripts
+            right = wide - _MARGIN - int(pen.textlength(limit))
+            ramp = np.round(255.0 * energy_colours(np.linspace(0.0, 1.0, 60), 1.0)).astype(np.uint8)
+            page.paste(Image.fromarray(np.tile(ramp, (8, 1, 1))), (right - 66, middle - 4))
+            for x, text in ((right - 76, "0"), (right, limit)):
+                pen.text((x, middle), text, fill=_INK, anchor="lm")
+        images.append(page)
+    return images
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,52 +145,3 @@ class _Drawn:
     face: IntArray
     edges: IntArray
     count: int
-
-
-def _image(
-    frame: Sequence[tuple[_Drawn, FloatArray, FloatArray]],
-    low: FloatArray,
-    scale: float,
-    shape: tuple[int, int],
-    energy: float,
-) -> Image.Image:
-    """Return the patterns of one frame, coloured by energy, with their outlines."""
-    from PIL import Image, ImageDraw
-
-    high, wide = shape
-    page = np.full((high, wide, 3), float(_PAPER))
-    lines = Image.new("L", (2 * wide, 2 * high))
-    pen = ImageDraw.Draw(lines)
-    for piece, points, density in frame:
-        grid = np.zeros((len(points), 3))
-        grid[:, 0] = 2.0 * ((points[:, 0] - low[0]) * scale + _MARGIN)
-        grid[:, 1] = 2.0 * (high - (points[:, 1] - low[1]) * scale - _MARGIN)
-        samples = rasterise(grid, piece.triangles, (2 * high, 2 * wide))
-        pixels = shade(samples, 2, grid, piece.triangles, energy_colours(density, energy), face=piece.face)
-        cover = pixels[..., 3:] / 255.0
-        page = page * (1.0 - cover) + pixels[..., :3] * cover
-        for begin, end in grid[piece.edges, :2].tolist():
-            pen.line((*begin, *end), fill=_OUTLINE, width=2)
-    image = Image.fromarray(np.round(page).astype(np.uint8))
-    image.paste(_INK, mask=lines.reduce(2))
-    return image
-
-
-def _with_foot(image: Image.Image, words: str, energy: float) -> Image.Image:
-    """Return a picture with a line below it: which frame it is, and the scale of its colours."""
-    from PIL import Image, ImageDraw
-
-    page = Image.new("RGB", (image.width, image.height + _FOOT), (_PAPER,) * 3)
-    page.paste(image)
-    pen, middle = ImageDraw.Draw(page), image.height + _FOOT // 2 - 2
-    pen.text((_MARGIN, middle), words, fill=_INK, anchor="lm")
-    if energy <= SMALLEST_SCALE:
-        pen.text((page.width - _MARGIN, middle), "no strain", fill=_INK, anchor="rm")
-        return page
-    limit = f"{energy:.3g} J/m2"  # the font has no superscripts
-    right = page.width - _MARGIN - int(pen.textlength(limit))
-    ramp = np.round(255.0 * energy_colours(np.linspace(0.0, 1.0, 60), 1.0)).astype(np.uint8)
-    page.paste(Image.fromarray(np.tile(ramp, (8, 1, 1))), (right - 66, middle - 4))
-    for x, text in ((right - 76, "0"), (right, limit)):
-        pen.text((x, middle), text, fill=_INK, anchor="lm")
-    return page

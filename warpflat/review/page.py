@@ -12,6 +12,7 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
@@ -86,11 +87,26 @@ def pack_frames(folder: Path) -> dict[str, Any] | None:
 
 def pack_pictures(folder: Path, files: Sequence[str]) -> dict[str, str]:
     """Pack the pictures among the files of a folder for the page; return them by name."""
-    return {
-        file: _image(latest_file(folder / file))
-        for file in files
-        if file.endswith(".png") and file != "contact_sheet.png"
-    }
+    from PIL import Image
+
+    packed = dict[str, str]()
+    for file in files:
+        if not file.endswith(".png") or file == "contact_sheet.png":
+            continue
+        path = latest_file(folder / file)
+        best, kind, small = _bytes(path), "png", io.BytesIO()
+        # No other format is tried, some of which start a program; and the size is known before a pixel is decoded.
+        wide, high = struct.unpack(">II", best[16:24]) if best[:8] == _PNG and len(best) >= 24 else (0, 0)
+        if not 0 < wide * high <= _MOST_PIXELS:
+            raise InputError(f"{path}: is no PNG of at most {_MOST_PIXELS:,} pixels; run the scene again")
+        with guarded(path, "picture"), Image.open(io.BytesIO(best), formats=["PNG"]) as picture:
+            if max(picture.size) < 65_000:
+                # As JPEG where that is smaller. WebP has half the bytes, and takes ten times as long.
+                picture.convert("RGB").save(small, "JPEG", quality=_QUALITY)
+                if len(small.getvalue()) < len(best):
+                    best, kind = small.getvalue(), "jpeg"
+        packed[file] = f"data:image/{kind};base64,{base64.b64encode(best).decode('ascii')}"
+    return packed
 
 
 def write_review(
@@ -176,7 +192,18 @@ def _page(
             )
     notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
     shown = {**pack_pictures(folder, [file for file in files if file not in pictures]), **pictures}
-    order = sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
+    # What pictures show, for who does not see them.
+    shows = {
+        "picture.png": f"{name} in space beside its pattern, coloured by strain energy",
+        "drape.png": f"{name} worn: gap to the body and strain, from the front, the side and the back",
+        "wear.png": "Strain of each piece when worn, along the warp and the weft",
+        "walked.png": "The two sides of every seam laid upon each other",
+        "corrected.png": "Outlines before and after the correction",
+    }
+    images = []
+    for file in sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file)):
+        words = shows.get(file, file.removesuffix(".png").replace("_", " ").replace(".", " "))
+        images.append(f'<img alt="{escape(words)}" src="{shown[file]}">')
     drawings = []
     for file in sorted(file for file in files if file.endswith(".svg")):
         text = base64.b64encode(_bytes(latest_file(folder / file))).decode("ascii")
@@ -228,15 +255,17 @@ def _page(
             f'<img alt="The garment comes to rest on the body" src="data:image/webp;base64,{text}">'
             "<p>Front, left side and back, coloured by the gap to the body; frames.usdc holds the same in space.</p>"
         )
+    # The files lie beside the page.
+    links = "".join(
+        f'<li><a href="{quote(file)}">{escape(file)}</a></li>'
+        for file in sorted(set(files), key=lambda file: (file != "pattern.pdf", file))
+    )
     sections = [
         ("", f'{verdict_words(metrics)}<div class="cards">{boxes}</div>'),
         ("Ease", ease_table(metrics)),
         ("From the development to rest", film),
         ("Worn: from the designed surface to rest", worn),
-        (
-            "Pictures",
-            "".join(f'<img alt="{escape(_picture_words(file, name))}" src="{shown[file]}">' for file in order),
-        ),
+        ("Pictures", "".join(images)),
         ("Pattern", "".join(drawings)),
         ("Cuts and darts", ledger_table(metrics)),
         ("Seams", seam_table(metrics)),
@@ -244,7 +273,7 @@ def _page(
         ("Energy, stage by stage", energy_table(metrics)),
         ("Body", size_table(metrics)),
         ("Notes", "<ul>" + "".join(f"<li>{escape(note)}</li>" for note in notes) + "</ul>" if notes else ""),
-        ("Files", _file_links(files)),
+        ("Files", f'<ul class="files">{links}</ul>'),
     ]
     body = "".join(f"<h2>{title}</h2>{content}" if title else content for title, content in sections if content)
     script = f"<script>{_data('viewer.js')}</script>" if packed else ""
@@ -321,46 +350,6 @@ def ease_table(metrics: Mapping[str, Any]) -> str:
         for level, girth in (metrics.get("girths") or {}).items()
     ]
     return _table(("level", "body", "garment", "ease", "asked for"), rows)
-
-
-def _picture_words(file: str, name: str) -> str:
-    """Return what a picture shows, for who does not see it."""
-    return {
-        "picture.png": f"{name} in space beside its pattern, coloured by strain energy",
-        "drape.png": f"{name} worn: gap to the body and strain, from the front, the side and the back",
-        "wear.png": "Strain of each piece when worn, along the warp and the weft",
-        "walked.png": "The two sides of every seam laid upon each other",
-        "corrected.png": "Outlines before and after the correction",
-    }.get(file, file.removesuffix(".png").replace("_", " ").replace(".", " "))
-
-
-def _file_links(files: Sequence[str]) -> str:
-    """Return a list of links to the files, which lie beside the page."""
-    from urllib.parse import quote
-
-    first = [file for file in ("pattern.pdf",) if file in files]
-    items = "".join(
-        f'<li><a href="{quote(file)}">{escape(file)}</a></li>' for file in [*first, *sorted(set(files) - {*first})]
-    )
-    return f'<ul class="files">{items}</ul>'
-
-
-def _image(path: Path) -> str:
-    """Return a picture as text: as JPEG where that is smaller."""
-    from PIL import Image
-
-    best, kind, small = _bytes(path), "png", io.BytesIO()
-    # No other format is tried, some of which start a program; and the size is known before a pixel is decoded.
-    wide, high = struct.unpack(">II", best[16:24]) if best[:8] == _PNG and len(best) >= 24 else (0, 0)
-    if not 0 < wide * high <= _MOST_PIXELS:
-        raise InputError(f"{path}: is no PNG of at most {_MOST_PIXELS:,} pixels; run the scene again")
-    with guarded(path, "picture"), Image.open(io.BytesIO(best), formats=["PNG"]) as picture:
-        if max(picture.size) < 65_000:
-            # WebP has half the bytes, and takes ten times as long.
-            picture.convert("RGB").save(small, "JPEG", quality=_QUALITY)
-            if len(small.getvalue()) < len(best):
-                best, kind = small.getvalue(), "jpeg"
-    return f"data:image/{kind};base64,{base64.b64encode(best).decode('ascii')}"
 
 
 def _bytes(path: Path) -> bytes:
