@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
 from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, output_options
 from warpflat.cli.run import report_run, start_warp_silently
 from warpflat.core.errors import InputError
-
-if TYPE_CHECKING:
-    from warpflat.scene.load import Scene
 
 __all__ = ["cuts"]
 
@@ -71,9 +68,30 @@ def cuts(
     loaded = load_scene(scene)
     start_warp_silently()
     target = out if out is not None else Path("out") / loaded.name
-    edits = {"rotate": rotate, "split": split, "turn": turn}
-    if any(edits.values()):
-        return _edit(loaded, target, edits, at, quiet=quiet, as_json=as_json, device=device)
+    edits = [(how, edit) for how, edit in (("rotate", rotate), ("split", split), ("turn", turn)) if edit]
+    if edits:
+        # Edit a dart, and compare the garment before and after.
+        from warpflat.cli.tables import edit_table
+        from warpflat.core.output import output_folder, write_report
+        from warpflat.scene.form_edits import edit_dart
+
+        (how, (dart, aim)), *more = edits
+        if more:
+            raise InputError(f"--{how} and --{more[0][0]}: give one edit at a time")
+        if how == "turn" and at is not None:
+            raise InputError("--at belongs to --rotate and --split")
+        if loaded.settings.mannequin is None:
+            raise InputError(f"{loaded.where}: --{how} edits the darts of a form; on a [surface] edit [[cuts]]")
+        with output_folder(target, ["edit.json", "cuts.toml"], sources=loaded.sources, guard=True) as folder:
+            made = edit_dart(loaded, dart, how=how, aim=aim, at=at, device=device)
+            data = made.as_dict()
+            _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [made.as_toml()])
+            write_report(folder / "edit.json", data, name="edit", files=["cuts.toml"])
+        if as_json:
+            click.echo((folder / "edit.json").read_text(encoding="utf-8"), nl=False)
+        elif not quiet:
+            click.echo(f"{edit_table(data)}\n\n{made.as_toml()}\n{folder}: edit.json, cuts.toml")
+        return DONE if data["after"]["converged"] else NOT_CONVERGED
     if at is not None:
         raise InputError("--at belongs to --rotate and --split")
     from warpflat.cli.progress_bar import ProgressBar
@@ -119,37 +137,3 @@ def _write_toml(folder: Path, heading: str, tables: Sequence[str]) -> None:
 
     with atomic_path(folder / "cuts.toml") as temporary:
         temporary.write_text("\n".join([f"# {heading}\n", *tables]), encoding="utf-8")
-
-
-def _edit(
-    scene: Scene,
-    target: Path,
-    edits: Mapping[str, tuple[str, str] | None],
-    at: str | None,
-    *,
-    quiet: bool,
-    as_json: bool,
-    device: str | None,
-) -> int:
-    """Edit a dart, compare the garment before and after, and write `edit.json` and `cuts.toml`."""
-    from warpflat.cli.tables import edit_table
-    from warpflat.core.output import output_folder, write_report
-    from warpflat.scene.form_edits import edit_dart
-
-    (how, (dart, aim)), *more = [(how, edit) for how, edit in edits.items() if edit]
-    if more:
-        raise InputError(f"--{how} and --{more[0][0]}: give one edit at a time")
-    if how == "turn" and at is not None:
-        raise InputError("--at belongs to --rotate and --split")
-    if scene.settings.mannequin is None:
-        raise InputError(f"{scene.where}: --{how} edits the darts of a form; on a [surface] edit [[cuts]]")
-    with output_folder(target, ["edit.json", "cuts.toml"], sources=scene.sources, guard=True) as folder:
-        edit = edit_dart(scene, dart, how=how, aim=aim, at=at, device=device)
-        data = edit.as_dict()
-        _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [edit.as_toml()])
-        write_report(folder / "edit.json", data, name="edit", files=["cuts.toml"])
-    if as_json:
-        click.echo((folder / "edit.json").read_text(encoding="utf-8"), nl=False)
-    elif not quiet:
-        click.echo(f"{edit_table(data)}\n\n{edit.as_toml()}\n{folder}: edit.json, cuts.toml")
-    return DONE if data["after"]["converged"] else NOT_CONVERGED

@@ -41,7 +41,12 @@ def example(name: str | None, out: Path | None) -> int:
         # A pipe takes whole lines.
         room = shutil.get_terminal_size().columns - width - 2 if sys.stdout.isatty() else 1000
         for each, path in found.items():
-            click.echo(f"{each.ljust(width)}  {textwrap.shorten(_first_sentence(path), room, placeholder=' ...')}")
+            # The first sentence of its first comment.
+            text = path.read_text(encoding="utf-8").removeprefix('"""')
+            comment = re.split(r'\n#?\n|"""', text, maxsplit=1)[0]
+            words = " ".join(line.lstrip("# ").strip() for line in comment.splitlines())
+            sentence = re.split(r"(?<=\.) ", words, maxsplit=1)[0].rstrip(".")
+            click.echo(f"{each.ljust(width)}  {textwrap.shorten(sentence, room, placeholder=' ...')}")
         click.echo("\nwarpflat example NAME writes one into the current folder.")
         return DONE
     key = name.removesuffix(".toml").removesuffix(".py")
@@ -81,10 +86,3 @@ def example_files() -> dict[str, Path]:
     folder = next((each for each in _FOLDERS if (each / "dome.toml").is_file()), None)
     paths = [] if folder is None else sorted(folder.iterdir())
     return {path.stem: path for path in paths if path.suffix in (".toml", ".py") and path.stem != "__init__"}
-
-
-def _first_sentence(path: Path) -> str:
-    """Return the first sentence of a file's first comment."""
-    text = path.read_text(encoding="utf-8").removeprefix('"""')
-    words = " ".join(line.lstrip("# ").strip() for line in re.split(r'\n#?\n|"""', text, maxsplit=1)[0].splitlines())
-    return re.split(r"(?<=\.) ", words, maxsplit=1)[0].rstrip(".")

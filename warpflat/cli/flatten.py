@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -210,10 +211,13 @@ def flatten(
             line = text.rstrip("/").rpartition("/")[2]
             numbers = [int(v) for v in text.split(",")] if re.fullmatch(r"[0-9]{1,18}(,[0-9]{1,18})+", text) else []
             ends = {"from": numbers[0], "to": numbers[1]} if len(numbers) == 2 else {"vertices": numbers}
+            angle: float | str = text
+            with suppress(ValueError):  # the scene refuses what is no number
+                angle = float(text)
             key, given = {
                 "--datum": ("datum", "datum" if numbers else line),
                 "--open": ("cuts", [{"name": "opening", **ends}] if len(numbers) == 2 else [{"line": line}]),
-                "--grain-angle": ("grain_angle", _degrees(text)),
+                "--grain-angle": ("grain_angle", angle),
             }[option]
             if key in own:
                 what = f"piece {quote_value(piece)}" if colon else "the piece"
@@ -244,14 +248,6 @@ def flatten(
         )
         # What is said of no option is about the mesh.
         raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", message)) from None
-
-
-def _degrees(text: str) -> float | str:
-    """Return an angle as a number, or what it is if it is none, which the scene refuses."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _drawn_seam(text: str) -> dict[str, Any]:

@@ -145,8 +145,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not isinstance(error, OSError):
             return report_internal_error(error, sys.argv[1:] if arguments is None else arguments)
         reason = system_reason(error)
-        if error.filename is None and _was_printing(error):
-            _discard_output()
+        printing = any(frame.f_code is click.echo.__code__ for frame, _ in traceback.walk_tb(error.__traceback__))
+        if error.filename is None and printing:
+            # To the null device: at the end of the process what is left of standard output would fail once more.
+            with suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nothing:
+                os.dup2(nothing.fileno(), sys.stdout.fileno())
             return _fail(f"cannot write to standard output: {reason}")
         return _fail(f"cannot read or write {error.filename or 'a temporary file'}: {reason}")
 
@@ -160,17 +163,6 @@ def _is_open(stream: TextIO | None) -> bool:
     except OSError:
         return False
     return True
-
-
-def _was_printing(error: OSError) -> bool:
-    """Return whether an error was raised while results were printed."""
-    return any(frame.f_code is click.echo.__code__ for frame, _ in traceback.walk_tb(error.__traceback__))
-
-
-def _discard_output() -> None:
-    """Send standard output to the null device: at the end of the process what is left of it would fail once more."""
-    with suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nothing:
-        os.dup2(nothing.fileno(), sys.stdout.fileno())
 
 
 def _report_signal(code: int) -> int:

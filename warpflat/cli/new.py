@@ -78,7 +78,26 @@ def new(
             raise InputError(f"a {offer.name} lies on no body; leave out --card")
         if out is not None or fabric is not None:
             raise InputError("--card draws a measurement card and writes no scene; leave out --out and --fabric")
-        _write_card(card, offer.name, tables, _body_table(size, measures, scan, card))
+        from warpflat.mannequin.card import needed_measurements, write_measurement_card
+        from warpflat.scene.style import covered_bands
+
+        table = _body_table(size, measures, scan, card)
+        if card.exists() or card.is_symlink():
+            raise InputError(f"{card}: exists and is kept; name another file")
+        if card.suffix.lower() != ".png":
+            raise InputError(f"{card}: a card is a picture; name it *.png")
+        if "scan" in table:
+            raise InputError("--card is for a tape measure; a scan is measured by itself: leave out --scan")
+        wearer = check_table(MannequinTable, {**(table or {"size": "EU 38"}), "resolution_mm": 12.0}, "command line")
+        mannequin = mannequin_from_table(wearer, path_of=Path)
+        hood = any(wish["kind"] == "hood" for wish in tables.get("finishing", ()))
+        given = set(table.get("measurements", ()))
+        guessed = {note.split(" = ")[0] for note in mannequin.notes} - given
+        card.parent.mkdir(parents=True, exist_ok=True)
+        write_measurement_card(
+            card, mannequin, needed_measurements(covered_bands(tables), hood=hood),
+            title=f"What to measure: {offer.name.replace('_', ' ')}", values=mannequin.lengths if table else None, guessed=guessed,
+        )  # fmt: skip
         click.echo(f"wrote {card}: what to measure for {offer.name.replace('_', ' ')}, and where")
         return DONE
     if size is None and not measures and scan is None and (offer.on_body or out is None):
@@ -127,35 +146,6 @@ def _body_table(size: str | None, measures: tuple[str, ...], scan: Path | None, 
         # Scenes start from their own folder.
         table["scan"] = Path(os.path.relpath(scan, file.parent)).as_posix()
     return table
-
-
-def _write_card(card: Path, garment: str, tables: Mapping[str, Any], table: Mapping[str, Any]) -> None:
-    """Draw the measurement card of a garment, with the values of a body that is given.
-
-    Raises:
-        InputError: the file exists or cannot be written, or there is no such body.
-    """
-    from warpflat.core.toml_file import check_table
-    from warpflat.mannequin.card import needed_measurements, write_measurement_card
-    from warpflat.mannequin.table import MannequinTable, mannequin_from_table
-    from warpflat.scene.style import covered_bands
-
-    if card.exists() or card.is_symlink():
-        raise InputError(f"{card}: exists and is kept; name another file")
-    if card.suffix.lower() != ".png":
-        raise InputError(f"{card}: a card is a picture; name it *.png")
-    if "scan" in table:
-        raise InputError("--card is for a tape measure; a scan is measured by itself: leave out --scan")
-    body = check_table(MannequinTable, {**(table or {"size": "EU 38"}), "resolution_mm": 12.0}, "command line")
-    mannequin = mannequin_from_table(body, path_of=Path)
-    hood = any(wish["kind"] == "hood" for wish in tables.get("finishing", ()))
-    given = set(table.get("measurements", ()))
-    guessed = {note.split(" = ")[0] for note in mannequin.notes} - given
-    card.parent.mkdir(parents=True, exist_ok=True)
-    write_measurement_card(
-        card, mannequin, needed_measurements(covered_bands(tables), hood=hood),
-        title=f"What to measure: {garment.replace('_', ' ')}", values=mannequin.lengths if table else None, guessed=guessed,
-    )  # fmt: skip
 
 
 def _read_choices(words: tuple[str, ...]) -> tuple[str | None, dict[str, str]]:

@@ -75,11 +75,38 @@ def summary_lines(
     wearer = metrics.get("wear", {}).get("wearer")
     if wearer:
         lines.append(_clipped(wearer_words(wearer, draped="drape" in metrics), width))
-    if "drape" in metrics:
-        head = "lies on the form" if wearer else "lies on the surface"
-    else:
-        head = "lies on the form" if wearer else "fit"
-    lines += _fit_lines(pieces, head, width)
+    worn = {name: piece for name, piece in pieces.items() if piece.get("wear")}
+    if worn:
+        head = "lies on the form" if wearer else "lies on the surface" if "drape" in metrics else "fit"
+        all_of_it = garment_wear(worn)
+        beyond = f"{100 * all_of_it['outside']:.1f} % beyond the limit"
+        if all_of_it["fits"]:
+            # The strains along both threads, 5 to 95 % of each piece's cloth, and the highest pressure.
+            wears, ranges = [piece["wear"] for piece in worn.values()], []
+            for thread in ("warp", "weft"):
+                low = 100 * min(wear[f"strain_{thread}"]["p05"] for wear in wears)
+                high = 100 * max(wear[f"strain_{thread}"]["p95"] for wear in wears)
+                ranges.append(f"{thread} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} %")
+            highest = max(wear["pressure"]["max"] for wear in wears)
+            ranges += [f"at most {highest:,.0f} Pa"] if highest >= 1.0 else []
+            lines.append(_clipped(f"{head}: yes; {beyond}; {', '.join(ranges)}", width))
+        else:
+            # The worst place, and the best advice for it.
+            unfit = [name for name in worn if not worn[name]["wear"]["fits"]]
+            worst = max(unfit, key=lambda name: worn[name]["wear"]["outside"] * worn[name]["area_m2"])
+            wear = worn[worst]["wear"]
+            sewn = "outside_unsewn" in wear
+            before = wear["outside_unsewn"] if sewn else wear["outside"]
+            # Of cuts that were tried the one that leaves least; those that were not are in the order of their promise.
+            best = min(
+                wear["would_help"],
+                key=lambda r: 1.0 if r["outside_after"] is None else r["outside_after"],
+                default=None,
+            )
+            advice = no_cut_words(before, sewn=sewn) if best is None else remedy_words(best, before, sewn=sewn)
+            place = next(iter(wear["where_not"]), "").partition(" (limit")[0]
+            lines.append(_clipped(f"{head}: no: {_some(unfit)}; {beyond}; {worst} {place}", width))
+            lines.append(_clipped(f"  {advice}", width))
     seams, constraints = metrics.get("seams", ()), metrics.get("constraints", ())
     if seams or constraints:
         parts = []
@@ -133,24 +160,16 @@ def summary_lines(
                 _clipped(f"corrected: misfit {first:.2f} to {last:.2f} mm in {rounds}; {found['reason']}", width)
             )
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
-    return [*lines, _listed(f"files: {folder}: ", ordered, width), _clipped(_last_line(metrics, files, folder), width)]
-
-
-def _last_line(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> str:
-    """Return in plain words whether it fits, which openings it needs, and what to print or open next.
-
-    Where a garment was draped, the drape says whether it fits.
-    """
-    pieces, drape = metrics["pieces"], metrics.get("drape")
-    judged = [piece["wear"] for piece in pieces.values() if piece.get("wear")]
-    wearer = metrics.get("wear", {}).get("wearer") or {}
+    lines.append(_listed(f"files: {folder}: ", ordered, width))
+    # In plain words whether it fits, which openings it needs, and what to print or open next. A drape says best whether it fits.
+    drape = metrics.get("drape")
     parts = []
     if not all(piece["converged"] for piece in pieces.values()):
         parts.append("not at rest")
     if drape is not None:
         parts.append("fits when worn" if drape["fits"] else "does not fit when worn")
-    elif judged:
-        fits = all(wear["fits"] for wear in judged) and wearer.get("fits", True)
+    elif worn:
+        fits = all(piece["wear"]["fits"] for piece in worn.values()) and (wearer or {}).get("fits", True)
         parts.append("fits by its strain" if fits else "does not fit by its strain: the cloth is held beyond its limit")
     shut = [
         f"{ring['name']} {ring['opening_needed_mm'] / 10:g} cm"
@@ -159,7 +178,8 @@ def _last_line(metrics: Mapping[str, Any], files: Sequence[str], folder: str) ->
     ]
     parts += [f"needs an opening at {' and '.join(shut)}"] if shut else []
     parts += [f"print {folder}/pattern.pdf"] if "pattern.pdf" in files else []
-    return f"result: {'; '.join(parts) or f'see {folder}'}"
+    lines.append(_clipped(f"result: {'; '.join(parts) or f'see {folder}'}", width))
+    return lines
 
 
 def notes_line(notes: Sequence[str]) -> str:
@@ -177,40 +197,6 @@ def notes_line(notes: Sequence[str]) -> str:
             return f"note: {line}"
     rest = f"; {len(parts) - 1} more" if len(parts) > 1 else ""
     return f"note: {parts[0]}{rest}" + ("; -v lists them" if rest else "") if parts else ""
-
-
-def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str, width: int | None) -> list[str]:
-    """Return whether all pieces fit, with their ranges or the worst place, and the best advice where one does not."""
-    worn = {name: piece for name, piece in pieces.items() if piece.get("wear")}
-    if not worn:
-        return []
-    all_of_it = garment_wear(worn)
-    beyond = f"{100 * all_of_it['outside']:.1f} % beyond the limit"
-    if all_of_it["fits"]:
-        # The strains along both threads, 5 to 95 % of each piece's cloth, and the highest pressure.
-        wears, ranges = [piece["wear"] for piece in worn.values()], []
-        for thread in ("warp", "weft"):
-            low = 100 * min(wear[f"strain_{thread}"]["p05"] for wear in wears)
-            high = 100 * max(wear[f"strain_{thread}"]["p95"] for wear in wears)
-            ranges.append(f"{thread} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} %")
-        highest = max(wear["pressure"]["max"] for wear in wears)
-        ranges += [f"at most {highest:,.0f} Pa"] if highest >= 1.0 else []
-        return [_clipped(f"{head}: yes; {beyond}; {', '.join(ranges)}", width)]
-    worst = max(
-        (name for name in worn if not worn[name]["wear"]["fits"]),
-        key=lambda name: worn[name]["wear"]["outside"] * worn[name]["area_m2"],
-    )
-    wear = worn[worst]["wear"]
-    sewn = "outside_unsewn" in wear
-    before = wear["outside_unsewn"] if sewn else wear["outside"]
-    # Of cuts that were tried the one that leaves least; those that were not are in the order of their promise.
-    best = min(
-        wear["would_help"], key=lambda r: 1.0 if r["outside_after"] is None else r["outside_after"], default=None
-    )
-    advice = no_cut_words(before, sewn=sewn) if best is None else remedy_words(best, before, sewn=sewn)
-    place = next(iter(wear["where_not"]), "").partition(" (limit")[0]
-    unfit = [name for name in worn if not worn[name]["wear"]["fits"]]
-    return [_clipped(f"{head}: no: {_some(unfit)}; {beyond}; {worst} {place}", width), _clipped(f"  {advice}", width)]
 
 
 def _within(millimetres: float) -> str:
