@@ -84,7 +84,14 @@ def run_task(task: Task, out: Path) -> Row:
             return done
         if has_killed(task, out):
             return set_aside(task, out)
-        _note_start(task, out)
+        # Whatever has the name of the count of starts by now is not followed, nor waited for.
+        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        try:
+            with os.fdopen(os.open(_started(task, out), flags, 0o666), "ab") as file:
+                if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                    file.write(f"{platform.node() or 'here'} {os.getpid()}\n".encode())
+        except OSError as error:
+            raise InputError(f"{_started(task, out)} cannot be written ({error.strerror})") from None
         try:
             from warpflat.scene.run import run_scene
 
@@ -140,17 +147,6 @@ def _starts(task: Task, out: Path) -> list[str]:
 
 def _started(task: Task, out: Path) -> Path:
     return out / f"{task.key}.started"
-
-
-def _note_start(task: Task, out: Path) -> None:
-    # Whatever has the name by now is not followed, nor waited for.
-    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-    try:
-        with os.fdopen(os.open(_started(task, out), flags, 0o666), "ab") as file:
-            if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                file.write(f"{platform.node() or 'here'} {os.getpid()}\n".encode())
-    except OSError as error:
-        raise InputError(f"{_started(task, out)} cannot be written ({error.strerror})") from None
 
 
 def set_aside(task: Task, out: Path) -> Row:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -122,8 +121,22 @@ def comparison_table(comparison: Comparison) -> str:
     blocks = []
     for piece in comparison.pieces:
         distances = list(comparison.distances(piece).values())
+        measures = [comparison.results[fabric][piece].measures for fabric in comparison.fabrics]
+        borders = [comparison.borders(fabric, piece) for fabric in comparison.fabrics]
+        worn = [(thread, [m["wear"][f"strain_{thread}"] for m in measures]) for thread in ("warp", "weft")]
         rows = [
-            *_measure_rows(comparison, piece),
+            ("area [cm2]", [f"{1e4 * m['area_m2']:.1f}" for m in measures]),
+            *((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]) for name in borders[0]),
+            ("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]),
+            ("model energy [mJ]", [f"{1e3 * m['model_energy_j']:.4g}" for m in measures]),
+            ("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]),
+            *(
+                (f"strain {thread} [%]", [f"{100 * of['min']:+.1f} to {100 * of['max']:+.1f}" for of in each])
+                for thread, each in worn
+            ),
+            ("beyond limit [%]", [f"{100 * m['wear']['outside']:.1f}" for m in measures]),
+            ("fits", ["yes" if m["wear"]["fits"] else "no" for m in measures]),
+            ("converged", ["yes" if m["converged"] else "NO" for m in measures]),
             *[(f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in distances)]) for point in distances[0]],
         ]
         blocks.append(_columns(piece, comparison.fabrics, rows))
@@ -160,34 +173,6 @@ def comparison_table(comparison: Comparison) -> str:
         )
     note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
     return "\n\n".join(blocks) + f"\n\n{note}"
-
-
-def _measure_rows(comparison: Comparison, piece: str) -> list[tuple[str, list[str]]]:
-    measures = [comparison.results[fabric][piece].measures for fabric in comparison.fabrics]
-    borders = [comparison.borders(fabric, piece) for fabric in comparison.fabrics]
-
-    def row(name: str, cell: Callable[[Any], str]) -> tuple[str, list[str]]:
-        return name, [cell(m) for m in measures]
-
-    def strains(thread: str) -> Callable[[Any], str]:
-        def cell(m: Any) -> str:
-            strain = m["wear"][f"strain_{thread}"]
-            return f"{100 * strain['min']:+.1f} to {100 * strain['max']:+.1f}"
-
-        return cell
-
-    return [
-        row("area [cm2]", lambda m: f"{1e4 * m['area_m2']:.1f}"),
-        *((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]) for name in borders[0]),
-        row("strain energy [mJ]", lambda m: f"{1e3 * m['strain_energy_j']:.4g}"),
-        row("model energy [mJ]", lambda m: f"{1e3 * m['model_energy_j']:.4g}"),
-        row("length error [%]", lambda m: f"{100 * m['length_error']:.2f}"),
-        row("strain warp [%]", strains("warp")),
-        row("strain weft [%]", strains("weft")),
-        row("beyond limit [%]", lambda m: f"{100 * m['wear']['outside']:.1f}"),
-        row("fits", lambda m: "yes" if m["wear"]["fits"] else "no"),
-        row("converged", lambda m: "yes" if m["converged"] else "NO"),
-    ]
 
 
 def _columns(title: str, fabrics: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:

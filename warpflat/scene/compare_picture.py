@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from warpflat.core.arrays import FloatArray
 from warpflat.core.output import atomic_path
 from warpflat.export.figure import new_figure
 from warpflat.export.letters import all_letters
@@ -93,7 +92,19 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
     for row, piece in enumerate(comparison.pieces):
         whole = figure.add_subplot(grid[row * _CLOSE_UPS : (row + 1) * _CLOSE_UPS, 0])
         _draw_outlines(whole, comparison, piece, width=1.4)
-        places = _furthest_apart(comparison, piece)
+        # The named points that are furthest apart, or the one of the outline that is.
+        first, *others = [comparison.layouts[fabric][piece] for fabric in comparison.fabrics]
+        points = comparison.points(piece)
+        if not points:
+            faces = comparison.results[comparison.fabrics[0]][piece].faces
+            outline = np.concatenate([np.unique(loop) for loop in border_loops(faces)])
+            moved = np.max([np.linalg.norm(other - first, axis=1) for other in others], axis=0)
+            points = {"furthest apart": int(outline[np.argmax(moved[outline])])}
+        places = []
+        for label, vertex in points.items():
+            apart = max(float(np.linalg.norm(other[vertex] - first[vertex])) for other in others)
+            places.append((label, np.mean([layout[vertex] for layout in (first, *others)], axis=0), apart))
+        places = sorted(places, key=lambda place: -place[2])[:_CLOSE_UPS]
         for number, (label, at, apart) in enumerate(places):
             close = figure.add_subplot(grid[row * _CLOSE_UPS + number, 1])
             _draw_outlines(close, comparison, piece, width=1.8)
@@ -150,21 +161,3 @@ def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: flo
         for loop in outline(comparison.results[fabric][piece], comparison.layouts[fabric][piece]):
             axis.plot(*loop.T, color=colour, linewidth=width, linestyle=(0, dashes) if dashes else "-")
     axis.set_aspect("equal")
-
-
-def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, FloatArray, float]]:
-    """Return the named points that are furthest apart: label, place [m], distance [m]."""
-    layouts = [comparison.layouts[fabric][piece] for fabric in comparison.fabrics]
-    points = comparison.points(piece)
-    if not points:
-        loops = np.concatenate(
-            [np.unique(loop) for loop in border_loops(comparison.results[comparison.fabrics[0]][piece].faces)]
-        )
-        apart = np.max([np.linalg.norm(other - layouts[0], axis=1) for other in layouts[1:]], axis=0)
-        worst = int(loops[np.argmax(apart[loops])])
-        points = {"furthest apart": worst}
-    found = []
-    for label, vertex in points.items():
-        apart = max(float(np.linalg.norm(other[vertex] - layouts[0][vertex])) for other in layouts[1:])
-        found.append((label, np.mean([layout[vertex] for layout in layouts], axis=0), apart))
-    return sorted(found, key=lambda entry: -entry[2])[:_CLOSE_UPS]

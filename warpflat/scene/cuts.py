@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
     from warpflat.solver.options import RelaxOptions
     from warpflat.surface.mesh import Surface
-    from warpflat.surface.paths.trace import SurfacePath
 
 __all__ = [
     "CutSequence",
@@ -76,7 +75,9 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
     from warpflat.cutting.open_tube import open_with_cuts, without_overlaps
     from warpflat.surface.connectivity import border_loops
     from warpflat.surface.cut.dart_legs import check_tip_back
-    from warpflat.surface.paths.edge_paths import path_length
+    from warpflat.surface.paths.edge_paths import as_vertex, path_length
+    from warpflat.surface.paths.section import plane_path, plane_section
+    from warpflat.surface.paths.trace import polyline_path
     from warpflat.surface.tubes import tube_borders
 
     names = [table.name or table.line or f"cut {number + 1}" for number, table in enumerate(tables)]
@@ -85,7 +86,19 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
         if table.line is None:
             line = find_unused_name(names[number], surface.lines)
             with errors_named(f"cuts[{number}]"):
-                surface = draw_line(surface, line, _path(surface, table))
+                if table.plane is None:
+                    stops: list[int | list[float]] = []
+                    for place in (table.from_, *table.through, table.to):
+                        assert place is not None  # the schema sees to it
+                        vertex = as_vertex(surface, place, as_read=True)
+                        stops.append(place if isinstance(place, list) else vertex)
+                    path = polyline_path(surface, stops)
+                elif table.plane.towards is None:
+                    path = plane_section(surface, table.plane.point, table.plane.normal)
+                else:
+                    as_vertex(surface, table.plane.point)  # says so if the point is off the piece
+                    path = plane_path(surface, table.plane.point, table.plane.normal, towards=table.plane.towards)
+                surface = draw_line(surface, line, path)
             drawn[number] = line
     border = {vertex for loop in border_loops(surface.faces) for vertex in loop.tolist()}
     paths: dict[str, list[IntArray]] = {}
@@ -118,24 +131,6 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
             f"it is a tube, cut open where its borders are nearest, {length:.1f} cm, {ends}; [[cuts]] or --open choose another line"
         )
     return CutSequence(surface=surface, plans=tuple(plans), first_auto=len(plans), notes=tuple(notes))
-
-
-def _path(surface: Surface, table: CutTable) -> SurfacePath:
-    from warpflat.surface.paths.edge_paths import as_vertex
-    from warpflat.surface.paths.section import plane_path, plane_section
-    from warpflat.surface.paths.trace import polyline_path
-
-    if table.plane is not None and table.plane.towards is None:
-        return plane_section(surface, table.plane.point, table.plane.normal)
-    if table.plane is not None:
-        as_vertex(surface, table.plane.point)  # says so if the point is off the piece
-        return plane_path(surface, table.plane.point, table.plane.normal, towards=table.plane.towards)
-    stops: list[int | list[float]] = []
-    for place in (table.from_, *table.through, table.to):
-        assert place is not None  # the schema sees to it
-        vertex = as_vertex(surface, place, as_read=True)
-        stops.append(place if isinstance(place, list) else vertex)
-    return polyline_path(surface, stops)
 
 
 def plan_automatic_cuts(

@@ -68,38 +68,29 @@ def write_drape(
     )
     metrics = {"drape": draped.measures()}
     if table.correct or table.correct_fabric is not None:
-        entry, more = _write_correction(scene, garment, draped, folder)
-        metrics["drape"]["correction"] = entry
-        files += more
+        # Correct the pattern, and write it beside the first.
+        from warpflat.core.output import optional_file
+        from warpflat.draping.correct_pattern import correct_pattern
+        from warpflat.fabric.library import find_fabric
+        from warpflat.scene.pattern_options import pattern_options
+
+        report_activity("correcting the pattern")
+        with errors_named(scene.where):
+            other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
+            found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
+            drawing = pattern_options(scene.settings.pattern, None)
+        if output.picture:
+            with optional_file(folder / "corrected.png", files) as path:
+                from warpflat.draping.correction_picture import write_correction_picture
+
+                write_correction_picture(path, found)
+        corrected = found.apply(garment)
+        assert isinstance(corrected, Garment)
+        drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
+        written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
+        metrics["drape"]["correction"] = found.measures(garment)
+        files += written.files
     return metrics, files
-
-
-def _write_correction(scene: Scene, garment: Garment, draped: Drape, folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """Correct the pattern, and write it beside the first."""
-    from warpflat.core.output import optional_file
-    from warpflat.draping.correct_pattern import correct_pattern
-    from warpflat.fabric.library import find_fabric
-    from warpflat.scene.pattern_options import pattern_options
-
-    settings = scene.settings
-    table = settings.drape
-    assert table is not None
-    report_activity("correcting the pattern")
-    with errors_named(scene.where):
-        other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
-        found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
-        drawing = pattern_options(settings.pattern, None)
-    files = list[str]()
-    if settings.output.picture:
-        with optional_file(folder / "corrected.png", files) as path:
-            from warpflat.draping.correction_picture import write_correction_picture
-
-            write_correction_picture(path, found)
-    corrected = found.apply(garment)
-    assert isinstance(corrected, Garment)
-    drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
-    written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
-    return found.measures(garment), [*files, *written.files]
 
 
 def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | None = None) -> Drape:

@@ -121,10 +121,13 @@ def split_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> 
     half = None if old.mouth_mm is None else 0.5 * old.mouth_mm
     first = cut_of_dart(replace(old, mouth_mm=half))
     second: dict[str, Any] = {"name": f"second {old.name}", "piece": old.piece}
-    if at is None and _bounds(scene, old.piece, line):
-        second |= {"line": old.line, "towards": line}
+    if at is None:
+        own = scene_form(scene)[1].pieces.get(old.piece)
+        # Whether the line is an edge of the piece, or a part of one.
+        bounds = own is not None and line in {own.parts.get(edge, edge) for edge in own.edges}
+        second |= {"line": old.line, "towards": line} if bounds else {"line": line}
     else:
-        second |= {"line": line, **({} if at is None else {"at": at})}
+        second |= {"line": line, "at": at}
     if half is not None:
         second["mouth_mm"] = half
     return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), first, second])
@@ -198,13 +201,6 @@ def _cuts_without(scene: Scene, dart: FormDart, *, keep: bool = False) -> list[d
         keys = zip(("piece", "line", "towards", "at"), dart.place, strict=True)
         cuts.append({"name": dart.name, **{key: value for key, value in keys if value is not None}, "omit": True})
     return cuts
-
-
-def _bounds(scene: Scene, piece: str, line: str) -> bool:
-    """Return whether a line is an edge of a piece, or a part of one."""
-    form = scene_form(scene)[1]
-    own = form.pieces.get(piece)
-    return own is not None and line in {own.parts.get(edge, edge) for edge in own.edges}
 
 
 def _shares(dart: FormDart, garment: Garment) -> Mapping[str, tuple[str, float]]:

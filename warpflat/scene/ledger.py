@@ -11,10 +11,9 @@ from warpflat.core.errors import InputError
 from warpflat.cutting.candidates import Peaks, find_candidates, find_peaks
 from warpflat.cutting.cut_plan import CutPlan
 from warpflat.cutting.ledger import Ledger, LedgerEntry, RankedBy, coarse_options, make_ledger, try_all
-from warpflat.flattening.result import Flattening
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.mannequin.bricks import select_bricks
-from warpflat.mannequin.darts import FormDart, dart_along, usual_darts
+from warpflat.mannequin.darts import dart_along, usual_darts
 from warpflat.mannequin.forms import Form
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.mannequin import Mannequin
@@ -132,10 +131,10 @@ def candidate_cuts(base: FormTrial, *, usual_only: bool = False) -> Iterator[dic
         base: the pieces before them.
         usual_only: the darts of a pattern book only.
     """
-    layout, bricks = base.mannequin.layout, base.bricks
+    layout, bricks, form = base.mannequin.layout, base.bricks, base.plan.form
     present = {dart.place for dart in base.recipe.darts}
     names = {(dart.piece, dart.name) for dart in base.recipe.darts}
-    for dart in usual_darts(layout, base.plan.form.vertices, bricks):
+    for dart in usual_darts(layout, form.vertices, bricks):
         if dart.place not in present:
             yield cut_of_dart(dart if (dart.piece, dart.like) in names else replace(dart, like=None))
     if usual_only:
@@ -147,28 +146,20 @@ def candidate_cuts(base: FormTrial, *, usual_only: bool = False) -> Iterator[dic
     for name, piece in base.garment.pieces.items():
         if all(is_side(brick, "right") for brick in bricks[name]):
             continue
-        for dart in _cuts_along_lines(base, name, piece, bricks[name]):
-            key = (dart.piece, dart.line, dart.part)
-            if key not in found:
-                found.add(key)
-                yield cut_of_dart(dart)
-
-
-def _cuts_along_lines(base: FormTrial, name: str, piece: Flattening, bricks: Sequence[str]) -> Iterator[FormDart]:
-    """Yield cuts of one piece from its border along lines to the peaks of its energy, and along whole lines."""
-    form = base.plan.form
-    try:
-        candidates = find_candidates(piece, base.peaks.get(name))
-    except InputError:
-        return
-    for candidate in candidates:
-        if len(candidate.paths) != 1:
+        # From the border along lines to the peaks of its energy, and along whole lines.
+        try:
+            candidates = find_candidates(piece, base.peaks.get(name))
+        except InputError:
             continue
-        row = form.pieces[name].grid_vertices[candidate.paths[0]]
-        words = candidate.name.replace(",", "").replace(" left", "").replace(" right", "")
-        dart = dart_along(base.mannequin.layout, form.vertices, bricks, row, piece=name, name=words)
-        if dart is not None:
-            yield dart
+        for candidate in candidates:
+            if len(candidate.paths) != 1:
+                continue
+            row = form.pieces[name].grid_vertices[candidate.paths[0]]
+            words = candidate.name.replace(",", "").replace(" left", "").replace(" right", "")
+            along = dart_along(layout, form.vertices, bricks[name], row, piece=name, name=words)
+            if along is not None and (key := (along.piece, along.line, along.part)) not in found:
+                found.add(key)
+                yield cut_of_dart(along)
 
 
 def with_cut(scene: Scene, cut: Mapping[str, Any], mannequin: Mannequin | None = None) -> Scene:

@@ -870,7 +870,13 @@ class SceneTable(Table):
                     raise ValueError(
                         f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
                     )
-        self._check_sizes()
+        # Refuse sizes of a pattern that no size table can give.
+        if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
+            raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
+        if self.pattern.sizes and self.mannequin is not None and self.mannequin.measurements:
+            raise ValueError(
+                "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
+            )
         return self
 
     @model_validator(mode="after")
@@ -878,14 +884,3 @@ class SceneTable(Table):
         if self.drape is not None and self.half:
             raise ValueError("a drape needs the whole garment: leave out half, or [drape]")
         return self
-
-    def _check_sizes(self) -> None:
-        """Refuse sizes of a pattern that no size table can give."""
-        if not self.pattern.sizes:
-            return
-        if self.mannequin is None or self.mannequin.size is None:
-            raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
-        if self.mannequin.measurements:
-            raise ValueError(
-                "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
-            )
