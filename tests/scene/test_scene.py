@@ -343,7 +343,11 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
         assert "Measures" in guide
         assert "from the back" in guide
         for text in (guide, sheets, *drawn):
-            named = set(re.findall(r"zip|button|vent|slit|keyhole", text.replace(path.stem, "").replace(own_name, "")))
+            named = set(
+                re.findall(
+                    r"zip|button|vent|slit|keyhole|wrap|godet", text.replace(path.stem, "").replace(own_name, "")
+                )
+            )
             assert openings <= named
 
 

@@ -319,6 +319,7 @@ def _annotations(
             words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
         return spot is not None
 
+    beyond = list[Any]()
     for fold in piece.fold_edges:
         # A line beside the fold whose two arms point to it, with words along it.
         start, span = fold.line[0], fold.line[-1] - fold.line[0]
@@ -343,17 +344,10 @@ def _annotations(
         for stroke in bracket:
             room.take(shapely.LineString(stroke.points))
         if paper is not None:
-            run = BEYOND_FOLD * span / length
-            room.take(
-                shapely.Polygon(
-                    [
-                        start - run,
-                        start - run - BEYOND_FOLD * inwards,
-                        fold.line[-1] + run - BEYOND_FOLD * inwards,
-                        fold.line[-1] + run,
-                    ]
-                )
-            )
+            run, out = BEYOND_FOLD * span / length, BEYOND_FOLD * inwards
+            ends = start - run, fold.line[-1] + run
+            beyond.append(shapely.Polygon([ends[0], ends[0] - out, ends[1] - out, ends[1]]))
+            room.take(beyond[-1])
 
     # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
     first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
@@ -373,9 +367,11 @@ def _annotations(
     }
     drawn = [shapely.LineString(line) for _, line, _ in named]
     for index, (name, line, side) in enumerate(named):
-        # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; a vent keeps its name.
+        # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; vents and wraps keep theirs.
         kind = (
-            "hem" if name in hems and not {"vent", "slit"} & set(name.split(" ")) else name_without_number(name, called)
+            "hem"
+            if name in hems and not {"vent", "slit", "wrap"} & set(name.split(" "))
+            else name_without_number(name, called)
         )
         # One of a pair is neither left nor right, as in the sewing order.
         text = translate_name(without_side(kind) if piece.piece.is_pair else kind)
@@ -425,6 +421,9 @@ def _annotations(
                 for way in (0.0, LETTER, 2.0 * LETTER)
                 for sign, out in zip((1.0, -1.0), aside, strict=True)
             ]
+            # Where the sheets' joint runs through all of them, the fold still counts.
+            off = [min(shapely.distance(shapely.Point(place), beyond), default=np.inf) for place in places]
+            places = [place for place, away in zip(places, off, strict=True) if away > half - LETTER_GAP] or places
             beside = [Spot(x=float(x), y=float(y)) for x, y in places]
             write(letter, LETTER, beside, bold=True, avoid=slits, enough=LETTER_CLEAR)
     return strokes, words
