@@ -206,8 +206,8 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         steps.append(
             SewingStep.at(
                 translate(
-                    "Fold the ties lengthways, sew and turn them. One is caught in the wrap edge of each front where it is marked; leave a gap "
-                    "in the right side seam there for the inner one: {pieces}.",
+                    "Fold the ties lengthways, sew and turn them. One is caught in the wrap edge of each front where it is marked; leave a "
+                    "gap in the right side seam there for the inner one: {pieces}.",
                     pieces=called(tied),
                 ),
                 pieces=[*ties, *tied],
