@@ -53,8 +53,15 @@ def style_options(tables: Mapping[str, Any]) -> dict[str, str]:
         tables: of its scene.
     """
     form, found = _form(tables), dict[str, str]()
+    # Edges to which a skirt of its own is sewn.
+    skirted = {
+        wish.get("edge")
+        for wish in tables.get("finishing", ())
+        if wish["kind"] in ("flounce", "ruffle") and wish.get("width_mm", 0.0) > _SKIRT
+    }
     for key, part in (("length", _body_part(form)), ("sleeve-length", "arm")):
-        if _hem(form, part) and not (key == "length" and _skirt_of(tables, _line_of(_hem(form, part), part))):
+        hem = _hem(form, part)
+        if hem and not (key == "length" and _line_of(hem, part) in skirted):
             found[key] = ", ".join(_line_of(level, part) for level in _lengths(form, part))
     if _hem(form, "arm"):
         found["sleeve-width"] = "cm"
@@ -63,7 +70,10 @@ def style_options(tables: Mapping[str, Any]) -> dict[str, str]:
         found["hem-LINE"] = "cm, at " + ", ".join(_HEM_LINES[_body_part(form)])
     if _has_neck(form):
         found |= {f"neck-{what}": "cm" for what in ("depth", "width")}
-    kinds = [f"{kind}-{where}" for kind in ("zip", "buttons") for where in _closings(form)]
+    names = " ".join(form.pieces)
+    places = [where for where in ("front", "back") if where in names]
+    places += [] if "leg_left" in form.pieces else ["side"]
+    kinds = [f"{kind}-{where}" for kind in ("zip", "buttons") for where in places]
     found["closure"] = ", ".join(
         [kind for kind in kinds if kind.endswith("front")] if _opens_in_front(tables) else ["none", *kinds]
     )
@@ -90,7 +100,11 @@ def with_style(tables: Mapping[str, Any], style: Mapping[str, str], garment: str
     for key, text in style.items():
         known = style_options(found)
         if key.startswith("ease-"):
-            found = laid_over(found, {"ease": {_eased_level(found, key, garment): _number(key, text, -30.0, 100.0)}})
+            eased = {_line_of(level, _part_of(level)): level for level in _eased(_form(found))}
+            name = key.removeprefix("ease-")
+            if name not in eased:
+                raise InputError(f"--{key} makes no sense on a {garment}: {nearest(name, eased)}")
+            found = laid_over(found, {"ease": {eased[name]: _number(key, text, -30.0, 100.0)}})
             continue
         if key.startswith("hem-"):
             found = _with_risen_hem(found, key, text, garment)
@@ -156,10 +170,6 @@ def _hem(form: Form, part: str) -> str:
     return _PARTS[part][max(lowest)] if lowest else ""
 
 
-def _top(form: Form, part: str) -> str:
-    return _PARTS[part][min(_PARTS[part].index(upper) for _, upper, _ in _bands(form, part))]
-
-
 def _lengths(form: Form, part: str) -> list[str]:
     """Return the levels at which a part may end."""
     # Above the last seam across nothing can end.
@@ -186,28 +196,12 @@ def _has_neck(form: Form) -> bool:
 def _eased(form: Form) -> list[str]:
     """Return the levels that a form covers and that can have ease."""
     can = {"trunk": RING_LEVELS, "arm": ARM_LEVELS[1:], "leg": LEG_LEVELS[1:]}
-    return [
-        level
-        for part, levels in _PARTS.items()
-        if any(_bands(form, part))
-        for level in levels[levels.index(_top(form, part)) : levels.index(_hem(form, part)) + 1]
-        if level in can[part]
-    ]
-
-
-def _closings(form: Form) -> list[str]:
-    names = " ".join(form.pieces)
-    return [where for where in ("front", "back") if where in names] + (
-        ["side"] if "leg_left" not in form.pieces else []
-    )
-
-
-def _skirt_of(tables: Mapping[str, Any], edge: str) -> bool:
-    """Return whether a skirt of its own is sewn to an edge."""
-    return any(
-        wish.get("edge") == edge and wish["kind"] in ("flounce", "ruffle") and wish.get("width_mm", 0.0) > _SKIRT
-        for wish in tables.get("finishing", ())
-    )
+    found = list[str]()
+    for part, levels in _PARTS.items():
+        if uppers := [levels.index(upper) for _, upper, _ in _bands(form, part)]:
+            covered = levels[min(uppers) : levels.index(_hem(form, part)) + 1]
+            found += [level for level in covered if level in can[part]]
+    return found
 
 
 def _opens_in_front(tables: Mapping[str, Any]) -> bool:
@@ -236,14 +230,6 @@ def _number(key: str, text: str, low: float, high: float) -> float:
     if not low <= value <= high:
         raise InputError(f"--{key} {text}: a number from {low:g} to {high:g} [cm] is needed")
     return value
-
-
-def _eased_level(tables: Mapping[str, Any], key: str, garment: str) -> str:
-    levels = {_line_of(level, _part_of(level)): level for level in _eased(_form(tables))}
-    name = key.removeprefix("ease-")
-    if name not in levels:
-        raise InputError(f"--{key} makes no sense on a {garment}: {nearest(name, levels)}")
-    return levels[name]
 
 
 def _with_risen_hem(tables: dict[str, Any], key: str, text: str, garment: str) -> dict[str, Any]:

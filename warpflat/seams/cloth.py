@@ -93,6 +93,10 @@ class Cloth:
             own = np.unique(np.concatenate([self.seams[name], own]), axis=0)
         return replace(self, seams={**self.seams, name: own})
 
+    def seam_length(self, name: str) -> float:
+        """Return the length of a seam [m]."""
+        return float(np.linalg.norm(np.diff(self.vertices[self.seams[name]], axis=1), axis=2).sum())
+
     def without_seam(self, name: str) -> Cloth:
         """Return the cloth with a seam closed again."""
         return replace(self, seams={key: edges for key, edges in self.seams.items() if key != name})

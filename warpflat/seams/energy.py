@@ -302,9 +302,9 @@ def _priced(
         """Return the seams that are closed together with one."""
         if name.startswith(SOLID):
             # What lies between equal pieces: they stay equal, and are drawn once.
-            long = _length(cloth, name)
+            long = cloth.seam_length(name)
             alike = [one for one in cloth.seams if one.startswith(SOLID) and one != name]
-            return [name, *(one for one in alike if abs(_length(cloth, one) - long) < _EQUAL * long)]
+            return [name, *(one for one in alike if abs(cloth.seam_length(one) - long) < _EQUAL * long)]
         mate = other_side(name)
         return [name, mate] if mate != name and mate in cloth.seams else [name]
 
@@ -312,7 +312,7 @@ def _priced(
         return group_of(name) if anatomy.mirror is not None or name.startswith(SOLID) else [name]
 
     waiting = list[str]()
-    for name in sorted(cloth.seams, key=lambda one: _length(cloth, one), reverse=True):
+    for name in sorted(cloth.seams, key=lambda one: cloth.seam_length(one), reverse=True):
         if not any(one in waiting for one in of_equal_price(name)):
             waiting.append(name)
     closed = True
@@ -569,7 +569,7 @@ def _can_be_sewn(
         if len(twice):
             gap = piece.result.positions[order[twice]] - piece.result.positions[order[twice + 1]]
             widest = max(widest, float(np.linalg.norm(gap, axis=1).max()))
-    return _MOUTH <= widest <= _WIDE * _length(cloth, _TRIAL)
+    return _MOUTH <= widest <= _WIDE * cloth.seam_length(_TRIAL)
 
 
 def _trial_options(energy_left: float) -> RelaxOptions:
@@ -867,17 +867,10 @@ def _mesh_at(cloth: Cloth, mesh: PieceMesh) -> PieceMesh | None:
     return meshes[int(np.argmin(away))] if meshes else None
 
 
-def _length(cloth: Cloth, name: str) -> float:
-    return float(np.linalg.norm(np.diff(cloth.vertices[cloth.seams[name]], axis=1), axis=2).sum())
-
-
 def _value(gain: float, cloth: Cloth, more: int) -> float:
     """Return what a line on trial is worth: what it brings [m2], less its price, for each piece more; pieces are few."""
-    return (gain - _PRICE * 100.0 * _trial_length(cloth)) / max(more, 1)
-
-
-def _trial_length(cloth: Cloth) -> float:
-    return sum(_length(cloth, name) for name in (_TRIAL, _MATE) if name in cloth.seams)
+    length = sum(cloth.seam_length(name) for name in (_TRIAL, _MATE) if name in cloth.seams)
+    return (gain - _PRICE * 100.0 * length) / max(more, 1)
 
 
 def _renamed(cloth: Cloth, old: str, new: str) -> Cloth:

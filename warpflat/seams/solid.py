@@ -227,7 +227,7 @@ def _best_cut(
             values={key: value for key, value in made.values.items() if key != "way"},
             labels={key: label for key, label in made.labels.items() if key != "own"},
         ).with_seam(name, edges)
-        cost = _SEAM * _seam_length(made, edges) / np.sqrt(area)
+        cost = _SEAM * made.seam_length(name) / np.sqrt(area)
         part = components(made.faces.astype(np.int32), barrier=made.seam_edges().astype(np.int32))
         areas = list[float]()
         for number in np.unique(part[within]):
@@ -250,7 +250,3 @@ def _topology(faces: Ids) -> float:
         return 1.0
     holes = 2 - euler_characteristic(faces.astype(np.int32)) - 1
     return 0.01 * min(holes, 1) + 0.2 * max(holes - 1, 0)
-
-
-def _seam_length(cloth: Cloth, edges: Ids) -> float:
-    return float(np.linalg.norm(np.diff(cloth.vertices[edges], axis=1), axis=2).sum())
