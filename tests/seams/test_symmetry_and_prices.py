@@ -75,6 +75,17 @@ def test_a_sleeves_grain_runs_over_the_arm_opposite_to_its_seam() -> None:
         assert across.min() > 0.7 * thick
 
 
+def test_the_grain_of_a_garment_that_leans_runs_along_its_own_middle() -> None:
+    lean = np.radians(3.0)
+    turn = np.array([[np.cos(lean), -np.sin(lean), 0.0], [np.sin(lean), np.cos(lean), 0.0], [0.0, 0.0, 1.0]])
+    plain = lopsided(0.0)
+    leaning = warpflat.make_surface(plain.vertices @ turn.T, plain.faces, name="shirt", closed=True)
+    for piece in warpflat.find_seams(leaning).pieces:
+        if not piece.name.endswith("sleeve"):
+            ends = (piece.vertices @ turn)[piece.lines["grain"][[0, -1]]]
+            assert abs(ends[1, 0] - ends[0, 0]) < 0.2 * np.sin(lean) * np.linalg.norm(ends[1] - ends[0])
+
+
 def test_every_seam_has_a_price_or_a_reason() -> None:
     found = warpflat.find_seams(lopsided(0.0), warpflat.SeamOptions(no=("dart",), limit=1.0), fabric="woven")
     price = {seam.name: seam for seam in found.seams}

@@ -299,6 +299,10 @@ def _above_slanted_hem(
     return above if slants else mass
 
 
+# Rounds of closest points for the plane of symmetry that is taken.
+_MORE_ROUNDS = 40
+
+
 def _plane_of_symmetry(
     vertices: FloatArray, mass: FloatArray, upward: FloatArray, size: float
 ) -> tuple[FloatArray, float, float]:
@@ -317,13 +321,10 @@ def _plane_of_symmetry(
     one = np.cross(upward, [1.0, 0.0, 0.0] if abs(upward[0]) < 0.9 else [0.0, 1.0, 0.0])
     one /= np.linalg.norm(one)
     other = np.cross(upward, one)
-    found: list[tuple[float, FloatArray, float]] = []
-    for turn in range(12):
-        angle = np.pi * turn / 12
-        normal = np.cos(angle) * one + np.sin(angle) * other
-        offset = float(normal @ middle)
-        rounds = 6
-        while rounds:
+
+    def closer(normal: FloatArray, offset: float, rounds: int) -> tuple[float, FloatArray, float]:
+        """Return the asymmetry of a plane after some rounds of closest points, its normal and its offset."""
+        for _ in range(rounds):
             image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
             away, nearest = tree.query(image)
             near = away <= max(float(np.quantile(away, 0.8)), 1e-3 * size)
@@ -335,15 +336,19 @@ def _plane_of_symmetry(
             k = int(np.abs(axes.T @ normal).argmax()) if values[1] - values[0] < 0.05 * values[2] else 0
             normal = axes[:, k] * (1.0 if axes[:, k] @ normal >= 0 else -1.0)
             offset = float(normal @ (p_mean + q_mean)) / 2.0
-            rounds -= 1
         image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
-        found.append((float(np.median(tree.query(image)[0])), normal, offset))
+        return float(np.median(tree.query(image)[0])), normal, offset
+
+    normals = [np.cos(angle) * one + np.sin(angle) * other for angle in np.pi / 12 * np.arange(12)]
+    found = [closer(normal, float(normal @ middle), 6) for normal in normals]
     # A lying plane (above against below) is no garment's.
     upright = [one for one in found if abs(one[1] @ upward) < 0.5] or found
     best = min(upright, key=lambda one: one[0])
     # Round things have many: the one nearest to the axes is taken.
     as_good = [one for one in upright if one[0] <= best[0] + 0.004 * size]
     best = max(as_good, key=lambda one: (round(float(abs(one[1][0])), 2), -one[0]))
+    # The lean of a coarse mesh is found slowly.
+    best = min(best, closer(best[1], best[2], _MORE_ROUNDS), key=lambda one: one[0])
     spacing = float(np.median(tree.query(vertices[:: max(1, len(vertices) // 500)], k=2)[0][:, 1]))
     # Images fall between vertices: what the mesh's own spacing explains is no asymmetry.
     return best[1], best[2], max(0.0, best[0] - 0.5 * spacing)

@@ -458,7 +458,9 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     """Return the line along which a piece's grain runs: down the trunk and the leg, along a sleeve; None where there is none."""
     sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
     sleeves = anatomy.limbs_of("sleeve")
-    along = sleeves[sleeve].along if 0 <= sleeve < len(sleeves) else anatomy.up
+    # A garment that leans in its file hangs along its own plane of symmetry.
+    upright = anatomy.up if anatomy.mirror is None else anatomy.up - (anatomy.up @ anatomy.normal) * anatomy.normal
+    along = sleeves[sleeve].along if 0 <= sleeve < len(sleeves) else upright
     if anatomy.kind not in TAILORED:
         # A gore, a strip: nothing but its own length says how it hangs.
         spread, axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))
