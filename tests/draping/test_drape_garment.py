@@ -130,6 +130,26 @@ def test_frames_that_refer_to_a_file_not_yet_there_are_added_to_silently(
     assert written.ListTimeSamplesForPath("/World/drape/cloth.points")[0] == 8
 
 
+@pytest.mark.parametrize("before", [0, 7], ids=["alone", "after a run's frames"])
+def test_a_drape_takes_the_place_of_an_earlier_one_in_its_film(worn: warpflat.Drape, tmp_path: Path, before: int):
+    """The second drape of a pattern into a folder was put after the first, and the third could not be written."""
+    path = tmp_path / "frames.usdc"
+    if before:
+        layer = Sdf.Layer.CreateNew(str(path))
+        layer.endTimeCode = before
+        Sdf.CreatePrimInLayer(layer, "/World/front")
+        layer.Save()
+    ends = []
+    for _ in range(3):
+        write_drape_frames(path, worn)
+        written = Sdf.Layer.FindOrOpen(str(path))
+        written.Reload()
+        ends.append(written.endTimeCode)
+        assert written.ListTimeSamplesForPath("/World/drape/cloth.points")[0] == before + 1
+        assert bool(written.GetPrimAtPath("/World/front")) == (before > 0)
+    assert len(set(ends)) == 1
+
+
 def test_a_cut_is_closed_again():
     surface = warpflat.make_shape("dome", resolution=17)
     piece = warpflat.flatten(surface, fabric="woven")

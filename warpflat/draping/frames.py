@@ -75,15 +75,19 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
 
     with usd_errors(path):
         layer = Sdf.Layer.CreateAnonymous(".usda")
-        written = latest_file(path)
+        written, begin = latest_file(path), 1
         if written.is_file():
             layer.TransferContent(Sdf.Layer.FindOrOpen(str(written)))
+            begin = int(layer.endTimeCode) + 1
+            if layer.GetPrimAtPath("/World/drape"):
+                # An earlier drape, which this one takes the place of.
+                begin = int(min(layer.ListTimeSamplesForPath("/World/drape.warpflat:stage")))
+                del layer.GetPrimAtPath("/World").nameChildren["drape"]
+            if begin == 1:
+                layer.Clear()
         # The rest may refer to files that lie beside the finished file, not yet beside this one.
         stage = Usd.Stage.OpenMasked(layer, Usd.StagePopulationMask(["/World/drape"]))
-        begin = 1
-        if written.is_file():
-            begin = int(stage.GetEndTimeCode()) + 1
-        else:
+        if begin == 1:
             begin_stage(stage, is_film=True)
         group = define_group(stage, "/World/drape", kind=Kind.Tokens.component)
         chosen = choose_frames(drape.frames)
