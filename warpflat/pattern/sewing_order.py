@@ -310,7 +310,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     by_name = {piece.name: piece for piece in pieces}
     rings = {piece for seam in seams if seam.stage == _BAND_ENDS for piece, _ in seam.places}
 
-    def way(seam: SewnSeam) -> str:
+    def phrase_of(seam: SewnSeam) -> str:
         """Return how a seam is sewn: by its stage, and by what a strip or a waistband is like."""
         strips = [by_name[piece] for piece, _ in seam.places if roles.get(piece) in ("strip", "waistband")]
         if seam.stage == _WAISTBANDS:
@@ -339,10 +339,10 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         plain = [seam for seam in here if not seam.openings or stage == _LININGS]
         for seam in (seam for seam in here if seam not in plain):
             steps += [SewingStep.at(words, seam.places) for words in _opened_steps(seam, units)]
-        ways: dict[str, list[SewnSeam]] = {}
+        by_phrase: dict[str, list[SewnSeam]] = {}
         for seam in plain:
-            ways.setdefault(way(seam), []).append(seam)
-        for what, alike in ways.items():
+            by_phrase.setdefault(phrase_of(seam), []).append(seam)
+        for what, alike in by_phrase.items():
             words = [seam.words() + (translate(", open beside the zip") if _zips(seam) else "") for seam in alike]
             steps.append(
                 SewingStep.at(
