@@ -196,6 +196,30 @@ def test_of_halves_on_the_fold_both_sides_are_sewn(openings: tuple[SeamOpening, 
     assert [step.words for step in sewing_steps(drafted, "")][: len(expected)] == expected
 
 
+def test_pocket_and_straps_that_no_seam_takes_are_sewn_on():
+    """As an apron's: nothing of them is left to be bound, and the pocket is hemmed once."""
+
+    def strip(name: str, width: float, kinds: Sequence[str]) -> Piece:
+        corners = np.array([[0.0, 0.0], [width, 0.0], [width, 0.2], [0.0, 0.2], [0.0, 0.0]])
+        names = ("bottom", "right", "top", "left")
+        edges = [Edge(name=n, points=corners[k : k + 2], kind=kinds[k]) for k, n in enumerate(names)]
+        return Piece(name=name, edges=edges)
+
+    pieces = (
+        strip("panel", 0.5, ["hem"] * 4),
+        strip("pocket", 0.2, ["seam", "seam", "hem", "seam"]),
+        strip("tie", 0.1, ["cut"] * 4),
+    )
+    steps = [step.words for step in sewing_steps(draft_garment(Pattern(name="apron", pieces={"": pieces})), "")]
+    assert [step.partition(":")[0].partition(",")[0] for step in steps] == [
+        "Hem the upper edges of the patch pockets",
+        "Press the long edges of the straps to their middle",
+        "Turn up and sew the hems",
+    ]
+    assert [step.rpartition(": ")[2] for step in steps[:2]] == ["pocket.", "tie."]
+    assert "pocket" not in steps[2]
+
+
 def test_a_waistband_above_a_zip_has_a_hook():
     band = Finishing(kind="waistband", edge="neck", width=0.03)
     assert "1 hook and bar" in notions(draft_garment(finish_edges(top(ZIP), [band], gaps=["centre back"])), "")

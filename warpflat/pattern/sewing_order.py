@@ -225,8 +225,13 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         if words:
             places = [(piece, leg) for piece, of_piece in legs.items() for row in of_piece.values() for leg in row]
             steps.append(SewingStep.at(translate(phrase, darts="; ".join(words), pleats="; ".join(words)), places))
+    joined = {side.piece for seam in garment.garment.seams for row in seam.sides for side in row}
+    # A pocket of a first project is a panel like others, but nothing is sewn to its edges.
     patches = [
-        piece for piece in pieces if piece.piece.role == "pocket" and any(edge.kind == "hem" for edge in piece.edges)
+        piece
+        for piece in pieces
+        if (piece.piece.role == "pocket" or (piece.name.endswith("pocket") and piece.name not in joined))
+        and any(edge.kind == "hem" for edge in piece.edges)
     ]
     if patches:
         steps.append(
@@ -248,6 +253,22 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
                     pockets=called(welts),
                 ),
                 pieces=welts,
+            )
+        )
+    straps = [
+        piece
+        for piece in pieces
+        if piece.piece.role == "shell" and piece.name not in joined and all(edge.kind == "cut" for edge in piece.edges)
+    ]
+    if straps:
+        steps.append(
+            SewingStep.at(
+                translate(
+                    "Press the long edges of the straps to their middle, fold them along it, sew them, and sew on their "
+                    "ends last: {straps}.",
+                    straps=called(straps),
+                ),
+                pieces=straps,
             )
         )
     pleated = [piece for piece in pieces if any("pleat fold" in name for name in piece.piece.internal_lines)]
@@ -363,6 +384,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
                 )
             )
     done = {*at_zip, *(place for row in basted.values() for place in row)}
+    done |= {(piece.name, edge.name) for piece in patches for edge in piece.edges}
     left = {edge: rest for edge, row in free.items() if (rest := [place for place in row if place not in done])}
     if left:
         words = [f"{translate_name(edge)} ({called(row)})" for edge, row in left.items()]
@@ -375,7 +397,8 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     # Slits and vents are hems of their own, which the steps of their seams have turned in.
     hems: dict[float, list[Place]] = {}
     opened, cased = {"slit", "vent"}, {elastic.edge for elastic in garment.garment.elastics}
-    for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
+    pockets = {piece.name for piece in patches}
+    for piece in (piece for piece in pieces if piece.piece.role != "pocket" and piece.name not in pockets):
         for edge in piece.edges:
             name = without_side(edge.name).rstrip(" 0123456789")
             if edge.kind == "hem" and name not in cased and not opened & set(edge.name.split(" ")):
