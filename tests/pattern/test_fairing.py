@@ -54,7 +54,7 @@ def test_a_line_goes_through_the_points_that_it_is_to_meet():
     assert away[1] > 3e-3
     assert fair_line(bust, 0.15, met=np.zeros(len(bust), dtype=bool)).points == pytest.approx(free.points)
     one_way = np.column_stack([0.3 * np.maximum(ALONG - 0.15, 0.0), ALONG])
-    bent = [bend_one_way(one_way, 0.3, met=these) for these in (ALONG == ALONG[30], None)]
+    bent = [bend_one_way(one_way, 0.3, met=these) for these in (np.arange(len(ALONG)) == 30, None)]
     assert bent[0] is not None
     assert bent[1] is not None
     assert np.linalg.norm(bent[0].points[30] - one_way[30]) < 1e-3 < np.linalg.norm(bent[1].points[30] - one_way[30])

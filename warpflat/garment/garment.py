@@ -428,7 +428,8 @@ def _with_curves(
         held, folds, options: under which it was sewn, as :func:`warpflat.garment.sewing.sew` takes them.
     """
     bounds, before = dict.fromkeys(garment.pieces, bound), garment.sewn
-    assert garment.form is not None and garment.mannequin is not None
+    assert garment.form is not None
+    assert garment.mannequin is not None
     for share in (0.5, 0.0, None):
         plans = plan_curves(garment.mannequin.layout, garment.form, garment.positions, bounds, held)
         if not plans or before is None or not before.converged:
