@@ -193,6 +193,7 @@ def stand_body(
     *,
     faces_ahead: bool = False,
     as_scanned: bool = False,
+    sits: bool = False,
     landmarks: Mapping[str, float] | None = None,
 ) -> StandingBody:
     """Fit the model to an upright scan, lay it on the scan, and undo its pose where no tape is laid in it.
@@ -203,13 +204,14 @@ def stand_body(
         scanned: triangles from this one on close holes.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
         as_scanned: whether the mannequin keeps the scan's pose.
+        sits: whether the scan does.
         landmarks: known heights [m], which the fit follows.
     """
     corners = vertices[triangles]
     if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
         triangles = triangles[:, ::-1]
-    found = _stand(fit_body(vertices, triangles, landmarks), vertices, triangles, scanned, as_scanned)
-    if found.unsure is not None and not faces_ahead:
+    found = _stand(fit_body(vertices, triangles, landmarks, sits=sits), vertices, triangles, scanned, as_scanned)
+    if found.unsure is not None and not faces_ahead and not sits:
         vertices = vertices * [-1.0, 1.0, -1.0]
         fit = fit_body(vertices, triangles, landmarks)
         if fit.cost < found.fit.cost:
