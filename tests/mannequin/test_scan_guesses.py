@@ -75,3 +75,12 @@ def test_trunk_of_two_equal_parts_has_a_direction() -> None:
     left = across_trunk(slicer, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     assert abs(left[1]) < 1e-9
     assert np.linalg.norm(left) == pytest.approx(1.0)
+
+
+@needs_bodies
+def test_tapes_of_arms_above_the_shoulders_are_guesses() -> None:
+    """The shoulder's flesh comes into them: a tape laid on the mesh is 60 to 110 mm off."""
+    up, level = posed_body("male", "arms up"), posed_body("male", "arms level")
+    for name in ("biceps left", "biceps right"):
+        assert up.measures[name].guess == "the arms are raised above the shoulders"
+        assert level.measures[name].guess is None

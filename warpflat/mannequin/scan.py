@@ -37,6 +37,8 @@ _HARMONICS = 28
 _ARM_LEAN = np.radians(11.0)
 # A level of a body lies at most so far from where the mean body has it, as a share of the stature.
 _NEIGHBOUR = 0.06
+# An arm above the level of its shoulder [rad] draws the shoulder's flesh into the tapes around it.
+_OVERHEAD = np.radians(90.0)
 # What the flesh of a body that sits does not show.
 _SAT_ON = ("hip", "thigh", "knee")
 # How far a side seam follows the waves of front and back at the waist.
@@ -144,6 +146,10 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         for name in ("bust", "underbust", "waist", "hip"):
             girth = float(np.interp(levels[name], t.y, t.girth))
             measures[name] = ScanMeasure(height=found[name].height, girth=girth, guess=measures[name].guess)
+    if laid.raised > _OVERHEAD:
+        for name in measures:
+            if name.startswith(("biceps", "elbow")) and measures[name].guess is None:
+                measures[name] = replace(measures[name], guess="the arms are raised above the shoulders")
     if laid.together is not None:
         more = [_around(vertices, levels["hip"]) for vertices in (laid.together, laid.vertices)]
         hip = measures["hip"]
