@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,15 @@ sys.dont_write_bytecode = False
 # A shell lets what it starts in the background ignore Ctrl-C, and the programs that tests start would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _few_lays(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Sheets and cloth are laid in two orders of the pieces instead of eight, but for the tests of laying itself."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
+            patch.setattr("warpflat.pattern.tile_nesting.ORDERS", 2)
+        yield
 
 
 @pytest.fixture
