@@ -26,9 +26,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _few_lays(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Sheets and cloth are laid in two orders of the pieces instead of eight, but for the tests of laying itself."""
+def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A body of a size is built once, and sheets and cloth are laid in two orders of the pieces instead of eight, but for their own tests."""
+    from bodies import built_once, laid_once
+
     with pytest.MonkeyPatch.context() as patch:
+        if request.path.parent.name != "mannequin":
+            patch.setattr("warpflat.mannequin.mannequin.Mannequin.from_size", built_once)
+            patch.setattr("warpflat.mannequin.common_body.common_body_of_mannequin", laid_once)
         if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
             patch.setattr("warpflat.pattern.tile_nesting.ORDERS", 2)
         yield
