@@ -5,10 +5,15 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command import Command, command_in
+
+from warpflat.core.errors import InputError
+from warpflat.core.usd_process import UNREADABLE
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("WARPFLAT_THREADS", "1")
@@ -27,7 +32,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 @pytest.fixture(autouse=True, scope="module")
 def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
-    """A body of a size is built once, and sheets and cloth are laid in two orders of the pieces instead of eight, but for their own tests."""
+    """What others' tests need is had sooner: a body of a size is built once, sheets and cloth are laid in two orders of the pieces
+    instead of eight, and a USD file is read in this process, not in one of its own, which `fuzz` and the command's own processes do."""
     from bodies import built_once, laid_once
 
     with pytest.MonkeyPatch.context() as patch:
@@ -36,7 +42,23 @@ def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
             patch.setattr("warpflat.mannequin.common_body.common_body_of_mannequin", laid_once)
         if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
             patch.setattr("warpflat.pattern.tile_nesting.ORDERS", 2)
+        if request.path.parent.name != "fuzz":
+            patch.setattr("warpflat.surface.io.read.read_apart", _read_here)
+            patch.setattr("warpflat.review.film.read_apart", _read_here)
         yield
+
+
+def _read_here(function: str, path: Path, **arguments: Any) -> Any:
+    """In place of `read_apart`."""
+    with path.open("rb"):
+        pass
+    module, _, name = function.partition(":")
+    try:
+        return getattr(import_module(module), name)(path.absolute(), **arguments)
+    except InputError:
+        raise
+    except Exception:
+        raise InputError(UNREADABLE) from None
 
 
 @pytest.fixture
