@@ -26,8 +26,8 @@ def solidified(
         np.add.at(normal, quads[:, k], np.cross(c - a, d - b))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     count = len(vertices)
-    sides = [(int(q[k]), int(q[(k + 1) % 4])) for q in quads for k in range(4)]
-    open_sides = [side for side in sides if side[::-1] not in set(sides)] if rim else []
+    sides = {(int(q[k]), int(q[(k + 1) % 4])): None for q in quads for k in range(4)}
+    open_sides = [side for side in sides if side[::-1] not in sides] if rim else []
     faces = [*quads.tolist(), *(quads[:, ::-1] + count).tolist()]
     faces += [[b, a, a + count, b + count] for a, b in open_sides]
     return np.vstack([vertices, vertices - thickness * normal]), faces
