@@ -74,7 +74,7 @@ def row(offer: GarmentOffer, wearer: str, chosen: Mapping[str, str], out: Path |
     drawn = sum(len(cloth["pieces"]) for cloth in metrics["cloths"])
     beyond = metrics.get("wear", {}).get("outside", 0.0)
     return (
-        f"{head} {0 if converged and not flips else 1:>4} {flips:>5} {pattern['seam_difference_mm']:>6.2f} "
+        f"{head} {0 if converged and not flips else 1:>4} {flips:>5} {pattern['seam_difference_mm'] or 0.0:>6.2f} "
         f"{', '.join(shut) or 'pass':<12} {drawn:>6} {beyond:>7.2%} {sheets:>6} {time.process_time() - start:>6.0f}"
     )
 

@@ -44,6 +44,22 @@ def skirt() -> Pattern:
     return Pattern(name="skirt", pieces={"": pieces}, seams=seams)
 
 
+def test_a_patch_becomes_smaller_on_a_short_line_as_a_whole():
+    """The line is 400 mm long, of which a fifth is 80: two thirds of the width that is asked for, and of the other lengths."""
+    pattern = add_pockets(skirt(), [replace(PATCH, most_share=0.2)])
+    front, patch = pattern.piece("front", ""), pattern.piece("front_pocket", "")
+    assert np.ptp(patch.outline[:, 0]) == pytest.approx(0.08)
+    assert patch.edge("left side").length == pytest.approx(0.14 * 2 / 3)
+    marks = np.array([at for name, at in front.marks.items() if name.startswith("pocket corner")])
+    ends = [0.05 * 2 / 3, 0.05 * 2 / 3 + 0.08]
+    assert sorted(np.abs(marks[:, 0])) == pytest.approx(sorted([*ends, *ends]))
+    assert marks[:, 1] == pytest.approx(0.4 - 0.02 * 2 / 3)
+    # On a line that is long enough nothing changes.
+    assert np.ptp(add_pockets(skirt(), [replace(PATCH, most_share=0.4)]).piece("front_pocket", "").outline[:, 0]) == (
+        pytest.approx(0.12)
+    )
+
+
 def test_patch_lies_below_its_line_on_both_sides_of_the_centre():
     pattern = add_pockets(skirt(), [PATCH])
     front, patch = pattern.piece("front", ""), pattern.piece("front_pocket", "")

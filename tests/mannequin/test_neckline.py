@@ -9,6 +9,7 @@ import pytest
 from armhole_curves import depth_inside
 
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths
 from warpflat.garment.rings import find_rings, ring_line
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
@@ -69,10 +70,26 @@ def test_neckline_that_cannot_be_is_named():
         mannequin.form(narrow)
 
 
-@pytest.mark.parametrize(("power", "depth"), [(1.0, 8.0), (2.0, 10.0), (5.0, 8.0)])
-def test_cloth_below_a_deep_neckline_is_not_folded(power: float, depth: float):
+def test_neckline_by_shares_suits_every_body():
+    """As a share of the lines that it lies along it is as deep on everybody, and in centimetres on one body the same."""
+    table = {"like": "bodice", "neckline": {"side_share": 0.2, "front_share": 0.4, "back_share": 0.1}}
+    for size in ("EU 38", "EU 122"):
+        body, depths = Mannequin.from_size(size, resolution_mm=30.0), []
+        base, made = body.form("bodice"), body.form(form_from_mapping("top", table))
+        rings = body.layout.rings[body.layout.level_row["bust"] :]
+        for row, column in ((body.layout.front, 0), (body.layout.back, rings.shape[1] // 2)):
+            centre = np.concatenate([row[:0:-1, row.shape[1] // 2], rings[::-1, column]])
+            whole, left = (arc_lengths(each.vertices[centre])[-1] for each in (base, made))
+            depths.append(float(1.0 - left / whole))
+        assert depths == pytest.approx([0.4, 0.1], abs=0.01), size
+
+
+@pytest.mark.parametrize(
+    ("power", "depth", "side"), [(1.0, 8.0, 3.0), (2.0, 10.0, 3.0), (5.0, 8.0, 3.0), (1.0, 15.0, 8.0)]
+)
+def test_cloth_below_a_deep_neckline_is_not_folded(power: float, depth: float, side: float):
     mannequin = Mannequin.from_size("EU 38", resolution_mm=16.0)
-    neckline = {"side_cm": 3.0, "front_cm": depth, "front_power": power}
+    neckline = {"side_cm": side, "front_cm": depth, "front_power": power}
     made = mannequin.form(form_from_mapping("top", {"like": "bodice", "neckline": neckline}))
     surface = made.pieces["front"].surface
     corners = surface.vertices[surface.faces]
@@ -99,8 +116,7 @@ def test_v_neckline_is_straight_from_the_centre_to_the_shoulder():
 
 def test_neckline_that_would_fold_the_cloth_is_refused():
     mannequin = Mannequin.from_size("EU 38", resolution_mm=16.0)
-    deep = form_from_mapping(
-        "top", {"like": "bodice", "neckline": {"side_cm": 8.0, "front_cm": 15.0, "front_power": 1.0}}
-    )
+    # Below the bust, where the rows that lie between have no place.
+    deep = replace(shipped_form("bodice"), neckline=Neckline(side_cm=8.0, front_cm=25.0, front_power=1.0))
     with pytest.raises(InputError, match="the cloth folds below it"):
         mannequin.form(deep)

@@ -64,6 +64,17 @@ def test_the_curve_that_bends_takes_up_the_difference(ease: float, apart: float)
     assert np.angle(last / first) == pytest.approx(0.0, abs=1e-6)
 
 
+def test_the_first_side_bends_where_the_second_is_an_s():
+    """The bumps of an S would cancel: what one half gains the other half loses."""
+    x = np.linspace(0.0, 0.2, 41)
+    second, first = fit_curve(np.column_stack([x, 0.012 * np.sin(10.0 * np.pi * x)])), fit_curve(arc(0.09, 2.0, 25))
+    ease = (second.length + 1.2e-4) / first.length - 1.0
+    made = equal_sides(PIECES, [seam(ease)], {("a", "e"): first, ("b", "e"): second})
+    lengths = [made[name, "e"].length for name in "ab"]
+    assert lengths[1] - (1.0 + ease) * lengths[0] == pytest.approx(0.0, abs=2e-5)
+    assert np.linalg.norm(first.bezier[:, [0, 3]] - made["a", "e"].bezier[:, [0, 3]], axis=2).max() < SHIFT
+
+
 def test_what_would_have_to_move_far_stays():
     second = fit_curve(arc(0.5, 0.2, 25))
     curves = {("a", "e"): chords(np.array([[0.0, 0.0], [second.length + 4e-4, 0.0]])), ("b", "e"): second}

@@ -187,7 +187,8 @@ class Garment:
         of_pieces = (
             note if alone else f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages
         )
-        return (*(() if self.mannequin is None else self.mannequin.notes), *self.remarks, *of_pieces)
+        of_body = () if self.mannequin is None else self.mannequin.notes
+        return (*of_body, *(() if self.form is None else self.form.notes), *self.remarks, *of_pieces)
 
     @property
     def rings(self) -> list[GarmentRing]:

@@ -33,6 +33,7 @@ __all__ = [
     "opened_rings",
     "part_at_centres",
     "place_opening",
+    "sized_opening",
 ]
 
 CENTRES = ("centre front", "centre back")
@@ -66,6 +67,7 @@ class Opening:
         line: of the seam, as "centre back" or "side left"; pieces that run across a centre line are parted there, except
             by a keyhole, which is cut into the piece.
         length: [m]; infinite for a wrap, and for buttons or a zip all along the line.
+        share: of its line, in place of the length; 0 if that is given.
         start: how far from that end it begins [m].
         style: of a zip, "invisible" or "lapped".
         width: of a vent's flap, of the button stand or the wrap beyond its line, of a godet's hem, or of a keyhole's round end [m].
@@ -76,6 +78,7 @@ class Opening:
     kind: str
     line: str
     length: float
+    share: float = 0.0
     start: float = 0.0
     style: str = "invisible"
     width: float = 0.04
@@ -181,6 +184,20 @@ def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
     if math.isfinite(end) and end > before:
         raise InputError(f"ends {1e3 * end:.0f} mm along {opening.line!r}, which is {1e3 * before:.0f} mm long")
     return parts
+
+
+def sized_opening(form: FormResult, opening: Opening, positions: Mapping[str, FloatArray]) -> Opening:
+    """Return an opening whose share of its line has become a length, in whole centimetres; see :func:`place_opening`."""
+    whole = sum(part.whole for part in place_opening(form, opening, positions))
+    if not opening.share:
+        return opening
+    length = 0.01 * math.floor(100.0 * (opening.share * whole - opening.start))
+    if length <= 0.0:
+        raise InputError(
+            f"length_share = {opening.share:g} ends {1e3 * opening.share * whole:.0f} mm along {opening.line!r}, "
+            f"and start_mm begins at {1e3 * opening.start:.0f}"
+        )
+    return replace(opening, length=length, share=0.0)
 
 
 def one_sided(openings: Sequence[Opening]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -11,7 +12,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, part_between, points_at_lengths
+from warpflat.core.polyline import arc_lengths, part_between, points_at_lengths, polyline_length
 from warpflat.core.text import find_unused_name, other_side
 from warpflat.garment.mark_openings import lines_inside, with_notches
 from warpflat.garment.strips import Strip, strip_edges, swept
@@ -46,6 +47,7 @@ class Pocket:
         below: how far a patch or welt lies below its line, an opening below the upper end of its seam [m].
         from_centre: distance of the inner side from the centre line [m]; on a leg, which has none, it lies in the middle.
         welt: height of a welt [m].
+        most_share: of its line on the piece that a patch or welt is wide at most; its other lengths become smaller with its width.
     """
 
     kind: str
@@ -56,6 +58,7 @@ class Pocket:
     below: float = 0.0
     from_centre: float = 0.07
     welt: float = 0.015
+    most_share: float = math.inf
 
 
 def add_pockets(pattern: Pattern, pockets: Sequence[Pocket]) -> Pattern:
@@ -79,13 +82,21 @@ def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
     """Return a pattern with a patch or welt pocket and its place, on both sides of a piece that has both."""
     import shapely
 
-    pattern.piece(pocket.where, pattern.sample)
-    half, high = 0.5 * pocket.width, pocket.height if pocket.kind == "patch" else pocket.welt
-    # Of a patch on the right of the centre line, from its upper right corner leftwards.
-    shape = [(half, 0.0), (-half, 0.0), (-half, -high), (0.0, -high - _POINT), (half, -high)]
-    shape = shape if pocket.kind == "patch" else [*shape[:3], shape[4]]
-    pieces = {}
+    asked, pieces = pocket, {}
     for size, row in pattern.pieces.items():
+        like = pattern.piece(asked.where, size)
+        known = {**{edge.name: edge.points for edge in like.edges}, **like.internal_lines}
+        if asked.line not in known:
+            raise InputError(f"piece {like.name!r} has no line {asked.line!r}; {nearest(asked.line, known)}")
+        smaller = min(1.0, asked.most_share * polyline_length(known[asked.line]) / asked.width)
+        pocket = replace(
+            asked,
+            **{key: smaller * getattr(asked, key) for key in ("width", "height", "below", "from_centre")},
+        )
+        half, high = 0.5 * pocket.width, pocket.height if pocket.kind == "patch" else pocket.welt
+        # Of a patch on the right of the centre line, from its upper right corner leftwards.
+        shape = [(half, 0.0), (-half, 0.0), (-half, -high), (0.0, -high - _POINT), (half, -high)]
+        shape = shape if pocket.kind == "patch" else [*shape[:3], shape[4]]
         made = list[Piece]()
         count = 0
         for piece in row:
@@ -95,9 +106,6 @@ def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
             grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
             up = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
             across = np.array([up[1], -up[0]])
-            known = {**{edge.name: edge.points for edge in piece.edges}, **piece.internal_lines}
-            if pocket.line not in known:
-                raise InputError(f"piece {piece.name!r} has no line {pocket.line!r}; {nearest(pocket.line, known)}")
             level = known[pocket.line]
             order = np.argsort(level @ across)
             lines, marks = dict(piece.internal_lines), dict(piece.marks)
@@ -122,7 +130,6 @@ def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
             made.append(replace(piece, internal_lines=lines, marks=marks))
             count *= piece.quantity * (2 if piece.on_fold else 1)
         # The piece of a patch, or welt and bags.
-        like = next(p for p in row if p.name == pocket.where)
         if pocket.kind == "patch":
             names = ["upper", "left side", "lower left", "lower right", "right side"]
             patch = np.array(shape)

@@ -122,6 +122,7 @@ class FormResult:
         darts: of the pieces on both sides of the body.
         ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled or bridged ones.
         recipe, body, half: what it was built from.
+        notes: what was changed for this body, one sentence each.
     """
 
     __repr__ = short_repr
@@ -135,6 +136,7 @@ class FormResult:
     seams: tuple[FormSeam, ...]
     darts: tuple[PlacedDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def legs(self) -> dict[tuple[str, str], tuple[IntArray, IntArray]]:
         """Return the legs of every dart that the pieces have, by piece and dart; half pieces have those on the left."""

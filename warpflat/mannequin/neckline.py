@@ -25,6 +25,10 @@ _POWER_BEHIND = 1.6
 _ALONG_COLUMNS = (1.0, 4.0, 16.0, 64.0, 256.0)
 # Share of corners that may look aside: those of a scan do so in its hollows. Beside a V or a square any of them shows.
 _FOLDED = 0.002
+# A corner that was folded has this area [m2] of its parallelogram once it is turned back.
+_TURNED_BACK = 1e-5
+# Brought back to the surface some fold again; so many times at most they are turned back.
+_TURNS_BACK = 5
 # A neckline deeper than this [cm] may fold the cloth below it.
 _DEEP = 8.0
 
@@ -36,18 +40,46 @@ class Neckline:
     Attributes:
         side_cm: along the shoulder seams [cm].
         front_cm, back_cm: along the centre lines [cm].
+        side_share: what is added to `side_cm`, as a share of the shoulder seams.
+        front_share, back_share: what is added to `front_cm` and `back_cm`, as a share of the centre lines down to the bust.
         front_power: of the superellipse in front: 2 is round, 1 a V, 6 nearly square.
     """
 
     side_cm: float = 0.0
     front_cm: float = 0.0
     back_cm: float = 0.0
+    side_share: float = 0.0
+    front_share: float = 0.0
+    back_share: float = 0.0
     front_power: float = 2.0
 
     @staticmethod
     def ranges() -> dict[str, tuple[float, float]]:
         """Return the least and the greatest valid value of every number."""
-        return {"side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0), "front_power": (1.0, 8.0)}
+        return {
+            "side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0), "side_share": (0.0, 0.6),
+            "front_share": (0.0, 0.8), "back_share": (0.0, 0.8), "front_power": (1.0, 8.0),
+        }  # fmt: skip
+
+    def in_cm(self, layout: Layout, vertices: FloatArray) -> Neckline:
+        """Return the same neckline without shares.
+
+        Args:
+            layout, vertices: of the body or form (#V by 3 [m]) whose lines they are shares of.
+        """
+        side = np.mean([arc_lengths(vertices[layout.yokes[f"front-{each}"][-1]])[-1] for each in ("left", "right")])
+        # Down the patch, and on along the rings to the bust.
+        rings = layout.rings[layout.level_row["bust"] :]
+        front, back = (
+            arc_lengths(vertices[np.concatenate([row[:0:-1, row.shape[1] // 2], rings[::-1, column]])])[-1]
+            for row, column in ((layout.front, 0), (layout.back, rings.shape[1] // 2))
+        )
+        return Neckline(
+            side_cm=self.side_cm + self.side_share * 100.0 * float(side),
+            front_cm=self.front_cm + self.front_share * 100.0 * float(front),
+            back_cm=self.back_cm + self.back_share * 100.0 * float(back),
+            front_power=self.front_power,
+        )
 
 
 def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> FloatArray:
@@ -64,6 +96,7 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
     surface = _Surface(vertices, quads)
     out = vertices.copy()
+    neckline = neckline.in_cm(layout, vertices)
     neck, seams, centres = layout.neck[0], [], []
     for side in ("left", "right"):
         seam = layout.yokes[f"front-{side}"][-1]
@@ -122,20 +155,35 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     moved = np.setdiff1d(ids, fixed)
     # Smooth as far as that keeps every quad upright; below a deep neckline each column of the grid is drawn together by itself instead.
     upright, best, fewest = _corners_upright(vertices, quads), out, quads.size + 1
-    few = _FOLDED * quads.size
+    few = (_FOLDED if neckline.front_power == Neckline.front_power else 0.0) * quads.size
+
+    def on_centres(placed: FloatArray) -> None:
+        """What lies on a centre line stays on it."""
+        for line in centres:
+            for vertex in np.intersect1d(line, moved):
+                placed[vertex] = nearest_on_polyline(placed[vertex], vertices[line])
+
     for stiffness in _ALONG_COLUMNS:
         placed = out.copy()
         shift = _filled(out - vertices, ids, _along_columns(laplacian, vertices[ids], stiffness), local, fixed)
         placed[moved] = surface.nearest(vertices[moved] + shift[moved])
-        for line in centres:
-            # What lies on the centre stays on it.
-            for vertex in np.intersect1d(line, moved):
-                placed[vertex] = nearest_on_polyline(vertices[vertex] + shift[vertex], vertices[line])
+        on_centres(placed)
         folded = int((upright & ~_corners_upright(placed, quads, along=vertices)).sum())
         if folded < fewest:
             best, fewest = placed, folded
-        if folded <= (few if neckline.front_power == Neckline.front_power else 0):
+        if folded <= few:
             break
+    # Where something is folded still, around the tip of a V or on the narrow shoulder of a scan, it is turned back by itself.
+    for _ in range(_TURNS_BACK):
+        if fewest <= few:
+            break
+        turned_back = best.copy()
+        turned_back[moved] = surface.nearest(_unfolded(best, quads, moved, vertices)[moved])
+        on_centres(turned_back)
+        folded = int((upright & ~_corners_upright(turned_back, quads, along=vertices)).sum())
+        if folded >= fewest:
+            break
+        best, fewest = turned_back, folded
     # A round one that is not deep, as forms ask for by themselves, is drawn as well as it can be on anybody.
     is_deep = max(neckline.front_cm, neckline.back_cm) > _DEEP or neckline.front_power != Neckline.front_power
     if fewest > few and is_deep:
@@ -163,6 +211,39 @@ def _corners_upright(points: FloatArray, quads: IntArray, along: FloatArray | No
     normal = np.cross(before[:, 2] - before[:, 0], before[:, 3] - before[:, 1])
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     return np.asarray((np.cross(ahead, behind) * normal[:, None]).sum(axis=2) > 0.0)
+
+
+def _unfolded(points: FloatArray, quads: IntArray, moved: IntArray, along: FloatArray) -> FloatArray:
+    """Return points moved as little as it takes until every corner of every quad looks `along` as it did.
+
+    Least squares of what the area of each corner's parallelogram lacks; Escobar et al., Comput. Methods Appl. Mech. Eng. 192 (2003),
+    untangle so.
+    """
+    from scipy.optimize import minimize
+
+    before = along[quads]
+    normal = np.cross(before[:, 2] - before[:, 0], before[:, 3] - before[:, 1])
+    normal = (normal / np.linalg.norm(normal, axis=1)[:, None])[:, None]
+    out = points.copy()
+
+    def lacking(row: FloatArray) -> tuple[float, FloatArray]:
+        out[moved] = row.reshape(-1, 3)
+        corners = out[quads]
+        ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+        short = np.maximum(0.0, _TURNED_BACK - (np.cross(ahead, behind) * normal).sum(axis=2)) / _TURNED_BACK
+        pull = -2.0 * short[:, :, None] / _TURNED_BACK
+        to_ahead, to_behind = pull * np.cross(behind, normal), pull * np.cross(normal, ahead)
+        gradient = np.zeros_like(out)
+        np.add.at(gradient, np.roll(quads, -1, axis=1), to_ahead)
+        np.add.at(gradient, np.roll(quads, 1, axis=1), to_behind)
+        np.add.at(gradient, quads, -(to_ahead + to_behind))
+        return float((short**2).sum()), gradient[moved].ravel()
+
+    found = minimize(
+        lacking, points[moved].ravel(), jac=True, method="L-BFGS-B", options={"maxiter": 300, "ftol": 1e-12}
+    )
+    out[moved] = found.x.reshape(-1, 3)
+    return out
 
 
 class _Surface:

@@ -130,8 +130,8 @@ def equal_sides(
 
     Curves that keep near their points, and turned corners, leave a seam's sides some tenths of a millimetre apart. The curves of
     the second side take up the difference, those that bend most of it: each moves along one direction by a smooth bump, at most by
-    `SHIFT`. Their ends stay, with their directions. What would have to move farther stays as it is. A straight strip, such as a
-    band or a cuff, is stretched.
+    `SHIFT`. Where these bend too little, the first side moves, too, and both by several bumps. Ends stay, with their directions. What
+    would have to move farther stays as it is. A straight strip, such as a band or a cuff, is stretched.
     """
     found, roles = dict(curves), {piece.name: piece.role for piece in pieces}
     for seam in seams:
@@ -155,31 +155,43 @@ def equal_sides(
                 for key in [key for key in found if key[0] == side.piece]:
                     found[key] = found[key].transformed(np.column_stack([stretch, np.zeros(2)]))
             continue
-        bends, total = dict[EdgeKey, FloatArray](), 0.0
-        for key in ((side.piece, side.edge) for side in seam.sides[1]):
-            line = found[key].sample()
-            if not found[key].straight.any() and len(line) > 2:
-                # The length grows by the bump's work on the turning tangent.
-                tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
-                shares = arc_lengths(line)[1:-1] / polyline_length(line)
-                bends[key] = np.asarray(-(np.sin(np.pi * shares) ** 2) @ np.diff(tangents, axis=0))
-                # Both copies of an edge that is sewn twice move.
-                total += float(bends[key] @ bends[key])
-        if not bends or abs(more) * max(float(np.linalg.norm(bend)) for bend in bends.values()) > SHIFT * total:
+        # How the difference grows with each bump: one on every curve of the second side, and where these bend too little, as a nearly
+        # straight one or an S, on all curves, and with more bumps, each in a direction of its own.
+        for moved, count in ((seam.sides[1:], 1), (seam.sides, 1), (seam.sides, 2), (seam.sides, 4)):
+            bends, total, most = dict[EdgeKey, FloatArray](), 0.0, 0.0
+            for row in moved:
+                for key in ((side.piece, side.edge) for side in row):
+                    line = found[key].sample()
+                    if not found[key].straight.any() and len(line) > 2:
+                        # The length grows by the bumps' work on the turning tangent.
+                        tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
+                        at = count * arc_lengths(line)[1:-1] / polyline_length(line)
+                        work = -(np.sin(np.pi * at) ** 2)[:, None] * np.diff(tangents, axis=0)
+                        bend = np.zeros((count, 2))
+                        np.add.at(bend, np.minimum(at.astype(int), count - 1), work)
+                        bends[key] = bend if row is seam.sides[1] else -(1.0 + seam.ease) * bend
+                        # Both copies of an edge that is sewn twice move.
+                        total += float((bends[key] ** 2).sum())
+                        most = max(most, float(np.linalg.norm(bends[key], axis=1).max()))
+            if bends and abs(more) * most <= SHIFT * total:
+                break
+        else:
             continue
         for key, bend in bends.items():
-            way, bezier = more / total * bend, found[key].bezier.copy()
+            bezier = found[key].bezier.copy()
             lengths = [
                 polyline_length(Curve(bezier=each[None], straight=np.zeros(1, dtype=bool)).sample()) for each in bezier
             ]
-            joints = np.concatenate([[0.0], np.cumsum(lengths)]) / sum(lengths)
-            bump, slope = np.sin(np.pi * joints) ** 2, np.pi * np.sin(2.0 * np.pi * joints) / sum(lengths)
+            joints = count * np.concatenate([[0.0], np.cumsum(lengths)]) / sum(lengths)
+            way = more / total * bend[np.minimum(joints.astype(int), count - 1)]
+            bump = np.sin(np.pi * joints)[:, None] ** 2 * way
+            slope = count * np.pi * np.sin(2.0 * np.pi * joints)[:, None] / sum(lengths) * way
             handles = np.linalg.norm(bezier[:, [1, 2]] - bezier[:, [0, 3]], axis=2)
             # Tangents at a joint turn alike on both of its sides.
-            bezier[:, 0] += bump[:-1, None] * way
-            bezier[:, 1] += (bump[:-1] + handles[:, 0] * slope[:-1])[:, None] * way
-            bezier[:, 2] += (bump[1:] - handles[:, 1] * slope[1:])[:, None] * way
-            bezier[:, 3] += bump[1:, None] * way
+            bezier[:, 0] += bump[:-1]
+            bezier[:, 1] += bump[:-1] + handles[:, :1] * slope[:-1]
+            bezier[:, 2] += bump[1:] - handles[:, 1:] * slope[1:]
+            bezier[:, 3] += bump[1:]
             # The ends are corners, shared bit for bit.
             bezier[0, 0], bezier[-1, 3] = found[key].bezier[0, 0], found[key].bezier[-1, 3]
             found[key] = replace(found[key], bezier=bezier)

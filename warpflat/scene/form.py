@@ -12,7 +12,8 @@ from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.cuts import cut_form
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric
-from warpflat.scene.openings import scene_openings
+from warpflat.scene.openings import scene_finishing, scene_openings
+from warpflat.scene.pulled_on import wide_enough
 
 __all__ = ["scene_form", "scene_recipe"]
 
@@ -32,7 +33,17 @@ def scene_form(
     """
     mannequin, form = scene_recipe(scene, mannequin)
     with errors_named(f"{scene.where}: {'cuts' if scene.settings.cuts else 'form'}"):
-        return mannequin, mannequin.form(form, half=scene.settings.half, before=before)
+        built = mannequin.form(form, half=scene.settings.half, before=before)
+    if scene.settings.pulled_on:
+        with errors_named(f"{scene.where}: pulled_on"):
+            built = wide_enough(
+                mannequin,
+                built,
+                strain_limit=scene_fabric(scene).strain_limit,
+                openings=scene_openings(scene.settings.openings),
+                finishing=scene_finishing(scene.settings.finishing),
+            )
+    return mannequin, built
 
 
 def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:

@@ -31,6 +31,7 @@ def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
             kind=table.kind,
             line=table.seam,
             length=math.inf if table.length_mm is None else 1e-3 * table.length_mm,
+            share=table.length_share or 0.0,
             start=1e-3 * table.start_mm,
             style=table.style,
             width=1e-3 * (_WIDTH_MM[table.kind] if table.width_mm is None else table.width_mm),
@@ -112,6 +113,7 @@ def scene_pockets(tables: Sequence[PocketTable]) -> list[Pocket]:
             below=1e-3 * table.below_mm,
             from_centre=1e-3 * table.from_centre_mm,
             welt=1e-3 * table.welt_mm,
+            most_share=table.most_share or math.inf,
         )
         for table in tables
     ]

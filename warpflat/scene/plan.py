@@ -24,7 +24,7 @@ from warpflat.garment.drawn_curves import CURVES_MM
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.garment.openings import Opening, place_opening
+from warpflat.garment.openings import Opening, sized_opening
 from warpflat.garment.pattern_files import PatternOptions, check_names
 from warpflat.garment.sew_pieces import name_seams, sew_pieces
 from warpflat.garment.to_pattern import check_edge_names
@@ -420,7 +420,8 @@ def plan_garment(
         check_names(drawing.names, form.pieces)
     for number, opening in enumerate(openings):
         with errors_named(f"{scene.where}: openings[{number}]"):
-            place_opening(form, opening, {name: piece.surface.vertices for name, piece in form.pieces.items()})
+            on_form = {name: piece.surface.vertices for name, piece in form.pieces.items()}
+            openings[number] = sized_opening(form, opening, on_form)
     with errors_named(f"{scene.where}: grain_angle"):
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)

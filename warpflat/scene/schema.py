@@ -493,6 +493,8 @@ class OpeningTable(Table):
     kind: Literal["zip", "buttons", "wrap", "slit", "vent", "godet", "keyhole"]
     seam: Annotated[str, Field(min_length=1, max_length=100)]
     length_mm: Annotated[float, Field(ge=10, le=2000)] | None = None
+    length_share: Annotated[float, Field(gt=0, le=1)] | None = None
+    """Where it ends, as a share of its line, so that it suits every wearer; rounded to a length in whole centimetres."""
     start_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
     style: Literal["invisible", "lapped"] = "invisible"
     width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
@@ -517,6 +519,8 @@ class OpeningTable(Table):
             raise ValueError(
                 "start_mm and style belong to a zip; a slit, vent or godet begins at the lower end of its seam"
             )
+        if self.length_share is not None and (self.length_mm is not None or self.kind not in ("buttons", "zip")):
+            raise ValueError("length_share belongs to a zip or buttons without length_mm; leave one of them out")
         if self.kind not in ("buttons", "zip", "wrap") and self.length_mm is None:
             raise ValueError("length_mm is missing; only buttons, zips and wraps run all along their line without one")
         if self.kind == "wrap" and (self.length_mm is not None or self.seam not in ("centre front", "centre back")):
@@ -663,6 +667,9 @@ class PocketTable(Table):
     from_centre_mm: Annotated[float, Field(ge=0, le=500)] = 70.0
     welt_mm: Annotated[float, Field(ge=5, le=80)] = 15.0
     """Height of a welt."""
+    most_share: Annotated[float, Field(gt=0, le=1)] | None = None
+    """Share of `line` on its piece that a patch or welt takes at most. On a smaller wearer its width and height, and its distances from
+    line and centre line, become smaller alike."""
 
     @model_validator(mode="after")
     def _has_its_place(self) -> PocketTable:
@@ -670,6 +677,8 @@ class PocketTable(Table):
             raise ValueError(f'a {self.kind} pocket needs its piece: piece = "front"')
         if self.kind in ("inseam", "hip") and (not self.seam or self.below_mm < 0):
             raise ValueError(f'a pocket of kind {self.kind} needs its seam, seam = "side left", and below_mm from 0')
+        if self.kind not in ("patch", "welt") and self.most_share is not None:
+            raise ValueError(f"most_share belongs to a patch or welt; leave it out for a pocket of kind {self.kind}")
         if self.kind != "welt" and "welt_mm" in self.model_fields_set:
             raise ValueError(f"welt_mm belongs to a welt; leave it out for a pocket of kind {self.kind}")
         return self
@@ -759,6 +768,9 @@ class SceneTable(Table):
     many of a book's darts as bring the strain within the cloth's limit."""
     ease: str | dict[str, Any] | None = None
     """Wearing ease of a form: a preset (moulage, close, semi-fitted, loose), or a table of levels [cm], with a `preset` for the others."""
+    pulled_on: bool = False
+    """A form of a knit is pulled on: its neckline, and the ease of its other edges and levels, grow until what must pass through them
+    does, stretched to the cloth's limit. Openings count. A note says what has grown."""
     curves_mm: Annotated[float, Field(ge=0, le=20)] | None = None
     """How far the borders of a form's pieces may move to be drawn as by hand: without wobble, and straight where a book has them
     straight; 3 mm if not given, 0 leaves them as the cloth rests."""
@@ -818,6 +830,8 @@ class SceneTable(Table):
                     raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
             if self.curves_mm is not None:
                 raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
+            if self.pulled_on:
+                raise ValueError("pulled_on belongs to a form; a [surface] is as large as its mesh")
             if self.ease is not None:
                 raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
             if isinstance(self.surface, FileSurface) and self.surface.pattern is not None:
@@ -897,6 +911,10 @@ class SceneTable(Table):
                     raise ValueError(
                         f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
                     )
+        if self.pulled_on and self.wear is not None:
+            raise ValueError(
+                "pulled_on makes a garment as wide as it must be, and [wear] as tight as is asked; give one of them"
+            )
         # Refuse sizes of a pattern that no size table can give.
         if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
             raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')

@@ -117,8 +117,12 @@ def with_style(tables: Mapping[str, Any], style: Mapping[str, str], garment: str
             found = _with_length(found, key, text)
         elif key in ("neck-depth", "neck-width"):
             which = "front_cm" if key == "neck-depth" else "side_cm"
-            own = _form(found).neckline or Neckline()
-            values = {**asdict(own), which: _number(key, text, *Neckline.ranges()[which])}
+            # What is given takes the place of a share, too; those that nobody has given are left out.
+            own = {**asdict(_form(found).neckline or Neckline()), which: _number(key, text, *Neckline.ranges()[which])}
+            replaced = which.replace("cm", "share")
+            values = {
+                each: 0.0 if each == replaced else value for each, value in own.items() if value or each[-5:] != "share"
+            }
             found = _with_form(found, {"neckline": values})
         elif key == "closure":
             found = _with_closure(found, text, garment)

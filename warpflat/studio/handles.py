@@ -199,7 +199,8 @@ def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray
 def _of_neckline(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
     """Points of the neckline on centre lines and shoulder seams make it deeper or wider."""
     piece, form = plan.form.pieces[name], plan.scene.settings.form
-    now = asdict(plan.form.recipe.neckline or Neckline())
+    now = asdict((plan.form.recipe.neckline or Neckline()).in_cm(plan.mannequin.layout, plan.form.body))
+    now = {key: value for key, value in now.items() if not key.endswith("share")}
     neck = {vertex for edge, ids in piece.edges.items() if edge.split(" ")[0] == "neck" for vertex in ids.tolist()}
 
     def change(key: str, moved: float) -> dict[str, Any]:
