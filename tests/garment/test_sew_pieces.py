@@ -10,7 +10,9 @@ import trimesh
 
 from warpflat.core.errors import InputError
 from warpflat.export.pattern_json import read_pattern_json
+from warpflat.export.read_pattern import read_pattern
 from warpflat.garment.sew_pieces import meeting_borders
+from warpflat.pattern.whole_pieces import whole_pieces
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.io.read_pieces import read_pieces
@@ -127,3 +129,42 @@ def test_what_belongs_to_one_piece_is_refused(tmp_path: Path):
         InputError, match=r"ball\.obj: every part is closed .* or a crumb; give the layer of cloth alone"
     ):
         read_pieces(tmp_path / "ball.obj", units="m")
+
+
+def test_a_piece_cut_turned_over_hangs_on_its_side_where_the_mesh_stands_aside_and_leans(tmp_path: Path):
+    """A back and two fronts, flared, 30 cm off x = 0 and leaning by 4 degrees."""
+    lean, parts = np.radians(4.0), {}
+    turn = np.array([[np.cos(lean), -np.sin(lean), 0.0], [np.sin(lean), np.cos(lean), 0.0], [0.0, 0.0, 1.0]])
+    v = np.linspace(0.0, 1.0, 13)
+    for name, start, end in (("front_left", 0.0, 0.5), ("front_right", 0.5, 1.0), ("back", 1.0, 2.0)):
+        count = int(16 * (end - start)) + 1
+        a = np.pi * np.linspace(start, end, count)
+        radius = 0.16 - 0.06 * v[None, :]
+        points = np.stack(
+            [radius * np.cos(a)[:, None], np.broadcast_to(0.4 * v, (count, 13)), radius * np.sin(a)[:, None]], axis=-1
+        ).reshape(-1, 3)
+        at = np.arange(count * 13).reshape(count, 13)
+        quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+        # Diagonals are mirror images, too.
+        left = points[quads].mean(axis=1)[:, 0] > 0.0
+        first = np.where(left[:, None], quads[:, [0, 1, 2]], quads[:, [0, 1, 3]])
+        second = np.where(left[:, None], quads[:, [0, 2, 3]], quads[:, [1, 2, 3]])
+        parts[name] = trimesh.Trimesh(
+            (points @ turn.T + [0.3, 0.1, 0.0]).round(9), np.concatenate([first, second]), process=False
+        )
+    _write_obj(tmp_path / "coat.obj", parts)
+    data = {"surface": {"file": str(tmp_path / "coat.obj"), "units": "m", "component": "all"}, **QUIET}
+    result = run_scene(make_scene(data, name="coat", folder=tmp_path, where="coat.toml"), tmp_path / "out")
+    assert "front_left: cut twice, once mirrored, it serves for front_right too" in result.notes
+    pattern = read_pattern(tmp_path / "out" / "pattern.json")
+    pieces, _, _ = whole_pieces(pattern.pieces[pattern.sample], pattern.seams)
+    hung = {
+        name: np.column_stack([piece.outline, np.ones(len(piece.outline))]) @ piece.placement.T
+        for name, piece in pieces.items()
+        if piece.placement is not None
+    }
+    assert set(hung) == {"front_left", "front_left mirrored", "back"}
+    assert hung["back"][:, 0].max() == pytest.approx(-hung["back"][:, 0].min(), abs=1e-4)
+    assert hung["front_left"][:, 0].min() == pytest.approx(-hung["front_left mirrored"][:, 0].max(), abs=1e-9)
+    # It hangs beside the back, not into it.
+    assert hung["front_left"][:, 0].max() == pytest.approx(hung["back"][:, 0].max(), abs=0.06)

@@ -42,6 +42,7 @@ from warpflat.surface.border_seams import SAME_PLACE
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.cut.dart import fish_eye_measure
 from warpflat.surface.cut.dart_legs import are_curved, open_length, pull_back, pull_back_eye
+from warpflat.surface.mirror import mirror_plane
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
@@ -62,6 +63,8 @@ GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 _MOST_EDGES = 8
 #: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
 BESIDE, ALIGNED = 0.05, 1e-3
+# A plane of symmetry whose normal has this cosine to x at least is that between left and right.
+_UPRIGHT = 0.8
 
 
 def pattern_of_garment(
@@ -104,6 +107,8 @@ def pattern_of_garment(
             return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
         pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
+        if pairs:
+            pattern = _hung_upright(pattern, sample, pairs)
         drawn, more = _drawn_once(pattern.pieces, pairs)
         pattern = replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs))
         pattern, equal = draw_equal_pieces_once(pattern)
@@ -209,6 +214,33 @@ def pattern_of_garment(
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
         notes += equal
     return replace(pattern, worn=describe_worn(garments, pattern.sample, rises)), notes
+
+
+def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair]) -> Pattern:
+    """Return the pattern with its pieces where they hang about x = 0, the plane at which those that are cut turned over are mirrored.
+
+    A mesh may stand beside that plane, and lean. One that faces sideways is left as it is.
+    """
+    points, images = list[FloatArray](), list[FloatArray]()
+    for pair in pairs:
+        partners = garment.mirror_vertices(pair.of, pair.name)
+        assert partners is not None  # find_mirror_pairs has found them
+        points.append(garment.pieces[pair.of].network.surface.vertices)
+        images.append(garment.pieces[pair.name].network.surface.vertices[partners])
+    normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
+    if normal[0] < _UPRIGHT:
+        return pattern
+    # The shortest turn that takes the normal to x (Rodrigues).
+    x = np.array([1.0, 0.0, 0.0])
+    over = np.cross(np.eye(3), np.cross(normal, x))
+    turn = np.eye(3) + over + over @ over / (1.0 + normal[0])
+
+    def hung(piece: Piece) -> Piece:
+        if piece.placement is None:
+            return piece
+        return replace(piece, placement=turn @ piece.placement - np.outer([off, 0.0, 0.0], [0.0, 0.0, 1.0]))
+
+    return replace(pattern, pieces={size: [hung(piece) for piece in row] for size, row in pattern.pieces.items()})
 
 
 def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
