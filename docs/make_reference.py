@@ -287,8 +287,8 @@ def _form_section() -> list[str]:
         _row(
             "`neckline`",
             "How far the edge lies from the base of the neck, along shoulder seams and centre lines [cm]; `front_power` is 2 for a round "
-            "neckline, 1 for a V, 6 for one that is nearly square. `side_share`, `front_share` and `back_share` add a share of the shoulder seam, or of "
-            "the centre line down to the bust, so that it suits every wearer.",
+            "neckline, 1 for a V, 6 for one that is nearly square. `side_share`, `front_share` and `back_share` add a share of the "
+            "shoulder seam, or of the centre line down to the bust, so that it suits every wearer.",
             "`neckline = { side_cm = 2.0, front_cm = 5.0, back_cm = 1.5 }`",
         ),
         _row(
