@@ -55,7 +55,10 @@ def find_legs(slicer: Slicer, up: FloatArray) -> tuple[float, FloatArray | None]
     across = _plane_axes(up)
 
     def parts(share: float) -> list[_Part]:
-        return _large_parts(slicer, up, low + share * (high - low), across)
+        """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
+        cut = slicer.cut(up, low + share * (high - low))
+        found = sorted((_hull_area_and_middle(part.points @ across.T) for part in cut), key=lambda part: -part[0])
+        return [part for part in found if part[0] > 0.15 * found[0][0]]
 
     levels = np.linspace(0.07, 0.40, 12)
     pairs = [legs for share in levels if _is_pair(legs := parts(float(share)))]
@@ -68,13 +71,6 @@ def find_legs(slicer: Slicer, up: FloatArray) -> tuple[float, FloatArray | None]
     middle = np.mean([0.5 * (legs[0][1] + legs[1][1]) for legs in pairs], axis=0)
     stands = _is_body(middle, parts(0.62), parts(0.93), high - low)
     return len(pairs) / len(levels) if stands else 0.0, direction @ across
-
-
-def _large_parts(slicer: Slicer, up: FloatArray, height: float, across: FloatArray) -> list[_Part]:
-    """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
-    found = [_hull_area_and_middle(part.points @ across.T) for part in slicer.cut(up, height)]
-    found.sort(key=lambda part: -part[0])
-    return [part for part in found if part[0] > 0.15 * found[0][0]]
 
 
 def _is_pair(legs: list[_Part]) -> bool:
