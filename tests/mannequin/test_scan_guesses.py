@@ -24,12 +24,12 @@ def _between(points: np.ndarray, faces: np.ndarray, low: float, high: float) -> 
 @needs_bodies
 def test_a_body_without_its_head_is_refused() -> None:
     with pytest.raises(InputError, match="the head is missing"):
-        Mannequin.from_scan(*_between(*scan("male"), 0.0, 0.89), resolution_mm=25.0)
+        Mannequin.from_scan(*_between(*scan("male"), 0.0, 0.89), resolution_mm=40.0)
 
 
 @needs_bodies
 def test_a_body_without_feet_says_so() -> None:
-    body = Mannequin.from_scan(*_between(*scan("female"), 0.06, 1.1), resolution_mm=25.0)
+    body = Mannequin.from_scan(*_between(*scan("female"), 0.06, 1.1), resolution_mm=40.0)
     assert "the scan shows no foot left and no foot right; heights count from its lowest point" in body.notes
     assert body.measures["ankle left"].guess is not None
 
@@ -58,7 +58,7 @@ def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
     """On bodies with one mesh a landmark's vertices on one are the landmark's on all, mixes among them."""
     (one, faces), (other, _) = scan("child"), scan("male_heavy")
     points = 0.5 * (one + other)
-    body, marks = Mannequin.from_scan(points, faces, resolution_mm=25.0), Landmarks(faces)
+    body, marks = Mannequin.from_scan(points, faces, resolution_mm=40.0), Landmarks(faces)
     assert body.measures["underbust"].guess is None
     assert abs(body.measures["underbust"].height - marks.fold(points)) < 0.004
     # Fat moves the crease behind the knee down, and the skin over it less.

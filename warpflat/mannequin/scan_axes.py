@@ -59,7 +59,10 @@ def find_legs(slicer: Slicer, up: FloatArray, *, sits: bool = False) -> tuple[fl
     across = _plane_axes(up)
 
     def parts(share: float) -> list[_Part]:
-        return _large_parts(slicer, up, low + share * (high - low), across)
+        """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
+        cut = slicer.cut(up, low + share * (high - low))
+        found = sorted((_hull_area_and_middle(part.points @ across.T) for part in cut), key=lambda part: -part[0])
+        return [part for part in found if part[0] > 0.15 * found[0][0]]
 
     # Whoever sits shows lower legs alone.
     levels = np.linspace(0.07, 0.25 if sits else 0.40, 12)
@@ -79,13 +82,6 @@ def find_legs(slicer: Slicer, up: FloatArray, *, sits: bool = False) -> tuple[fl
             return 0.0, None
         sideways = np.cross(up, ahead @ across)
     return score if _is_body(middle, trunk, parts(0.93), high - low) else 0.0, sideways
-
-
-def _large_parts(slicer: Slicer, up: FloatArray, height: float, across: FloatArray) -> list[_Part]:
-    """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
-    found = [_hull_area_and_middle(part.points @ across.T) for part in slicer.cut(up, height)]
-    found.sort(key=lambda part: -part[0])
-    return [part for part in found if part[0] > 0.15 * found[0][0]]
 
 
 def _is_pair(legs: list[_Part]) -> bool:

@@ -222,7 +222,8 @@ class FitJob:
         wearer = posed.in_pose_of(self.body)
         moved = []
         for (vertices, triangles), layer in zip(self.layers, self.read.layers, strict=True):
-            surface = replace(layer, vertices=vertices, faces=_as_faces(triangles))
+            corners = np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32)
+            surface = replace(layer, vertices=vertices, faces=corners)
             moved.append(carry(surface, self.body.vertices, wearer.vertices, skin_triangles()))
         faces = [triangles for _, triangles in self.layers]
         before, after = level_ease(self.body, self.layers), level_ease(wearer, list(zip(moved, faces, strict=True)))
@@ -509,10 +510,6 @@ def _joined(layers: Sequence[tuple[FloatArray, NDArray[np.int64]]]) -> tuple[Flo
     first = np.cumsum([0, *(len(vertices) for vertices, _ in layers)])
     triangles = [corners + start for (_, corners), start in zip(layers, first[:-1].tolist(), strict=True)]
     return np.concatenate([vertices for vertices, _ in layers]), np.concatenate(triangles)
-
-
-def _as_faces(triangles: NDArray[np.int64]) -> NDArray[np.int32]:
-    return np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32)
 
 
 def _obj_lines(vertices: FloatArray, read: GarmentFile) -> str:

@@ -282,7 +282,10 @@ def inner_sheets(layers: Sequence[tuple[FloatArray, IntArray]]) -> dict[int, tup
         # A rim is a strip along both, as wide as they lie apart.
         around = cKDTree(np.concatenate([layers[k][0] for k in (one, *(group[k] for k in partners))]))
         for k in others:
-            narrow = k not in taken and areas[k] <= 0.75 * thickness * _border_length(*layers[k])
+            points, faces = layers[k]
+            border = points[border_edges(faces)]
+            length = float(np.linalg.norm(border[:, 1] - border[:, 0], axis=1).sum())
+            narrow = k not in taken and areas[k] <= 0.75 * thickness * length
             if narrow and around.query(layers[k][0])[0].max() <= thickness:
                 taken.add(k)
                 found[k] = outer, thickness
@@ -293,8 +296,3 @@ def _longest_sides(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return #F, the longest side of each face (#F by 4) [m]."""
     places = vertices[np.where(faces >= 0, faces, faces[:, :1])]
     return np.asarray(np.linalg.norm(places - np.roll(places, -1, axis=1), axis=2).max(axis=1))
-
-
-def _border_length(vertices: FloatArray, faces: IntArray) -> float:
-    ends = border_edges(faces)
-    return float(np.linalg.norm(vertices[ends[:, 1]] - vertices[ends[:, 0]], axis=1).sum())
