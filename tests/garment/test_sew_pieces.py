@@ -235,3 +235,17 @@ def test_a_seam_around_a_hole_is_named_as_the_pattern_has_no_edge_there():
         pieces.append(flatten(make_surface(rings.reshape(-1, 3), faces, name=name), fabric="woven"))
     _, notes = pattern_of_garment({"": sew_pieces(pieces)}, name="target")
     assert any(note.startswith(f"{LACKING} 627 mm of the seam of disc and ring about (") for note in notes), notes
+
+
+def test_a_seam_of_a_single_edge_is_sewn():
+    """Two quads side by side, whose whole seam is one edge of either."""
+    left = make_surface([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]], [[0, 1, 2, 3]], name="left")
+    right = make_surface([[0.2, 0, 0], [0.5, 0, 0], [0.5, 0.1, 0], [0.2, 0.1, 0]], [[0, 1, 2, 3]], name="right")
+    (pair,) = meeting_borders({"left": left, "right": right})
+    one, other = (surface.vertices[row] for surface, row in zip((left, right), pair.vertices, strict=True))
+    np.testing.assert_array_equal(one, other)
+    pattern, notes = pattern_of_garment(
+        {"": sew_pieces([flatten(each, fabric="woven") for each in (left, right)])}, name="two"
+    )
+    assert _sewn_length(pattern) == pytest.approx(0.1)
+    assert not any(note.startswith(LACKING) for note in notes)
