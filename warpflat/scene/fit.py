@@ -220,11 +220,15 @@ class FitJob:
 
         posed = _common_body(body, "--to", keep_pose=keep_pose)
         wearer = posed.in_pose_of(self.body)
-        moved = []
-        for (vertices, triangles), layer in zip(self.layers, self.read.layers, strict=True):
-            corners = np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32)
-            surface = replace(layer, vertices=vertices, faces=corners)
-            moved.append(carry(surface, self.body.vertices, wearer.vertices, skin_triangles()))
+        cloths = [
+            replace(
+                layer,
+                vertices=vertices,
+                faces=np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32),
+            )
+            for (vertices, triangles), layer in zip(self.layers, self.read.layers, strict=True)
+        ]
+        moved = [carry(one, self.body.vertices, wearer.vertices, skin_triangles()) for one in cloths]
         faces = [triangles for _, triangles in self.layers]
         before, after = level_ease(self.body, self.layers), level_ease(wearer, list(zip(moved, faces, strict=True)))
         for level in ease:
@@ -257,13 +261,8 @@ class FitJob:
             down = float(wearer.vertices[:, 1].min() - posed.vertices[:, 1].min())
             sits = posed.vertices + np.array([0.0, down, 0.0])
             moved = [
-                carry(
-                    replace(layer, vertices=vertices, faces=_as_faces(triangles)),
-                    wearer.vertices,
-                    sits,
-                    skin_triangles(),
-                )
-                for vertices, triangles, layer in zip(moved, faces, self.read.layers, strict=True)
+                carry(replace(one, vertices=vertices), wearer.vertices, sits, skin_triangles())
+                for one, vertices in zip(cloths, moved, strict=True)
             ]
             cloth, wearer = np.concatenate(moved), replace(wearer, vertices=sits)
         # The mesh as it stands in its file moves as its layers do; what they left out, as buttons, as the nearest cloth.
