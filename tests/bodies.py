@@ -1,15 +1,33 @@
-"""Bodies of a size, each built once in a process; nobody changes one."""
+"""Bodies of a size, each built once in a process, whoever asks; nobody changes one."""
 
 from __future__ import annotations
 
 import functools
 
+from warpflat.mannequin.common_body import CommonBody, common_body_of_mannequin
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["body_of_size"]
+__all__ = ["body_of_size", "built_once", "laid_once"]
+
+_from_size = Mannequin.from_size
 
 
 @functools.cache
+def _built(size: str, resolution_mm: float, lengths: tuple[tuple[str, float], ...]) -> Mannequin:
+    return _from_size(size, resolution_mm=resolution_mm, **dict(lengths))
+
+
+def built_once(size: str, *, resolution_mm: float = 10.0, **lengths: float) -> Mannequin:
+    """In place of `Mannequin.from_size`."""
+    return _built(size, resolution_mm, tuple(sorted(lengths.items())))
+
+
 def body_of_size(resolution_mm: float, size: str = "EU 38") -> Mannequin:
     """The mannequin of a size, with edges about so long."""
-    return Mannequin.from_size(size, resolution_mm=resolution_mm)
+    return built_once(size, resolution_mm=resolution_mm)
+
+
+@functools.cache
+def laid_once(mannequin: Mannequin, *, name: str) -> CommonBody:
+    """In place of `common_body_of_mannequin`."""
+    return common_body_of_mannequin(mannequin, name=name)

@@ -4,10 +4,16 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command import Command, command_in
+
+from warpflat.core.errors import InputError
+from warpflat.core.usd_process import UNREADABLE
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("WARPFLAT_THREADS", "1")
@@ -22,6 +28,40 @@ sys.dont_write_bytecode = False
 # A shell lets what it starts in the background ignore Ctrl-C, and the programs that tests start would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What is no claim of a test is had sooner.
+
+    A body of a size is built once in a process, sheets and cloth are laid in two orders of the pieces instead of eight, and the rooms
+    that read and write most USD read it in this process; all others, and the command's own processes, in one of its own.
+    """
+    from bodies import built_once, laid_once
+
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.parent.name != "mannequin":
+            patch.setattr("warpflat.mannequin.mannequin.Mannequin.from_size", built_once)
+            patch.setattr("warpflat.mannequin.common_body.common_body_of_mannequin", laid_once)
+        if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
+            patch.setattr("warpflat.pattern.tile_nesting.ORDERS", 2)
+        if request.path.parent.name in ("surface", "export", "review"):
+            patch.setattr("warpflat.surface.io.read.read_apart", _read_here)
+            patch.setattr("warpflat.review.film.read_apart", _read_here)
+        yield
+
+
+def _read_here(function: str, path: Path, **arguments: Any) -> Any:
+    """In place of `read_apart`."""
+    with path.open("rb"):
+        pass
+    module, _, name = function.partition(":")
+    try:
+        return getattr(import_module(module), name)(path.absolute(), **arguments)
+    except InputError:
+        raise
+    except Exception:
+        raise InputError(UNREADABLE) from None
 
 
 @pytest.fixture

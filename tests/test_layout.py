@@ -6,7 +6,9 @@ Every import counts: at the top of a module, inside a function, for types alone,
 from __future__ import annotations
 
 import ast
+import functools
 import os
+import re
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
@@ -56,11 +58,17 @@ def _modules() -> dict[str, Path]:
 MODULES = _modules()
 
 
+@functools.cache
+def _nodes(path: Path) -> list[ast.AST]:
+    """All nodes of a file; the first is its module."""
+    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
+@functools.cache
 def _imports(module: str) -> set[str]:
     """The modules of the package that a module imports, wherever in its text."""
-    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
     found = set()
-    for node in ast.walk(tree):
+    for node in _nodes(MODULES[module]):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -77,9 +85,6 @@ def _room(module: str) -> str:
     return parts[1] if len(parts) > 1 else ""
 
 
-IMPORTS = {module: _imports(module) for module in MODULES}
-
-
 def test_every_module_lies_in_a_room() -> None:
     loose = {module for module in MODULES if len(module.split(".")) == 2 and MODULES[module].stem != "__init__"}
     assert loose == {"warpflat.__main__", "warpflat._version"}
@@ -91,9 +96,9 @@ def test_a_room_imports_from_rooms_below_it(room: str) -> None:
     allowed = {room, "_version", *ROOMS[room].split()}
     wrong = {
         f"{module} imports {name}"
-        for module, names in IMPORTS.items()
+        for module in MODULES
         if _room(module) == room
-        for name in names
+        for name in _imports(module)
         if _room(name) not in allowed
     }
     assert wrong == set()
@@ -101,7 +106,7 @@ def test_a_room_imports_from_rooms_below_it(room: str) -> None:
 
 def test_no_import_runs_in_a_circle() -> None:
     inner = {
-        module: {name for name in names if name in MODULES} for module, names in IMPORTS.items() if module != "warpflat"
+        module: {name for name in _imports(module) if name in MODULES} for module in MODULES if module != "warpflat"
     }
     try:
         TopologicalSorter(inner).prepare()
@@ -112,7 +117,7 @@ def test_no_import_runs_in_a_circle() -> None:
 def test_rooms_hold_no_second_path_to_a_name() -> None:
     """The `__init__` of a room is its description, so that each name has one path."""
     rooms = [path for path in PACKAGE.rglob("__init__.py") if path.parent not in (PACKAGE, KERNELS)]
-    filled = [str(path) for path in rooms if len(ast.parse(path.read_text(encoding="utf-8")).body) != 1]
+    filled = [str(path) for path in rooms if len(_body(path)) != 1]
     assert filled == []
     again = {
         f"{module}: {name}"
@@ -127,12 +132,25 @@ def test_no_module_imports_a_private_name_of_another() -> None:
     private = {
         f"{module} imports {node.module}.{alias.name}"
         for module, path in MODULES.items()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in _nodes(path)
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("warpflat")
         for alias in node.names
         if alias.name.startswith("_") and not alias.name.startswith("__") and alias.name != "_version"
     }
     assert private == set()
+
+
+def test_contributing_draws_the_house_as_it_is() -> None:
+    text = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)) == set(ROOMS) - {"kernels"}
+    way = text[text.index("### A scene's way") : text.index("## Habits")]
+    folder, gone = "", []
+    for named, file in re.findall(r"((?:\w+/)*)(\w+\.py|\w+\.toml)", way):
+        folder = named or folder
+        path = PACKAGE.parent / "scenes" / file if file.endswith(".toml") else PACKAGE / folder / file
+        gone += [] if path.is_file() else [str(path)]
+    assert gone == []
+    assert way.count(".py") > 20
 
 
 def test_tests_lie_in_the_room_of_what_they_test() -> None:
@@ -165,8 +183,14 @@ def test_importing_the_package_loads_none_of_its_rooms() -> None:
     assert set(done.stdout.split()) <= {"warpflat._version", "warpflat.kernels"}
 
 
+def _body(path: Path) -> list[ast.stmt]:
+    module = _nodes(path)[0]
+    assert isinstance(module, ast.Module)
+    return module.body
+
+
 def _exported(path: Path) -> set[str]:
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+    for node in _body(path):
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and node.targets[0].id == "__all__":
             return set(ast.literal_eval(node.value))
     return set()
@@ -174,7 +198,7 @@ def _exported(path: Path) -> set[str]:
 
 def _defined(path: Path) -> set[str]:
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in _nodes(path):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
         elif isinstance(node, ast.Assign | ast.AnnAssign):

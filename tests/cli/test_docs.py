@@ -14,6 +14,7 @@ shipped: `tests/scene/test_scene.py` runs these.
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import shlex
 from collections.abc import Iterator
@@ -145,12 +146,14 @@ def _face_lines(faces: np.ndarray) -> str:
 
 
 def coarse(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return a scene with a coarser mesh and a short film."""
+    """Return a scene with a coarser mesh, a short film, and its pattern on few sheets."""
     changed = dict(tables)
     if "mannequin" in tables:
         changed["mannequin"] = {**tables["mannequin"], "resolution_mm": RESOLUTION_MM}
     elif "shape" in tables.get("surface", {}):
         changed["surface"] = {**tables["surface"], "resolution": 9}
+    if tables.keys() & {"surface", "form"}:
+        changed["pattern"] = {"paper": "A0", **tables.get("pattern", {})}
     if "scenes" not in tables:
         changed["output"] = {"frames": 4 if "surface" in tables else 0, "picture": False, **tables.get("output", {})}
     return changed
@@ -189,13 +192,19 @@ def check_names(script: str) -> None:
             assert hasattr(warpflat, node.attr), f"warpflat.{node.attr}"
 
 
+@functools.cache
+def coarse_scenes() -> dict[str, str]:
+    """The shipped scenes, coarser, by their file's name."""
+    return {path.name: document_as_toml(coarse(read_toml(path))) for path in (ROOT / "scenes").glob("*.toml")}
+
+
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The current folder of a page: the scenes, coarser."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenes").mkdir()
-    for path in (ROOT / "scenes").glob("*.toml"):
-        (tmp_path / "scenes" / path.name).write_text(document_as_toml(coarse(read_toml(path))))
+    for name, text in coarse_scenes().items():
+        (tmp_path / "scenes" / name).write_text(text)
     return tmp_path
 
 

@@ -414,6 +414,50 @@ def test_a_tube_that_nothing_holds_falls_off():
         )
 
 
+def test_what_is_cut_turned_over_starts_beside_the_others_where_a_garment_stands_aside_and_leans():
+    """A tube of a front and two equal backs, 30 cm off x = 0 and leaning by some degrees, as a file may have it."""
+    radius, wide, tall = 0.1, 0.05 * np.pi, 0.2
+    lean = np.radians(4.0)
+    turn = np.array([[np.cos(lean), -np.sin(lean), 0.0], [np.sin(lean), np.cos(lean), 0.0], [0.0, 0.0, 1.0]])
+
+    def lift(begin: float):
+        def places(flat: np.ndarray) -> np.ndarray:
+            angle = begin + flat[:, 0] / radius
+            upright = np.column_stack([radius * np.sin(angle), flat[:, 1], radius * np.cos(angle)])
+            return upright @ turn.T + [0.3, 0.1, 0.0]
+
+        return places
+
+    corners = [(0.0, 0.0), (wide, 0.0), (wide, tall), (0.0, tall)]
+    pieces = [
+        polygon("front", [(2 * x, y) for x, y in corners]),
+        polygon("back", corners, quantity=2),
+    ]
+    turned = Seam(
+        name="side right",
+        sides=((SeamSide(piece="back", edge="e4", mirrored=True),), (SeamSide(piece="front", edge="e4"),)),
+    )
+    middle = Seam(
+        name="middle",
+        sides=((SeamSide(piece="back", edge="e2"),), (SeamSide(piece="back", edge="e2", mirrored=True),)),
+    )
+    pattern = Pattern(
+        name="tube", pieces={"": pieces}, seams=[seam("side left", "front.e2", "back.e4"), turned, middle]
+    )
+    lifts = {"front": lift(-wide / radius), "back": lift(wide / radius)}
+    worn, _ = drape_pattern(
+        pattern, None, fabric=warpflat.find_fabric("woven"), placement=Placement(spacing=0.02, lifts=lifts),
+        options=DrapeOptions(max_steps=100), device=DEVICE,
+    )  # fmt: skip
+    cloth = worn.cloth
+    starts = {name: cloth.designed[cloth.welded[rows]] for name, rows in cloth.piece_vertices.items()}
+    upright = {name: (points - [0.3, 0.1, 0.0]) @ turn for name, points in starts.items()}
+    for points in upright.values():
+        np.testing.assert_allclose(np.hypot(points[:, 0], points[:, 2]), radius, atol=1e-5)
+    assert upright["back"][:, 0].min() > -1e-5
+    assert upright["back mirrored"][:, 0].max() < 1e-5
+
+
 def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):
     """A quarter of a cylinder, whose other quarter is its image."""
     radius = 0.1

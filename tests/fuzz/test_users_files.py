@@ -148,7 +148,7 @@ def test_a_batch_does_not_replace_what_it_is_made_from(name: str, command: Comma
     assert name == "bodies.csv" or f"out/{name}" in ended.refusal
 
 
-GARMENT = """form = "skirt"
+GARMENT = """form = "a_line_skirt"
 half = true
 [mannequin]
 size = "EU 38"

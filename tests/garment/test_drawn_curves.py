@@ -44,3 +44,14 @@ def test_girths_have_their_ease_without_darts(dress: Garment):
     assert set(wanted) == {"bust", "waist", "abdomen", "hip"}
     for level, girth in wanted.items():
         assert girth["ease_m"] == pytest.approx(girth["ease_wanted_m"], abs=2e-3), level
+
+
+def test_levels_do_not_wave_to_be_as_long_as_asked(dress: Garment):
+    """Edges that are only to be longer find it in waves: with their lengths for an equation, neighbours turned by 50 degrees to and fro."""
+    for name, piece in dress.form.pieces.items():
+        for level in ("bust", "waist"):
+            row = dress.mannequin.layout.rings[dress.mannequin.layout.level_row[level]]
+            line = np.flatnonzero(np.isin(piece.grid_vertices, row))
+            places = dress.pieces[name].positions[line]
+            turns = np.degrees(turning_angles(places[np.argsort(places[:, 0])]))
+            assert np.abs(np.diff(turns)).max() < 15.0, (name, level)

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from warpflat.cli.summary import notes_line
 from warpflat.core.errors import InputError
 from warpflat.export.pattern_json import read_pattern_json
-from warpflat.garment.sew_pieces import meeting_borders
+from warpflat.export.read_pattern import read_pattern
+from warpflat.flattening.flatten_piece import flatten
+from warpflat.garment import to_pattern
+from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.sew_pieces import meeting_borders, sew_pieces
+from warpflat.garment.to_pattern import LACKING, pattern_of_garment
+from warpflat.pattern.pieces import Pattern
+from warpflat.pattern.whole_pieces import whole_pieces
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.io.read_pieces import read_pieces
+from warpflat.surface.repair.validate import make_surface
 
 QUIET = {"output": {"frames": 0, "picture": False}}
 
@@ -127,3 +137,115 @@ def test_what_belongs_to_one_piece_is_refused(tmp_path: Path):
         InputError, match=r"ball\.obj: every part is closed .* or a crumb; give the layer of cloth alone"
     ):
         read_pieces(tmp_path / "ball.obj", units="m")
+
+
+def test_a_piece_cut_turned_over_hangs_on_its_side_where_the_mesh_stands_aside_and_leans(tmp_path: Path):
+    """A back and two fronts, flared, 30 cm off x = 0 and leaning by 4 degrees."""
+    lean, parts = np.radians(4.0), {}
+    turn = np.array([[np.cos(lean), -np.sin(lean), 0.0], [np.sin(lean), np.cos(lean), 0.0], [0.0, 0.0, 1.0]])
+    v = np.linspace(0.0, 1.0, 13)
+    for name, start, end in (("front_left", 0.0, 0.5), ("front_right", 0.5, 1.0), ("back", 1.0, 2.0)):
+        count = int(16 * (end - start)) + 1
+        a = np.pi * np.linspace(start, end, count)
+        radius = 0.16 - 0.06 * v[None, :]
+        points = np.stack(
+            [radius * np.cos(a)[:, None], np.broadcast_to(0.4 * v, (count, 13)), radius * np.sin(a)[:, None]], axis=-1
+        ).reshape(-1, 3)
+        at = np.arange(count * 13).reshape(count, 13)
+        quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+        # Diagonals are mirror images, too.
+        left = points[quads].mean(axis=1)[:, 0] > 0.0
+        first = np.where(left[:, None], quads[:, [0, 1, 2]], quads[:, [0, 1, 3]])
+        second = np.where(left[:, None], quads[:, [0, 2, 3]], quads[:, [1, 2, 3]])
+        parts[name] = trimesh.Trimesh(
+            (points @ turn.T + [0.3, 0.1, 0.0]).round(9), np.concatenate([first, second]), process=False
+        )
+    _write_obj(tmp_path / "coat.obj", parts)
+    data = {"surface": {"file": str(tmp_path / "coat.obj"), "units": "m", "component": "all"}, **QUIET}
+    result = run_scene(make_scene(data, name="coat", folder=tmp_path, where="coat.toml"), tmp_path / "out")
+    assert "front_left: cut twice, once mirrored, it serves for front_right too" in result.notes
+    pattern = read_pattern(tmp_path / "out" / "pattern.json")
+    pieces, _, _ = whole_pieces(pattern.pieces[pattern.sample], pattern.seams)
+    hung = {
+        name: np.column_stack([piece.outline, np.ones(len(piece.outline))]) @ piece.placement.T
+        for name, piece in pieces.items()
+        if piece.placement is not None
+    }
+    assert set(hung) == {"front_left", "front_left mirrored", "back"}
+    assert hung["back"][:, 0].max() == pytest.approx(-hung["back"][:, 0].min(), abs=1e-4)
+    assert hung["front_left"][:, 0].min() == pytest.approx(-hung["front_left mirrored"][:, 0].max(), abs=1e-9)
+    # It hangs beside the back, not into it.
+    assert hung["front_left"][:, 0].max() == pytest.approx(hung["back"][:, 0].max(), abs=0.06)
+
+
+def _sewn_length(pattern: Pattern) -> float:
+    return sum(pattern.piece(side.piece, "").edge(side.edge).length for seam in pattern.seams for side in seam.sides[0])
+
+
+def test_a_seam_that_ends_within_an_edge_arrives_in_the_pattern(tmp_path: Path):
+    """The back ends below the front's top: both sides of the front are one edge each, and the seams end in them."""
+    parts = _barrel()
+    rows = np.arange(17 * 13) % 13
+    below = parts["back"].faces[(rows[parts["back"].faces] <= 8).all(axis=1)]
+    parts["back"] = trimesh.Trimesh(parts["back"].vertices, below, process=True)
+    _write_obj(tmp_path / "barrel.obj", parts)
+    pieces = read_pieces(tmp_path / "barrel.obj", units="m")
+    garment = sew_pieces([flatten(piece, fabric="woven") for piece in pieces], name="barrel")
+    pattern, notes = pattern_of_garment({"": garment}, name="barrel")
+    found = sum(seam.lengths[0] for seam in garment.seams)
+    assert found > 0.5
+    assert _sewn_length(pattern) == pytest.approx(found, abs=1e-6)
+    assert not any(note.startswith(LACKING) for note in notes)
+
+
+def test_a_seam_of_a_mesh_that_the_pattern_lacks_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    _write_obj(tmp_path / "barrel.obj", _barrel())
+    pieces = read_pieces(tmp_path / "barrel.obj", units="m")
+    garment = sew_pieces([flatten(piece, fabric="woven") for piece in pieces], name="barrel")
+    whole, notes = pattern_of_garment({"": garment}, name="barrel")
+    assert not any(note.startswith(LACKING) for note in notes)
+    find = to_pattern._mesh_seams
+    monkeypatch.setattr(to_pattern, "_mesh_seams", lambda *given: find(*given)[1:])
+    pattern, notes = pattern_of_garment({"": garment}, name="barrel")
+    told = [
+        match
+        for note in notes
+        if (match := re.fullmatch(LACKING + r" (\d+) mm of the seam of front and back about .+", note))
+    ]
+    assert len(told) == 1
+    assert _sewn_length(pattern) + 1e-3 * float(told[0][1]) == pytest.approx(_sewn_length(whole), abs=1e-3)
+    assert notes_line(["something else", *notes]).startswith(f"note: {LACKING}")
+    # An edge that is meant to be a hem has no seam.
+    hems = {edge.name: "hem" for edge in pattern.piece("front", "").edges}
+    _, notes = pattern_of_garment({"": garment}, name="barrel", rules=EdgeRules(kinds=hems))
+    assert not any(note.startswith(LACKING) for note in notes)
+
+
+def test_a_seam_around_a_hole_is_named_as_the_pattern_has_no_edge_there():
+    """A disc in a ring: the ring's inner border is a hole of its piece."""
+    radius, turn = np.linspace(0.0, 0.2, 9)[1:], np.linspace(0, 2 * np.pi, 33)[:-1]
+    rings = np.stack(
+        [radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn), 0 * radius[:, None] * turn], axis=-1
+    )
+    at = np.arange(8 * 32).reshape(8, 32)
+    pieces = []
+    for name, rows in (("disc", at[:4]), ("ring", at[3:])):
+        quads = np.stack([rows[:-1], rows[1:], np.roll(rows[1:], -1, 1), np.roll(rows[:-1], -1, 1)], -1).reshape(-1, 4)
+        faces = [*quads.tolist(), *([rows[0].tolist()] if name == "disc" else [])]
+        pieces.append(flatten(make_surface(rings.reshape(-1, 3), faces, name=name), fabric="woven"))
+    _, notes = pattern_of_garment({"": sew_pieces(pieces)}, name="target")
+    assert any(note.startswith(f"{LACKING} 627 mm of the seam of disc and ring about (") for note in notes), notes
+
+
+def test_a_seam_of_a_single_edge_is_sewn():
+    """Two quads side by side, whose whole seam is one edge of either."""
+    left = make_surface([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]], [[0, 1, 2, 3]], name="left")
+    right = make_surface([[0.2, 0, 0], [0.5, 0, 0], [0.5, 0.1, 0], [0.2, 0.1, 0]], [[0, 1, 2, 3]], name="right")
+    (pair,) = meeting_borders({"left": left, "right": right})
+    one, other = (surface.vertices[row] for surface, row in zip((left, right), pair.vertices, strict=True))
+    np.testing.assert_array_equal(one, other)
+    pattern, notes = pattern_of_garment(
+        {"": sew_pieces([flatten(each, fabric="woven") for each in (left, right)])}, name="two"
+    )
+    assert _sewn_length(pattern) == pytest.approx(0.1)
+    assert not any(note.startswith(LACKING) for note in notes)

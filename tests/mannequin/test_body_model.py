@@ -14,6 +14,7 @@ from scans import needs_bodies, posed_body, scan, scanned_body, triangles_of
 from warpflat.core.errors import InputError
 from warpflat.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation
+from warpflat.mannequin.common_body import common_body_of_scan
 from warpflat.mannequin.fit_body import Mesh
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.scan_pose import LANDMARKS, ScanOptions
@@ -126,7 +127,7 @@ def test_a_scan_is_measured_at_the_landmarks_that_are_given() -> None:
     free = scanned_body("female")
     given = {"waist": free.measures["waist"].height + 0.03, "elbow left": free.measures["elbow left"].height + 0.02}
     options = ScanOptions(landmarks={name.split()[0]: height for name, height in given.items()})
-    body = Mannequin.from_scan(points, faces, options=options, resolution_mm=20.0)
+    body = Mannequin.from_scan(points, faces, options=options, resolution_mm=40.0)
     for name, height in given.items():
         assert body.measures[name].height == pytest.approx(height, abs=0.005), name
         assert body.measures[name].girth != pytest.approx(free.measures[name].girth, abs=0.0005), name
@@ -195,7 +196,7 @@ def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
     if case == "T-pose":
         body = posed_body("female", "arms up")
     else:
-        body = Mannequin.from_scan(points, faces, resolution_mm=20.0)
+        body = Mannequin.from_scan(points, faces, resolution_mm=40.0)
     wanted = {"bust": 0.845, "underbust": 0.702, "waist": 0.652, "hip": 0.904}
     if case.startswith("legs"):
         del wanted["hip"]
@@ -219,3 +220,59 @@ def test_one_arm_is_refused_in_one_line() -> None:
     faces = _without(lambda at: (at[:, 0] > 0.2) & (at[:, 1] > 0.5 * points[:, 1].max()), points, faces)
     with pytest.raises(InputError, match="scan: the scan does not show two upper arms"):
         Mannequin.from_scan(points, faces, resolution_mm=20.0)
+
+
+def _sitting(hip: float, knee: float, *, turned: float = 0.0) -> tuple[Person, np.ndarray]:
+    """Return a person on a chair or a saddle, and the vertices of the finer body [m]."""
+    model = BodyModel.load()
+    bend = np.zeros((len(model.joints), 3))
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        for joint, angles in (
+            ("upperleg01", (-hip, 0.0, 0.0)), ("lowerleg01", (knee, 0.0, 0.0)), ("upperarm01", (-0.3, 0.0, -0.35 * sign)),
+        ):  # fmt: skip
+            bend[model.joints.index(f"{joint}.{side}")] = angles
+    bends = rotation(bend)
+    for side, sign in (("L", 0.15), ("R", -0.15)):
+        thigh = model.joints.index(f"upperleg01.{side}")
+        bends[thigh] = rotation(np.array([[0.0, sign, 0.0]]))[0] @ bends[thigh]
+    shape = 0.7 * np.random.default_rng(3).normal(size=len(model.shapes))
+    turn = rotation(np.array([[0.0, turned, 0.0]]))[0]
+    person = Person(shape=shape, bend=bends, turn=turn, scale=1.7, place=np.zeros(3))
+    return person, finer_body()[0] @ model.vertices(person)
+
+
+@pytest.mark.parametrize(("hip", "knee"), [(1.5, 1.4), (1.05, 1.55), (1.65, 1.65)])
+def test_a_body_that_sits_is_fitted_where_its_pose_is_kept(hip: float, knee: float) -> None:
+    person, vertices = _sitting(hip, knee, turned=0.5)
+    options = ScanOptions(keep_pose=True)
+    body = common_body_of_scan(vertices, finer_body()[1], name="rider", options=options)
+    assert body.far < 0.003
+    model = BodyModel.load()
+    for joint in ("upperleg01", "lowerleg01"):
+        number = model.joints.index(f"{joint}.L")
+        off = body.person.bend[number].T @ person.bend[number]
+        assert np.degrees(np.arccos(np.clip(0.5 * (np.trace(off) - 1.0), -1.0, 1.0))) < 5.0, joint
+
+
+def test_a_body_that_sits_is_refused_unasked_and_its_mannequin_stands() -> None:
+    person, vertices = _sitting(1.5, 1.4)
+    triangles = finer_body()[1]
+    with pytest.raises(InputError, match="a standing body with feet apart is needed"):
+        Mannequin.from_scan(vertices, triangles)
+    with pytest.raises(InputError, match="the scan sits, and heights are those of standing bodies"):
+        Mannequin.from_scan(vertices, triangles, options=ScanOptions(keep_pose=True, landmarks={"waist": 1.0}))
+    sat = Mannequin.from_scan(vertices, triangles, options=ScanOptions(keep_pose=True), resolution_mm=40.0)
+    upright = finer_body()[0] @ BodyModel.load().vertices(person.standing())
+    stood = Mannequin.from_scan(upright, triangles, resolution_mm=40.0)
+    assert sat.levels()["waist"].height == pytest.approx(stood.levels()["waist"].height, abs=0.015)
+    for name, most in (
+        ("bust", 0.005),
+        ("waist", 0.004),
+        ("calf left", 0.004),
+        ("hip", 0.015),
+        ("thigh left", 0.012),
+    ):
+        assert sat.measures[name].girth == pytest.approx(stood.measures[name].girth, abs=most), name
+    # What it sits on is a guess.
+    assert {name for name, each in sat.measures.items() if each.guess == "the scan sits"} >= {"hip", "thigh left"}
+    assert any("warpflat fit --keep-pose" in note for note in sat.notes)

@@ -304,7 +304,7 @@ def test_a_body_with_forty_holes_is_measured_as_the_whole_one() -> None:
     points, faces = scan("male")
     _, torn = copy_of_body(points, faces, "holes", 0.0, 0.0, 0.0)
     assert len(torn) < len(faces) - 500
-    body, plain = on_scan(points, torn), scanned_body("male")
+    body, plain = on_scan(points, torn, 40.0), scanned_body("male")
     assert any(note.startswith("holes closed by smooth patches") for note in body.notes)
     # Holes in hands, face and feet are too deep for what is told of them.
     for name, whole in plain.measures.items():
@@ -414,7 +414,7 @@ def test_a_childs_head_may_be_broader_than_its_waist_and_a_belly_is_no_bust() ->
     slim = points.copy()
     at = np.exp(-0.5 * ((points[:, 1] - points[:, 1].min() - 0.8) / 0.08) ** 2) * (np.abs(points[:, 0]) < 0.15)
     slim[:, [0, 2]] *= (1.0 - 0.12 * at)[:, None]
-    assert on_scan(slim, faces).measures["waist"].girth < 0.46
+    assert on_scan(slim, faces, 40.0).measures["waist"].girth < 0.46
     points, faces = scan("male_heavy")
     fat = points.copy()
     height = points[:, 1] - points[:, 1].min()
@@ -422,7 +422,7 @@ def test_a_childs_head_may_be_broader_than_its_waist_and_a_belly_is_no_bust() ->
     fat[:, 2] += (
         0.11 * ahead * np.exp(-0.5 * ((height - 1.0) / 0.094) ** 2) * np.exp(-0.5 * (points[:, 0] / 0.145) ** 2)
     )
-    bust = on_scan(fat, faces).measures["bust"]
+    bust = on_scan(fat, faces, 40.0).measures["bust"]
     assert abs(bust.height - scanned_body("male_heavy").measures["bust"].height) < 0.02
     assert abs(bust.girth - scanned_body("male_heavy").measures["bust"].girth) < 0.02
 

@@ -1,6 +1,7 @@
 """Faired lines: without wobble, within their bound, straight where they are to be."""
 
 import numpy as np
+import pytest
 
 from warpflat.core.polyline import turning_angles
 from warpflat.pattern.fairing import bend_one_way, count_inflections, fair_line, fairest_line
@@ -40,6 +41,23 @@ def test_a_stretch_is_straight_and_a_circle_stays():
     angle = np.linspace(0.0, np.pi / 2, 40)
     circle = 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
     assert fair_line(circle, 0.08).shift < 2e-4
+
+
+def test_a_line_goes_through_the_points_that_it_is_to_meet():
+    # A bust: the line turns within a few centimetres, and girths are measured there and below.
+    bust = np.column_stack([0.03 * np.exp(-(((ALONG - 0.15) / 0.03) ** 2)), ALONG])
+    met = np.isin(np.arange(len(ALONG)), (10, 30, 38))
+    # Places are within half a step of the line from where these points lie.
+    faired, free = fair_line(bust, 0.15, met=met), fair_line(bust, 0.15)
+    away = [np.linalg.norm(line.points[met] - bust[met], axis=1).max() for line in (faired, free)]
+    assert away[0] < 1e-3
+    assert away[1] > 3e-3
+    assert fair_line(bust, 0.15, met=np.zeros(len(bust), dtype=bool)).points == pytest.approx(free.points)
+    one_way = np.column_stack([0.3 * np.maximum(ALONG - 0.15, 0.0), ALONG])
+    bent = [bend_one_way(one_way, 0.3, met=these) for these in (np.arange(len(ALONG)) == 30, None)]
+    assert bent[0] is not None
+    assert bent[1] is not None
+    assert np.linalg.norm(bent[0].points[30] - one_way[30]) < 1e-3 < np.linalg.norm(bent[1].points[30] - one_way[30])
 
 
 def test_a_line_meets_the_fold_squarely():

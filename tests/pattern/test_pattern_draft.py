@@ -96,6 +96,39 @@ def test_notches_stand_at_the_same_length_on_both_sides_of_every_seam(dress):
                 assert abs(b - a * (1 + seam.ease)) < 0.5
 
 
+@pytest.mark.parametrize("longer_is", ["one edge", "two edges"])
+def test_a_joint_is_notched_opposite_to_itself_where_only_a_part_of_a_seam_is_eased(longer_is):
+    """Like a shoulder seam at a sleeve's cap: 80 mm of ease between a tenth and a half of the shorter side."""
+    whole, ease, eased, joint = 0.5, 0.16, (0.1, 0.5), 0.2
+
+    def block(name, height):
+        corners = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, height], [0.0, height]])
+        return Piece(name=name, edges=[Edge(name=f"e{k}", points=corners[[k, (k + 1) % 4]]) for k in range(4)])
+
+    def along(share):
+        return share + ease * np.clip((share - eased[0]) / (eased[1] - eased[0]), 0.0, 1.0)
+
+    if longer_is == "one edge":
+        cut, opposite = (joint, whole - joint), whole * along(joint / whole)
+        cap = whole * (1.0 + ease)
+    else:
+        cut, opposite, cap = (whole * along(joint / whole), whole * (1.0 + ease - along(joint / whole))), joint, whole
+    chain = tuple(SeamSide(piece=name, edge="e1") for name in ("lower", "upper"))
+    single = (SeamSide(piece="cap", edge="e1"),)
+    seam = Seam(
+        name="s",
+        sides=(chain, single) if longer_is == "one edge" else (single, chain),
+        ease=ease,
+        eased=eased,
+        notches=(),
+    )
+    pieces = [block("lower", cut[0]), block("upper", cut[1]), block("cap", cap)]
+    drafted = draft_garment(Pattern(name="three", pieces={"": pieces}, seams=[seam]))
+    (notch,) = (notch for piece in drafted.pieces[""] for notch in piece.notches if piece.name == "cap")
+    assert notch.length == pytest.approx(opposite, abs=5e-4)
+    assert abs(notch.length / cap - (cut[0] / sum(cut))) * cap > 0.01, "not at the same share of both sides"
+
+
 def test_notches_lie_on_the_cut_line_and_point_inwards(dress):
     for piece in dress.pieces["38"]:
         cut = shapely.Polygon(piece.cut_line)

@@ -50,6 +50,29 @@ def test_hems_run_on_across_the_side_and_meet_the_fold_squarely() -> None:
     assert drafted.seams[0].length_mm == pytest.approx((400.0, 400.0), abs=0.02)
 
 
+def test_a_side_of_several_edges_has_its_corners_at_its_own_ends() -> None:
+    """The same corners as of a side of one edge, and none at the joint."""
+    garment = flared(0.2 * np.tan(np.radians(8.0)))
+    front, back = garment.pieces[""]
+    hem, side, top, centre = front.edges
+    joint = side.points.mean(axis=0)
+    halves = [
+        replace(side, name="low", points=np.stack([side.points[0], joint])),
+        replace(side, name="high", points=np.stack([joint, side.points[1]])),
+    ]
+    chain = tuple(SeamSide(piece="front", edge=half.name) for half in halves)
+    (seam,) = garment.seams
+    parted = replace(
+        garment,
+        pieces={"": [replace(front, edges=[hem, *halves, top, centre]), back]},
+        seams=[replace(seam, sides=(chain, seam.sides[1]))],
+    )
+    whole, by_parts = (
+        {corner.place: corner.after_deg for corner in draft_garment(each).corners} for each in (garment, parted)
+    )
+    assert by_parts == pytest.approx(whole, abs=0.05)
+
+
 def test_corners_that_are_meant_stay() -> None:
     """A point of 60 degrees is no edge that runs on."""
     garment = flared(0.2 * np.tan(np.radians(25.0)))

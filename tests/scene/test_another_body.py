@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from bodies import body_of_size
 from command import Command
 
 from warpflat.core.errors import InputError
+from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation
+from warpflat.mannequin.fit_body import Mesh
 from warpflat.scene.fit import FitJob, Fitted, ease_wishes, require_own_study, study_table
 from warpflat.seams.layers import read_garment
 from warpflat.surface.io.file_seams import file_seams
@@ -169,3 +172,30 @@ def test_ease_is_read_with_its_unit():
     assert ease_wishes(["waist=40mm", " hip = 5 cm ", "bust=-1in"]) == pytest.approx(
         {"waist": 0.04, "hip": 0.05, "bust": -0.0254}
     )
+
+
+def test_a_garment_ends_as_its_wearer_sits_where_the_pose_is_kept(command: Command):
+    model = BodyModel.load()
+    bend = np.zeros((len(model.joints), 3))
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        bend[model.joints.index(f"upperleg01.{side}")] = -1.5, 0.2 * sign, 0.0
+        bend[model.joints.index(f"lowerleg01.{side}")] = 1.4, 0.0, 0.0
+    mean = np.zeros(len(model.shapes))
+    person = Person(shape=mean, bend=rotation(bend), turn=np.eye(3), scale=1.7, place=np.zeros(3))
+    matrix, triangles = finer_body()
+    trimesh.Trimesh(matrix @ model.vertices(person), triangles, process=False).export("rider.obj")
+    _skirt(Path("skirt.obj"))
+    ended = command("fit", "skirt.obj", "--units", "m", *ON, "--to", "rider.obj", "--out", "none", *BARE)
+    assert ended.code == 2
+    assert "a standing body" in ended.err
+    ended = command("fit", "skirt.obj", "--units", "m", *ON, "--to", "EU 42", "--keep-pose", "--out", "none", *BARE)
+    assert ended.code == 2
+    assert "'EU 42' is a size, which stands" in ended.err
+    job = FitJob.start(Path("skirt.obj"), units="m", body="EU 36")
+    stands, sits = job.to("EU 36", {}), job.to("rider.obj", {}, keep_pose=True)
+    # The hem of a skirt to the thigh goes ahead with the thighs; the ease is that of the body standing.
+    hem = stands.vertices[:, 1] < stands.vertices[:, 1].min() + 0.02
+    assert sits.vertices[hem, 2].mean() > stands.vertices[hem, 2].mean() + 0.2
+    assert sits.kept()[1]
+    body = Mesh(sits.skin, triangles)
+    assert np.median(np.linalg.norm(body.closest(sits.vertices)[2] - sits.vertices, axis=1)) < 0.06

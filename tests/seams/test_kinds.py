@@ -103,6 +103,19 @@ def pouch() -> Surface:
     return loft([((0.0, y, 0.0), 0.11, 0.1) for y in np.linspace(0.3, 0.0, 12)], closed=True)
 
 
+def ball_with_holes(*ways: Sequence[float]) -> Surface:
+    openings = [(0.18 * np.array(way), way) for way in ways]
+    return solids.skin(lambda points: np.linalg.norm(points, axis=1) - 0.2, [-0.24] * 3, [0.24] * 3, 0.02, openings)  # type: ignore[arg-type]
+
+
+def ball_of_equal_holes() -> Surface:
+    return ball_with_holes([0.0, -1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0])
+
+
+def ball_of_any_holes() -> Surface:
+    return ball_with_holes([0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [-0.707, -0.707, 0.0])
+
+
 def anatomy_of(surface: Surface) -> Anatomy:
     cloth = cloth_of(surface)
     return find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
@@ -123,6 +136,8 @@ def anatomy_of(surface: Surface) -> Anatomy:
         ("other", shoe_upper),
         ("other", mug),
         ("other", pouch),
+        ("other", ball_of_equal_holes),
+        ("other", ball_of_any_holes),
     ],
     ids=[
         "skirt",
@@ -137,6 +152,8 @@ def anatomy_of(surface: Surface) -> Anatomy:
         "shoe upper",
         "mug",
         "pouch",
+        "ball of equal holes",
+        "ball of any holes",
     ],
 )
 def test_what_is_not_surely_something_is_called_other(kind: str, make: Callable[[], Surface]) -> None:

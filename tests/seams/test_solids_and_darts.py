@@ -60,6 +60,24 @@ def test_closed_things_fall_into_equal_pieces_that_lie_flat_within_the_cloths_li
         assert max(areas) < 1.05 * min(areas)
 
 
+def test_a_toy_is_cut_alike_on_both_sides() -> None:
+    arms = [solids.rod((0.08 * s, 0.05, 0.02), (0.16 * s, 0.0, 0.06), 0.035) for s in (1, -1)]
+    body = [solids.rod((0.0, -0.05, 0.0), (0.0, 0.05, 0.0), 0.09), solids.rod((0.0, 0.18, 0.0), (0.0, 0.2, 0.0), 0.07)]
+    toy = solids.skin(solids.joined([*body, *arms], 0.01), [-0.22, -0.2, -0.15], [0.22, 0.32, 0.15], 0.02)
+    found = warpflat.find_seams(toy)
+    assert 4 <= len(found.pieces) <= 16
+    middles, areas = list[np.ndarray](), list[float]()
+    for piece in found.pieces:
+        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+        own = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        middles.append(own @ (a + b + c) / (3.0 * own.sum()))
+        areas.append(float(own.sum()))
+    for middle, area in zip(middles, areas, strict=True):
+        away = [float(np.linalg.norm(other - middle * [-1.0, 1.0, 1.0])) for other in middles]
+        assert min(away) < 1e-3
+        assert areas[int(np.argmin(away))] == pytest.approx(area, rel=1e-4)
+
+
 def test_a_bag_becomes_panels_that_lie_flat() -> None:
     box = trimesh.creation.box((0.3, 0.35, 0.12)).subdivide().subdivide().subdivide()
     found = warpflat.find_seams(surface_of(box, box.triangles_center[:, 1] < 0.174))

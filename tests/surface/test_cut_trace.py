@@ -18,7 +18,7 @@ from warpflat.surface.connectivity import euler_characteristic, non_manifold_ver
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.cut.split_faces import split_faces_along
 from warpflat.surface.half_edges import border_edges, non_manifold_edges
-from warpflat.surface.paths.section import plane_path, plane_section
+from warpflat.surface.paths.section import plane_path, plane_section, plane_sections
 from warpflat.surface.paths.trace import VertexStar, geodesic_path, locate, path_triangles, polyline_path
 
 DATA = os.environ.get("WARPFLAT_DATA")
@@ -347,3 +347,20 @@ def test_a_scan_with_slivers():
     assert broken_by_split(mesh, result) == []
     cut = cut_along(result.surface.faces, result.path, vertex_count=len(result.surface.vertices))
     assert cut.kind == "split"
+
+
+@pytest.mark.parametrize("towards", [[0.0, 1.0, 0.0], [0.0, -2.0, 0.0]])
+def test_half_a_plane_ends_at_its_point(towards):
+    """A curve from border to border is parted there, and a closed one where the half plane ends on both sides of it."""
+    mesh, at = dome(8), np.array([0.0113, 0.0371, 0.0])
+    whole = plane_section(mesh, at, [1.0, 0.0, 0.0])
+    (half,) = plane_sections(mesh, at, [1.0, 0.0, 0.0], towards=towards)
+    (other,) = plane_sections(mesh, at, [1.0, 0.0, 0.0], towards=[-part for part in towards])
+    along = (half.points - at) @ np.sign(towards)
+    assert along.min() == pytest.approx(0.0, abs=1e-9)
+    assert along[[0, -1]].min() == along.min()
+    assert half.length + other.length == pytest.approx(whole.length, rel=1e-9)
+    (arc,) = plane_sections(cylinder(12, 5), [0.0, 0.0137, 0.11], [0.0, 0.0, 1.0], towards=towards)
+    assert not arc.closed
+    assert arc.points[[0, -1], 1] == pytest.approx(0.0137, abs=1e-9)
+    assert ((arc.points[1:-1, 1] - 0.0137) * towards[1] > 0.0).all()

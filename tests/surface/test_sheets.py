@@ -26,8 +26,8 @@ def solidified(
         np.add.at(normal, quads[:, k], np.cross(c - a, d - b))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     count = len(vertices)
-    sides = [(int(q[k]), int(q[(k + 1) % 4])) for q in quads for k in range(4)]
-    open_sides = [side for side in sides if side[::-1] not in set(sides)] if rim else []
+    sides = {(int(q[k]), int(q[(k + 1) % 4])): None for q in quads for k in range(4)}
+    open_sides = [side for side in sides if side[::-1] not in sides] if rim else []
     faces = [*quads.tolist(), *(quads[:, ::-1] + count).tolist()]
     faces += [[b, a, a + count, b + count] for a, b in open_sides]
     return np.vstack([vertices, vertices - thickness * normal]), faces
@@ -295,3 +295,73 @@ def test_one_twisted_quad_is_cut_with_a_note() -> None:
     surface = make_surface(points, quads)
     assert any("quad" in note and "cut" in note for note in surface.notes)
     assert len(border_loops(surface.faces)) == 1
+
+
+def some_faces(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    used, place = np.unique(faces, return_inverse=True)
+    return points[used], place.reshape(faces.shape)
+
+
+@pytest.mark.parametrize("finer", [False, True])
+def test_layers_that_lie_on_each_other_in_part_are_told_with_their_area(finer: bool, tmp_path: Path) -> None:
+    points, quads = bodice()
+    column = quads % 21
+    left, right = quads[column.max(axis=1) <= 14], quads[column.min(axis=1) >= 8]
+    if finer:  # by triangles: no face has the vertices of another
+        right = np.concatenate([right[:, [0, 1, 3]], right[:, [1, 2, 3]]])
+    path = parts(
+        some_faces(points, left), some_faces(points, right), path=tmp_path / "two.obj", names=("left", "right")
+    )
+    pieces = warpflat.read_pieces(path, units="m")
+    assert [piece.name for piece in pieces] == ["left", "right"]
+    assert [note for note in pieces[0].notes if "left and right lie on each other over 622 cm2" in note]
+    # A garment whose seams are found is one layer there.
+    (layer,) = read_garment(path, units="m").layers
+    assert len(border_loops(layer.faces)) == 1
+    assert euler_characteristic(layer.faces) == 1
+    assert [
+        note for note in layer.notes if "of 622 cm2 dropped: a second layer that lies on another part there" in note
+    ]
+    # Side by side they are no second layer.
+    apart = parts(
+        some_faces(points, left), some_faces(points, quads[column.min(axis=1) >= 14]), path=tmp_path / "side.obj"
+    )
+    assert not any("lie on each other" in note for note in warpflat.read_pieces(apart, units="m")[0].notes)
+
+
+@pytest.mark.parametrize("welded", [False, True])
+def test_thick_panels_that_are_glued_rim_to_rim_are_one_sheet_each(welded: bool, tmp_path: Path) -> None:
+    def panel(left: float) -> tuple[np.ndarray, list[list[int]]]:
+        points = np.stack(
+            [np.tile(np.linspace(left, left + 0.3, 16), 21), np.repeat(np.linspace(0, 0.4, 21), 16), np.zeros(336)], -1
+        )
+        at = np.arange(336).reshape(21, 16)
+        return solidified(
+            points, np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], -1).reshape(-1, 4), 0.003
+        )
+
+    both = panel(0.0), panel(0.3)
+    path = parts(*both, path=tmp_path / "glued.obj", names=("one", "other"))
+    if welded:
+        count = len(both[0][0])
+        places, number = np.unique(np.vstack([each[0] for each in both]).round(9), axis=0, return_inverse=True)
+        faces = [*both[0][1], *([k + count for k in face] for face in both[1][1])]
+        path = write(tmp_path / "welded.obj", places, [[number.ravel()[k] for k in face] for face in faces])
+    pieces, (layer,) = warpflat.read_pieces(path, units="m"), read_garment(path, units="m").layers
+    assert [len(piece.faces) for piece in pieces] == ([600] if welded else [300, 300])
+    assert (len(layer.faces), len(border_loops(layer.faces))) == (600, 1)
+    assert any("3 mm thick" in note for note in layer.notes)
+    assert any("1 wall between sheets left out (12 cm2)" in note for note in layer.notes) == welded
+
+
+def test_thick_panels_whose_outer_edges_alone_touch_are_one_sheet_each(tmp_path: Path) -> None:
+    """Their rims stand at an angle: joined there without a look at their thickness they are one closed body."""
+    points, _ = bodice()
+    edge = points.reshape(26, 21, 3)[:, -1]
+    beside = np.stack([edge + np.array([0.02 * k, 0.0, 0.0]) for k in range(16)], axis=1).reshape(-1, 3)
+    at = np.arange(26 * 16).reshape(26, 16)
+    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], -1).reshape(-1, 4)
+    path = parts(solidified(*bodice(), 0.003), solidified(beside, quads, 0.003), path=tmp_path / "rims.obj")
+    (layer,) = read_garment(path, units="m").layers
+    assert (len(layer.faces), len(border_loops(layer.faces))) == (875, 1)
+    assert sum("3 mm thick" in note for note in layer.notes) == 2

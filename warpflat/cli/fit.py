@@ -47,6 +47,11 @@ _FILES = """\b
     metavar="LEVEL=LENGTH",
     help="Ease at bust, underbust, waist or hip, such as waist=40mm.  [default: as before]",
 )
+@click.option(
+    "--keep-pose",
+    is_flag=True,
+    help="End on the other body as its scan is posed, on a chair or a saddle.  [default: as the first body stands]",
+)
 @click.option("--units", metavar="UNIT", help="Of the garment's file: m, cm, mm, in ... Needed unless it says (USD).")
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.  [default: all]")
 @click.option("--front", metavar="AXIS", help="Where its front faces: +z, -z, +x, -x.  [default: found]")
@@ -80,6 +85,7 @@ def fit(
       warpflat fit shirt.obj --units m --from body.obj --to "EU 44"
       warpflat fit leggings.ply --units m --to scan.obj --fabric jersey
       warpflat fit out/dress/worn.usdc --from "EU 38" --to "EU 36" --to "EU 42" --out study
+      warpflat fit trousers.usdc --from "EU 38" --to rider.obj --keep-pose
       warpflat fit skirt.usd --to "EU 40" --ease waist=20mm --ease hip=5cm
     """
     from warpflat.cli.progress_bar import ProgressBar
@@ -116,7 +122,7 @@ def fit(
         garment, units=options["units"], prim=options["prim"], name=name, front=options["front"], body=body
     )
     # Every body is built before the first pattern, so that a wrong one is refused at once.
-    carried = [job.to(wearer, ease) for wearer in bodies]
+    carried = [job.to(wearer, ease, keep_pose=options["keep_pose"]) for wearer in bodies]
     shown = not (quiet or as_json)
     code, fitted = 0, []
     for one in carried:

@@ -10,6 +10,7 @@ from warpflat.core.text import energy_words, format_count
 from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words, wearer_words
 from warpflat.flattening.progress import relaxation_words
 from warpflat.garment.rings import rings_line
+from warpflat.garment.to_pattern import LACKING
 
 __all__ = ["cut_words", "notes_line", "summary_lines"]
 
@@ -187,9 +188,9 @@ def notes_line(notes: Sequence[str]) -> str:
     guessed = [note for note in notes if _COMPLETED.match(note)]
     parts = [f"{format_count(len(guessed), 'measurement')} guessed from others"] if guessed else []
     others = [note for note in notes if note not in guessed]
-    # What became of the user's files comes first.
-    parts = [*(note for note in others if note.startswith("removed")), *parts]
-    parts += [note for note in others if not note.startswith("removed")]
+    # What became of the user's files comes first, then what a pattern lacks.
+    first = [note for begin in ("removed", LACKING) for note in others if note.startswith(begin)]
+    parts = [*first, *parts, *(note for note in others if note not in first)]
     for count in range(len(parts), 0, -1):
         more = [f"{len(parts) - count} more"] if count < len(parts) else []
         line = "; ".join([*parts[:count], *more, *(["-v lists them"] if more or guessed else [])])

@@ -25,8 +25,9 @@ from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.pieces import Pattern, Piece
-from warpflat.pattern.whole_pieces import whole_pieces
+from warpflat.pattern.whole_pieces import MIRRORED, whole_pieces
 from warpflat.surface.connectivity import join_labels
+from warpflat.surface.mirror import mirror_plane
 
 __all__ = ["Placement", "drape_pattern", "place_pieces"]
 
@@ -117,6 +118,8 @@ def drape_pattern(
     # On another body than that of its designed surface a garment starts as one that has none, if it can.
     placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
     lifted = len(placed) == len(meshes)
+    if lifted:
+        placed = _mirrored_in_place(placed, welds)
     elsewhere = _elsewhere(placed, meshes, solid) if lifted and solid is not None else ""
     if not lifted and body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
@@ -180,6 +183,31 @@ def drape_pattern(
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
+
+
+def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequence[Weld]]) -> dict[str, FloatArray]:
+    """Return places (#P by 3 [m] by piece) with what is cut turned over on the other side of the garment's own plane of symmetry.
+
+    A garment may stand beside x = 0 and lean: its plane is that in which pieces turned over come to the seams of the others.
+    """
+    across = np.array([-1.0, 1.0, 1.0])
+    met = [
+        (placed[turned][i] * across, placed[other][j])
+        for seam in welds
+        for joint in seam
+        for turned, i in joint
+        for other, j in joint
+        if turned.endswith(MIRRORED) and not other.endswith(MIRRORED)
+    ]
+    if not met:
+        return dict(placed)
+    normal, off = mirror_plane(*np.array(met).transpose(1, 0, 2))
+    return {
+        name: points * across - 2.0 * np.outer((points * across) @ normal - off, normal)
+        if name.endswith(MIRRORED)
+        else points
+        for name, points in placed.items()
+    }
 
 
 def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh], body: Body) -> str:

@@ -55,6 +55,8 @@ PROJECTED_WIDTH = 0.9
 SHEET_NAME, NAME_INSIDE, NAME_CLEAR = 26, 0.006, 0.0015
 #: A strip slants if the box around it is so many times as large as the strip.
 SLANTING = 3.0
+# A label beside its piece that a joint of two sheets would cut is moved by up to so much, in such steps [m].
+_REACH, _STEP = 0.06, 0.004
 # Nobody glues more sheets than these together.
 MOST_SHEETS = 1000
 #: Roles whose strokes lie on the layer of their size in a nest.
@@ -125,6 +127,9 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
         pieces = tuple(relabelled(piece, printed.name, joints) for piece in place.pieces) if joints else place.pieces
         if any(piece.label.leader is not None for piece in pieces):
             pieces = place.pieces
+            if joints and all(piece.label.leader is not None for piece in pieces):
+                others = [each for each in sheet.placed if each is not place]
+                pieces = _beside_on_one_sheet(place, others, tiling)
         placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
     tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
     drawings = []
@@ -133,6 +138,34 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
         outside = shapely.transform(tiling.outside, place.on_piece)
         drawings.append(draw_nest(place.pieces, OnPaper(joints=joints, outside=outside, letters=letters)))
     return tiling, drawings
+
+
+def _beside_on_one_sheet(place: Placed, others: Sequence[Placed], tiling: Tiling) -> tuple[DraftedPiece, ...]:
+    """Return the pieces of a place with their label, which stands beside them, moved to where one sheet shows each of its rows."""
+    import shapely
+
+    corners = [tiling.corner(*tile) for tile in tiling.tiles]
+    windows = [shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap)) for corner in corners]
+    taken = [shapely.Polygon(place.on_sheet(piece.cut_line)) for piece in place.pieces]
+    taken += [shapely.convex_hull(shapely.MultiPoint(each.on_sheet(occupied_points(each.pieces)))) for each in others]
+    cloth, label = shapely.union_all(taken), nest_label(place.pieces)
+    steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
+    shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    for shift in shifts[np.argsort(np.linalg.norm(shifts, axis=1), kind="stable")]:
+        moved = replace(label, at=label.at + shift)
+        rows = [shapely.Polygon(place.on_sheet(row.box())) for row in moved.words()]
+        if all(any(window.covers(row) for window in windows) for row in rows) and (
+            not shift.any() or not shapely.Polygon(place.on_sheet(moved.box)).intersects(cloth)
+        ):
+            break
+    else:
+        return place.pieces
+    # The leader begins where the label stands, and ends on the cloth where it did.
+    labels = [
+        replace(own, at=own.at + shift, leader=None if own.leader is None else own.leader + np.outer([1.0, 0.0], shift))
+        for own in (piece.label for piece in place.pieces)
+    ]
+    return tuple(replace(piece, label=own) for piece, own in zip(place.pieces, labels, strict=True))
 
 
 def too_many_sheets(garment: DraftedGarment, paper: str) -> str:

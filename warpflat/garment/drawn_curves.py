@@ -15,7 +15,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import turning_angles
-from warpflat.garment.constraints import Constraint, DrawnLine, FixedLength, Straight
+from warpflat.garment.constraints import Constraint, DrawnLine, FixedLength, KeptGirth, Straight
 from warpflat.pattern.fairing import count_inflections, fair_line, fairest_line
 from warpflat.pattern.piece_parts import HEMMED_LEVELS
 
@@ -121,6 +121,7 @@ def plan_curves(
         constraints: of the sewing.
     """
     ruled = {(each.piece, each.line) for each in constraints if isinstance(each, Straight | FixedLength)}
+    girths = [each for each in constraints if isinstance(each, KeptGirth)]
     sewn = {
         (name, edge)
         for seam in form.seams
@@ -132,6 +133,9 @@ def plan_curves(
         bound = bounds[name]
         if bound == 0.0:
             continue
+        # As pattern makers do, the line is drawn through the places where girths are measured.
+        measured = [each.edges[name].ravel() for each in girths if name in each.edges]
+        levels = np.concatenate([np.empty(0, dtype=np.int32), *measured])
         on_fold = set() if piece.fold is None else set(piece.edges[piece.fold].tolist())
         for edge, vertices in _open_edges(form, name, positions[name]):
             part = piece.parts.get(edge, edge)
@@ -155,7 +159,8 @@ def plan_curves(
             straight = bool(wanted.any()) and away <= bound
             kept = wanted if straight else None
             one_way = book == "below hip" and bool(np.isin(grid, layout.rings[: layout.level_row["waist"] + 1]).all())
-            drawn = fairest_line(points, bound, straight=kept, mirrored=mirrored, one_way=one_way)
+            met = np.isin(vertices, levels)
+            drawn = fairest_line(points, bound, straight=kept, met=met, mirrored=mirrored, one_way=one_way)
             if drawn is None:
                 continue
             line = DrawnLine(piece=name, line=edge, vertices=vertices, shape=drawn.points)

@@ -379,89 +379,83 @@ def flatten_form(
         full[name] = give_fullness(full[name], edges, plain, options=relax)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
     held = (*constraints, *straight_hems(form, constraints), *dart_constraints(form))
-    result = sew(full, garment.stitching, constraints=held, folds=folds, options=relax)
-    garment = replace(garment, pieces=result.pieces, sewn=result, wished=wished)
-    again = _SewAgain(mannequin=mannequin, form=form, held=held, folds=folds, options=relax)
-
-    def drawn(own: Garment, under: _SewAgain) -> Garment:
-        return under.with_curves(own, 1e-3 * curves_mm) if curves_mm else own
-
-    knit = next(iter(pieces.values())).fabric.is_knit
     # A knit gives: its girths matter where they are to be smaller than the body.
-    if min(form.ease.values(), default=0.0) >= 0.0 if knit else not form.ease:
-        return drawn(garment, again)
-    kept = drawn(*again.with_girths(garment))
-    strained = _strained(garment, kept) if knit else []
-    if not strained:
+    knit = next(iter(pieces.values())).fabric.is_knit
+    wants = min(form.ease.values(), default=0.0) < 0.0 if knit else bool(form.ease)
+    girths = (
+        girth_constraints(mannequin, form, {name: piece.positions for name, piece in full.items()}) if wants else []
+    )
+
+    def sewn_under(held: Sequence[Constraint]) -> Garment:
+        result = sew(full, garment.stitching, constraints=held, folds=folds, options=relax)
+        found = replace(garment, pieces=result.pieces, sewn=result, wished=wished)
+        return _with_curves(found, 1e-3 * curves_mm, held, folds, relax) if curves_mm else found
+
+    if not girths:
+        return sewn_under(held)
+    kept = sewn_under([*held, *girths])
+    if (
+        kept.sewn is not None
+        and kept.sewn.converged
+        and not (knit and any(not each.fit.fits for each in kept.pieces.values()))
+    ):
         return kept
-    words = f"girths are as the cloth has them: as asked for they would strain {', '.join(strained)} beyond the cloth's limit"
-    return drawn(replace(garment, remarks=(*garment.remarks, words)), again)
+    free = sewn_under(held)
+    if kept.sewn is None or not kept.sewn.converged:
+        words = (
+            "the girths are as the cloth has them: seams and constraints leave no room for the ease that is asked for"
+        )
+    elif strained := _strained(free, kept):
+        words = f"girths are as the cloth has them: as asked for they would strain {', '.join(strained)} beyond the cloth's limit"
+    else:
+        return kept
+    return replace(free, remarks=(*free.remarks, words))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _SewAgain:
-    """What holds a sewn garment, to relax it again under more.
+def _with_curves(
+    garment: Garment,
+    bound: float,
+    held: Sequence[Constraint],
+    folds: Mapping[str, IntArray],
+    options: RelaxOptions | None,
+) -> Garment:
+    """Return a sewn garment with its borders drawn as by hand, within a bound [m].
 
-    Attributes:
-        mannequin, form: those of the garment.
-        held, folds, options: as :func:`warpflat.garment.sewing.sew` takes them.
+    Pieces that fit as the cloth rests, and are strained beyond its limit as they are drawn, get half the bound, then none.
+
+    Args:
+        garment: at rest, or not.
+        bound: how far its borders may move [m].
+        held, folds, options: under which it was sewn, as :func:`warpflat.garment.sewing.sew` takes them.
     """
-
-    mannequin: Mannequin
-    form: FormResult
-    held: Sequence[Constraint]
-    folds: Mapping[str, IntArray]
-    options: RelaxOptions | None
-
-    def __call__(self, garment: Garment, more: Sequence[Constraint]) -> tuple[Garment, Sewn]:
-        """Return the garment under more constraints, and the outcome of that; as it was, where they cannot be kept."""
-        assert garment.sewn is not None
+    bounds, before = dict.fromkeys(garment.pieces, bound), garment.sewn
+    assert garment.form is not None
+    assert garment.mannequin is not None
+    for share in (0.5, 0.0, None):
+        plans = plan_curves(garment.mannequin.layout, garment.form, garment.positions, bounds, held)
+        if not plans or before is None or not before.converged:
+            return garment
         outcome = sew(
-            garment.pieces, garment.stitching, constraints=[*self.held, *more], folds=self.folds, options=self.options,
-            offsets=garment.sewn.offsets,
+            garment.pieces, garment.stitching, constraints=[*held, *(plan.line for plan in plans)], folds=folds,
+            options=options, offsets=before.offsets,
         )  # fmt: skip
         if not outcome.converged:
-            return garment, outcome
-        return replace(garment, pieces=outcome.pieces, sewn=garment.sewn.followed_by(outcome)), outcome
-
-    def with_girths(self, garment: Garment) -> tuple[Garment, _SewAgain]:
-        """Return the garment with the girths that its form asks for, and what holds it then."""
-        girths = girth_constraints(self.mannequin, self.form, garment.positions)
-        if not girths:
-            return garment, self
-        kept, outcome = self(garment, girths)
-        if not outcome.converged:
-            words = "the girths are as the cloth has them: seams and constraints leave no room for the ease that is asked for"
-            return replace(kept, remarks=(*kept.remarks, words)), self
-        return kept, replace(self, held=[*self.held, *girths])
-
-    def with_curves(self, garment: Garment, bound: float) -> Garment:
-        """Return the garment with its borders drawn as by hand, within a bound [m].
-
-        Pieces that fit as the cloth rests, and are strained beyond its limit as they are drawn, get half the bound, then none.
-        """
-        bounds = dict.fromkeys(garment.pieces, bound)
-        for share in (0.5, 0.0, None):
-            plans = plan_curves(self.mannequin.layout, self.form, garment.positions, bounds, self.held)
-            if not plans or garment.sewn is None or not garment.sewn.converged:
-                return garment
-            drawn, outcome = self(garment, [plan.line for plan in plans])
-            if not outcome.converged or drawn.sewn is None:
-                words = "the borders stay as the cloth rests: drawn by hand, seams or constraints could not be kept"
-                return replace(garment, remarks=(*garment.remarks, words))
-            results = [each for each in outcome.results if each.kind == "curve"]
-            lines = measure_curves(self.form, plans, drawn.positions, results)
-            farthest, price = 1e3 * max(bounds.values()), drawn.sewn.drawing_cost
-            drawn = replace(drawn, curves=Curves(bound_mm=farthest, price_j=price, lines=lines))
-            strained = _strained(garment, drawn)
-            if share is None or not strained:
-                break
-            bounds |= {name: share * bounds[name] for name in strained}
-        less = [f"{name} {1e3 * reach:.3g} mm" for name, reach in bounds.items() if reach < bound]
-        if not less:
-            return drawn
-        words = f"borders are drawn within less, or the cloth would be strained beyond its limit: {', '.join(less)}"
-        return replace(drawn, remarks=(*drawn.remarks, words))
+            words = "the borders stay as the cloth rests: drawn by hand, seams or constraints could not be kept"
+            return replace(garment, remarks=(*garment.remarks, words))
+        drawn, sewn = replace(garment, pieces=outcome.pieces), before.followed_by(outcome)
+        results = [each for each in outcome.results if each.kind == "curve"]
+        lines = measure_curves(garment.form, plans, drawn.positions, results)
+        curves = Curves(bound_mm=1e3 * max(bounds.values()), price_j=sewn.drawing_cost, lines=lines)
+        drawn = replace(drawn, sewn=sewn, curves=curves)
+        strained = _strained(garment, drawn)
+        if share is None or not strained:
+            break
+        bounds |= {name: share * bounds[name] for name in strained}
+    less = [f"{name} {1e3 * reach:.3g} mm" for name, reach in bounds.items() if reach < bound]
+    if not less:
+        return drawn
+    words = f"borders are drawn within less, or the cloth would be strained beyond its limit: {', '.join(less)}"
+    return replace(drawn, remarks=(*drawn.remarks, words))
 
 
 def _strained(before: Garment, after: Garment) -> list[str]:

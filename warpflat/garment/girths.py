@@ -29,7 +29,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
     Args:
         mannequin: the body.
         form: on it.
-        positions: by piece, #V by 2, sewn without these constraints [m].
+        positions: by piece, #V by 2, at rest without these constraints [m].
     """
     found, piece_edges = [], PieceEdges(mannequin.layout, form)
     for level, girth in pattern_girths(mannequin, form, positions).items():

@@ -259,7 +259,7 @@ def meeting_borders(
     taken: set[str] = set()
     for first, second in edges.stretches():
         pieces = edges.names[first[0]], edges.names[second[0]]
-        vertices = edges.chain(first), edges.chain(second)
+        vertices = edges.chains(first, second)
         if pieces[0] != pieces[1]:
             plain = f"{pieces[0]} to {pieces[1]}"
         else:
@@ -446,11 +446,16 @@ class _BorderEdges:
                         break
                     used |= {following, met}
                     first = [*first, following] if step is self.next else [following, *first]
-            if len(first) > 1:
-                yield first, [self._partner[one] for one in first]
+            yield first, [self._partner[one] for one in first]
 
-    def chain(self, edges: Sequence[int]) -> np.ndarray[Any, np.dtype[np.int32]]:
-        """Return the vertices along edges that follow each other, with or against the border's direction."""
-        if self.next[edges[0]] == edges[1]:
-            return np.array([*(self.tail[edge] for edge in edges), self.head[edges[-1]]], dtype=np.int32)
-        return np.array([*(self.head[edge] for edge in edges), self.tail[edges[-1]]], dtype=np.int32)
+    def chains(
+        self, first: Sequence[int], second: Sequence[int]
+    ) -> tuple[np.ndarray[Any, np.dtype[np.int32]], np.ndarray[Any, np.dtype[np.int32]]]:
+        """Return the vertices along two rows of edges that meet, in the same order in space; the first runs as its border does."""
+        against = self._ends[first[0]] != self._ends[second[0]]
+        one = [*(self.tail[edge] for edge in first), self.head[first[-1]]]
+        if against:
+            other = [*(self.head[edge] for edge in second), self.tail[second[-1]]]
+        else:
+            other = [*(self.tail[edge] for edge in second), self.head[second[-1]]]
+        return np.array(one, dtype=np.int32), np.array(other, dtype=np.int32)

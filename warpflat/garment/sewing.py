@@ -279,7 +279,7 @@ def _constraint_equations(
     for constraint in constraints:
         if isinstance(constraint, KeptGirth):
             parts = [
-                girth_equations(joined.numbers(name, edges), constraint.lengths[name], constraint.shares[name])
+                girth_equations(joined.numbers(name, edges), constraint.lengths[name], constraint.shares[name], unsewn)
                 for name, edges in constraint.edges.items()
             ]
             equations.append(one_group(*parts))

@@ -16,7 +16,9 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
 from warpflat.core.text import find_unused_name, quote_value
+from warpflat.cutting.separate_pieces import separate
 from warpflat.flattening.applied_cut import seam_kind
 from warpflat.garment.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
 from warpflat.garment.darts import pleat_depths
@@ -42,16 +44,18 @@ from warpflat.surface.border_seams import SAME_PLACE
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.cut.dart import fish_eye_measure
 from warpflat.surface.cut.dart_legs import are_curved, open_length, pull_back, pull_back_eye
+from warpflat.surface.mirror import mirror_plane
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
     from warpflat.garment.garment import Garment
+    from warpflat.garment.sewn import Stitching
     from warpflat.mannequin.pieces import FormPiece
     from warpflat.surface.border_seams import BorderSeam
     from warpflat.surface.cut.cut_mesh import Crack
     from warpflat.surface.mesh import Surface
 
-__all__ = ["check_edge_names", "grain_of", "pattern_of_garment", "pattern_of_surface"]
+__all__ = ["LACKING", "check_edge_names", "grain_of", "pattern_of_garment", "pattern_of_surface"]
 
 
 #: A datum that strays from the grain by no more than this [m] carries the grain line.
@@ -62,6 +66,10 @@ GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 _MOST_EDGES = 8
 #: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
 BESIDE, ALIGNED = 0.05, 1e-3
+#: How a note on a seam of a mesh begins that its pattern lacks; shorter stretches [m] are not told.
+LACKING, _LACKING = "not sewn in the pattern:", 1e-3
+# A plane of symmetry whose normal has this cosine to x at least is that between left and right.
+_UPRIGHT = 0.8
 
 
 def pattern_of_garment(
@@ -97,6 +105,24 @@ def pattern_of_garment(
         pattern, notes = pattern_of_surface(
             list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams
         )
+        lacking = _lacking_seams(sample, pattern)
+        if lacking:
+            # A seam that ends within an edge of one side alone: that edge is parted there.
+            ends: dict[str, set[int]] = {}
+            for pair, run in lacking:
+                for each, along in zip(pair.pieces, pair.vertices, strict=True):
+                    ends.setdefault(each, set()).update(along[[run[0], run[-1] + 1]].tolist())
+            pattern, notes = pattern_of_surface(
+                list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, ends=ends
+            )
+            lacking = _lacking_seams(sample, pattern)
+        for pair, run in lacking:
+            chain, flat = pair.vertices[0][run[0] : run[-1] + 2], sample.pieces[pair.pieces[0]]
+            place = ", ".join(f"{100 * x:.0f}" for x in flat.network.surface.vertices[chain[len(chain) // 2]] + 0.0)
+            notes += (
+                f"{LACKING} {1e3 * polyline_length(flat.positions[chain]):.0f} mm of the seam of "
+                f"{' and '.join(dict.fromkeys(pair.pieces))} about ({place}) cm: no edges of them fit each other there",
+            )
         # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
         stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
         pattern = replace(pattern, seams=[_eased(seam, pattern, stretched) for seam in pattern.seams])
@@ -104,6 +130,8 @@ def pattern_of_garment(
             return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
         pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
+        if pairs:
+            pattern = _hung_upright(pattern, sample, pairs)
         drawn, more = _drawn_once(pattern.pieces, pairs)
         pattern = replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs))
         pattern, equal = draw_equal_pieces_once(pattern)
@@ -209,6 +237,33 @@ def pattern_of_garment(
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
         notes += equal
     return replace(pattern, worn=describe_worn(garments, pattern.sample, rises)), notes
+
+
+def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair]) -> Pattern:
+    """Return the pattern with its pieces where they hang about x = 0, the plane at which those that are cut turned over are mirrored.
+
+    A mesh may stand beside that plane, and lean. One that faces sideways is left as it is.
+    """
+    points, images = list[FloatArray](), list[FloatArray]()
+    for pair in pairs:
+        partners = garment.mirror_vertices(pair.of, pair.name)
+        assert partners is not None  # find_mirror_pairs has found them
+        points.append(garment.pieces[pair.of].network.surface.vertices)
+        images.append(garment.pieces[pair.name].network.surface.vertices[partners])
+    normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
+    if normal[0] < _UPRIGHT:
+        return pattern
+    # The shortest turn that takes the normal to x (Rodrigues).
+    x = np.array([1.0, 0.0, 0.0])
+    over = np.cross(np.eye(3), np.cross(normal, x))
+    turn = np.eye(3) + over + over @ over / (1.0 + normal[0])
+
+    def hung(piece: Piece) -> Piece:
+        if piece.placement is None:
+            return piece
+        return replace(piece, placement=turn @ piece.placement - np.outer([off, 0.0, 0.0], [0.0, 0.0, 1.0]))
+
+    return replace(pattern, pieces={size: [hung(piece) for piece in row] for size, row in pattern.pieces.items()})
 
 
 def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
@@ -416,6 +471,7 @@ def pattern_of_surface(
     rules: EdgeRules | None = None,
     size: str = "",
     seams: Sequence[BorderSeam] = (),
+    ends: Mapping[str, Collection[int]] | None = None,
 ) -> tuple[Pattern, tuple[str, ...]]:
     """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
 
@@ -429,6 +485,7 @@ def pattern_of_surface(
             called "edge_1" and so on, counter-clockwise.
         size: for the label.
         seams: of the border, by the lines that are sewn to each other.
+        ends: by piece the vertices at which its border is parted into edges, beside its corners and the ends of lines.
 
     Returns:
         The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
@@ -438,7 +495,8 @@ def pattern_of_surface(
             far, or a named seam's side is no edge.
     """
     rules = rules or EdgeRules()
-    pieces = [_mesh_piece(result, size) for result in results]
+    ends = ends or {}
+    pieces = [_mesh_piece(result, size, ends.get(result.surface.name, ())) for result in results]
     named = []
     for seam in seams:
         first, second = (_edges_along(line, results, pieces) for line in seam.sides)
@@ -474,7 +532,7 @@ def pattern_of_surface(
     return Pattern(name=name, pieces={size: ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
 
 
-def _mesh_piece(result: Flattening, size: str) -> Piece:
+def _mesh_piece(result: Flattening, size: str, ends: Collection[int] = ()) -> Piece:
     """Return one piece with its cuts as darts, and its grain."""
     darts: dict[str, tuple[int, int, int]] = {}
     fisheyes: dict[str, Crack] = {}
@@ -500,6 +558,7 @@ def _mesh_piece(result: Flattening, size: str) -> Piece:
             lines=lines,
             darts=darts,
             fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in fisheyes.items()},
+            ends=ends,
         ),
         size=size,
         fabric=result.fabric.name,
@@ -636,6 +695,52 @@ def _mesh_seams(
         beside = tuple(replace(side, reversed=against) for side in (second[::-1] if against else second))
         seams.append(Seam(name=name, sides=(first, beside), ease=rules.ease.get(name, 0.0)))
     return tuple(seams)
+
+
+def _lacking_seams(garment: Garment, pattern: Pattern) -> list[tuple[Stitching, IntArray]]:
+    """Return each stretch of a seam of meshes, longer than 1 mm, that is in no seam of the pattern, with the places of its edges.
+
+    What the user has given another kind than that of a seam, and cuts that are darts or have closed, are none.
+    """
+    (pieces,) = pattern.pieces.values()
+    of_part = {
+        part.surface.name: name
+        for name, piece in garment.pieces.items()
+        for part in (separate(piece) if piece.cuts else (piece,))
+    }
+    seam_of = {
+        (side.piece, side.edge): number
+        for number, seam in enumerate(pattern.seams)
+        for row in seam.sides
+        for side in row
+    }
+    # Each mesh edge of an outline, by its piece and its ends in the layout: the number of its seam, -1 for none; None if it is meant to
+    # be in none.
+    sewn: dict[tuple[str, frozenset[bytes]], int | None] = {}
+    for drawn in pieces:
+        layout = garment.parts[drawn.name].positions
+        for edge in drawn.edges:
+            number = seam_of.get((drawn.name, edge.name), -1 if edge.kind in ("seam", "cut") else None)
+            for a, b in pairwise([] if edge.vertices is None else edge.vertices.tolist()):
+                sewn[of_part[drawn.name], frozenset((layout[a].tobytes(), layout[b].tobytes()))] = number
+    found = []
+    for pair in garment.stitching:
+        if pair.joints is not None:
+            # Named by lines that are whole edges.
+            continue
+        # A cut that has closed, or lies inside a piece, is no edge; nor is the border of a hole, to which nothing can be sewn.
+        first = garment.pieces[pair.pieces[0]]
+        missing = None if pair.name in [title for title, *_ in seams_of_cuts(first)] else -1
+        numbers, layouts = list[list[int | None]](), [garment.pieces[name].positions for name in pair.pieces]
+        for name, layout, row in zip(pair.pieces, layouts, pair.vertices, strict=True):
+            ends = [layout[vertex].tobytes() for vertex in row.tolist()]
+            numbers.append([sewn.get((name, frozenset(both)), missing) for both in pairwise(ends)])
+        lost = [None not in (one, other) and (one != other or one == -1) for one, other in zip(*numbers, strict=True)]
+        length = np.linalg.norm(np.diff(layouts[0][pair.vertices[0]], axis=0), axis=1)
+        for run in np.split(np.arange(len(lost)), np.flatnonzero(np.diff(lost)) + 1):
+            if lost[run[0]] and length[run].sum() > _LACKING:
+                found.append((pair, run.astype(np.int32)))
+    return found
 
 
 def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:

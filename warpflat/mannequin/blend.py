@@ -254,7 +254,9 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
         for grid in (layout.front, layout.back):
             row = grid[0]
             distance = chest[0].offset_cm / 100.0 + chest[1] / 200.0 / math.pi
-            normals = _row_normals(body[row])
+            tangent = np.gradient(body[row], axis=0)
+            normals = np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]])
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
             move[row] = distance * normals + (chest[0].scale - 1.0) * (body[row] - body[row].mean(axis=0))
             held[local[row]] = True
     _solve_moves(move, ids, laplacian, held)
@@ -320,12 +322,6 @@ def _lower_sides(move: FloatArray, layout: Layout, body: FloatArray, column: int
     share = ((heights[first : bust + 1] - heights[first]) / (heights[chest] - heights[first]))[:, None]
     ids = layout.rings[first : bust + 1, (column + at) % count]
     move[ids, 1] += lower * share * near * near * (3.0 - 2.0 * near)
-
-
-def _row_normals(row: FloatArray) -> FloatArray:
-    tangent = np.gradient(row, axis=0)
-    normal = np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]])
-    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
 
 
 def _move_arms(

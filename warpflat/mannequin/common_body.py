@@ -84,7 +84,7 @@ def common_body_of_scan(
     """
     options = options or ScanOptions()
     scan, _ = turn_scan_upright(np.asarray(vertices, float), np.asarray(faces, dtype=np.int64), options)
-    laid = stand_body(scan.vertices, scan.triangles, scan.scanned, landmarks=options.landmarks)
+    laid = stand_body(scan.vertices, scan.triangles, scan.scanned, sits=scan.sits, landmarks=options.landmarks)
     if laid.unsure is not None:
         raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
     turn, shift = scan.placed

@@ -9,7 +9,7 @@ shapes and small bends are preferred.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -45,6 +45,8 @@ _FIRST = ((2, 0.6, 0.12, False, 3), (3, 0.6, 0.12, True, 2), (3, 0.15, 0.06, Tru
 _LAST = ((8, 0.04, 0.03),)
 # Bends of the arms [rad] from which the fit starts, about the axis to the front: as the model stands, raised, hanging, overhead.
 _ARMS = (0.0, 0.5, -0.5, 0.9)
+# Bends [rad] about the axis to the left of hips and knees of a body that sits: on a chair, on a saddle.
+_SEATS = ((-1.5, 1.4), (-1.0, 1.2))
 
 
 class Mesh:
@@ -118,14 +120,19 @@ def vertex_normals(vertices: FloatArray, triangles: NDArray[np.int64]) -> FloatA
 
 
 def fit_body(
-    vertices: FloatArray, triangles: NDArray[np.int64], landmarks: Mapping[str, float] | None = None
+    vertices: FloatArray,
+    triangles: NDArray[np.int64],
+    landmarks: Mapping[str, float] | None = None,
+    *,
+    sits: bool = False,
 ) -> FittedBody:
-    """Fit the body model to a scan that stands upright, facing +Z.
+    """Fit the body model to a scan that stands upright, or sits, facing +Z.
 
     Args:
         vertices: #V by 3 [m], Y up.
         triangles: #T by 3, their normals outward.
         landmarks: known heights [m] of landmarks by name; one that is no place of the model says nothing.
+        sits: whether it sits.
     """
     model, mesh = BodyModel.load(), Mesh(vertices, triangles)
     rng = np.random.default_rng(0)
@@ -143,17 +150,20 @@ def fit_body(
     given = np.array([height_weights(name) for name in heights]).reshape(-1, model.count)
     used = np.flatnonzero(given.any(axis=0))
     known = _Known(model=model.only(used), weights=given[:, used], heights=np.array([*heights.values()]))
-    started = [(_start(model, vertices, arms), np.inf) for arms in _ARMS]
+    seats = _SEATS if sits else ((0.0, 0.0),)
+    started = [(_start(model, vertices, arms, seat), np.inf) for seat in seats for arms in _ARMS]
     for steps, preference, reach, shapes, keep in _FIRST:
         for i, (person, cost) in enumerate(started):
             for _ in range(steps):
-                person, cost = _step(coarse, normals[few], scan, known, person, preference, reach, shapes=shapes)
+                person, cost = _step(
+                    coarse, normals[few], scan, known, person, preference, reach, shapes=shapes, sits=sits
+                )
             started[i] = person, cost
         started = sorted(started, key=lambda each: each[1])[:keep]
     person, cost = started[0]
     for steps, preference, reach in _LAST:
         for _ in range(steps):
-            person, cost = _step(fine, normals[plain], scan, known, person, preference, reach, shapes=True)
+            person, cost = _step(fine, normals[plain], scan, known, person, preference, reach, shapes=True, sits=sits)
     posed = model.vertices(person)
     found, _, place = mesh.closest(posed)
     alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals[found]) > _ALIKE
@@ -161,23 +171,29 @@ def fit_body(
     return FittedBody(person=person, distance=distance, cost=cost)
 
 
-def _start(model: BodyModel, vertices: FloatArray, arms: float) -> Person:
-    """Return the mean body, as tall as the scan and in its place, with its arms bent."""
+def _start(model: BodyModel, vertices: FloatArray, arms: float, seat: tuple[float, float]) -> Person:
+    """Return the mean body, as tall as the scan and in its place, with its arms, and its hips and knees, bent [rad]."""
     bend = np.zeros((len(model.joints), 3))
     for side, sign in (("L", 1.0), ("R", -1.0)):
         bend[model.joints.index(f"upperarm01.{side}"), 2] = sign * arms
+        for joint, angle in zip(("upperleg01", "lowerleg01"), seat, strict=True):
+            bend[model.joints.index(f"{joint}.{side}"), 0] = angle
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     height = high[1] - low[1]
     person = Person(
-        shape=np.zeros(len(model.shapes)), bend=rotation(bend), turn=np.eye(3), scale=float(height), place=np.zeros(3)
+        shape=np.zeros(len(model.shapes)), bend=rotation(bend), turn=np.eye(3), scale=1.0, place=np.zeros(3)
     )
+    person = replace(person, scale=float(height / np.ptp(model.vertices(person)[:, 1])))
     posed = model.vertices(person)
     place = np.array([
         0.5 * (low[0] + high[0]) - 0.5 * (posed[:, 0].min() + posed[:, 0].max()),
         low[1] - posed[:, 1].min(),
-        np.median(vertices[:, 2]) - np.median(posed[:, 2]),
+        # Arms and feet may reach anywhere, but the knees of a body that sits are before its trunk.
+        np.median(vertices[:, 2]) - np.median(posed[:, 2])
+        if seat == (0.0, 0.0)
+        else 0.5 * (low[2] + high[2]) - 0.5 * (posed[:, 2].min() + posed[:, 2].max()),
     ])  # fmt: skip
-    return Person(shape=person.shape, bend=person.bend, turn=person.turn, scale=person.scale, place=place)
+    return replace(person, place=place)
 
 
 def _step(
@@ -190,6 +206,7 @@ def _step(
     reach: float,
     *,
     shapes: bool,
+    sits: bool,
 ) -> tuple[Person, float]:
     """Take one Gauss-Newton step; return the person after it and the cost before it.
 
@@ -226,6 +243,8 @@ def _step(
     bends = np.full((joints, 3), 0.3 * preference + 0.02)
     for joint, name in enumerate(model.joints):
         bends[joint] += 1.0 if name == "spine03" else 0.5 if name.startswith(("clavicle", "lowerleg")) else 0.0
+        if sits and name.startswith(("upperleg", "lowerleg")):
+            bends[joint] = 0.0
     stiffness[count : count + 3 * joints] = bends.ravel()
     value = np.zeros(len(gradient))
     value[: count + 3 * joints] = model.departures(person)

@@ -107,7 +107,8 @@ def measurements_from_size(size: str, **given: float) -> Measurements:
     table = size_tables()["tables"][key]
     title = f"size {table['label']} {name}" + (f"/{tall}" if tall else "")
     replaced = dict(given)
-    label = title + (f" with {_listed(replaced)}" if given else "") + f" ({table['source']}; grade {table['grade']})"
+    listed = ", ".join(f"{name} = {value * 100:g} cm" for name, value in replaced.items())
+    label = title + (f" with {listed}" if given else "") + f" ({table['source']}; grade {table['grade']})"
     if tall:
         low, high = size_tables()["valid"]["range"]["stature"]
         try:
@@ -207,10 +208,6 @@ def _read_given(given: Mapping[str, object]) -> tuple[dict[str, float], list[str
 
 def _plain(name: str) -> str:
     return re.sub(r"[\s_\-']+", "", name).lower()
-
-
-def _listed(values: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {value * 100:g} cm" for name, value in values.items())
 
 
 class _Completion:

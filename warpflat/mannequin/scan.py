@@ -37,6 +37,10 @@ _HARMONICS = 28
 _ARM_LEAN = np.radians(11.0)
 # A level of a body lies at most so far from where the mean body has it, as a share of the stature.
 _NEIGHBOUR = 0.06
+# An arm above the level of its shoulder [rad] draws the shoulder's flesh into the tapes around it.
+_OVERHEAD = np.radians(90.0)
+# What the flesh of a body that sits does not show.
+_SAT_ON = ("hip", "thigh", "knee")
 # How far a side seam follows the waves of front and back at the waist.
 _OFF_PLUMB = 0.5
 
@@ -76,6 +80,10 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     from scipy.spatial import QhullError
 
     scan, notes = turn_scan_upright(vertices, faces, options)
+    if scan.sits and options.landmarks:
+        raise InputError(
+            f"scan: landmark {next(iter(options.landmarks))}: the scan sits, and heights are those of standing bodies; leave it out"
+        )
     # A landmark beyond its neighbours would pull the fit off the body.
     stature = float(scan.vertices[:, 1].max())
     about = {name: LEVELS[name][0] * stature for name in LEVELS_UP if name in LEVELS} | dict(options.landmarks)
@@ -90,7 +98,8 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         scan.triangles,
         scan.scanned,
         faces_ahead=options.facing is not None,
-        as_scanned=options.keep_pose,
+        as_scanned=options.keep_pose and not scan.sits,
+        sits=scan.sits,
         landmarks=options.landmarks,
     )
     if laid.unsure is not None:
@@ -101,6 +110,11 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     if laid.turned:
         scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise, scan.scanned)
         notes.append("the scan was found to face the other way by the body model")
+    sits = scan.sits
+    if sits:
+        # What a tape would measure on the person standing.
+        scan = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned)
+        laid = replace(laid, posed=laid.vertices)
     try:
         crotch = options.landmarks.get("crotch") or _crotch_height(scan, laid)
         crotch -= float(laid.posed[laid.crotch, 1])
@@ -132,10 +146,18 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         for name in ("bust", "underbust", "waist", "hip"):
             girth = float(np.interp(levels[name], t.y, t.girth))
             measures[name] = ScanMeasure(height=found[name].height, girth=girth, guess=measures[name].guess)
+    if laid.raised > _OVERHEAD:
+        for name in measures:
+            if name.startswith(("biceps", "elbow")) and measures[name].guess is None:
+                measures[name] = replace(measures[name], guess="the arms are raised above the shoulders")
     if laid.together is not None:
         more = [_around(vertices, levels["hip"]) for vertices in (laid.together, laid.vertices)]
         hip = measures["hip"]
         measures["hip, legs together"] = replace(hip, girth=hip.girth + more[0] - more[1])
+    if sits:
+        for name in measures:
+            if name.startswith(_SAT_ON):
+                measures[name] = replace(measures[name], guess="the scan sits")
     told = [f"{name} was given: {height:.3f} m" for name, height in options.landmarks.items()]
     return ScanFound(
         blueprint=blueprint,

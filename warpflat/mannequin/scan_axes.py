@@ -16,6 +16,9 @@ __all__ = ["across_trunk", "find_facing", "find_legs"]
 # The trunk looks at most so far away from where the legs do [half degrees].
 _TURNED = 80
 
+# The lower legs of a body that sits lie so far before its trunk, as shares of its height.
+_BEFORE = 0.05, 0.5
+
 #: A part of a section: area and centroid of its convex hull in the section's plane, in the scan's unit.
 _Part: TypeAlias = tuple[float, FloatArray]
 
@@ -44,20 +47,25 @@ def _plane_axes(up: FloatArray) -> FloatArray:
     return np.array([first, np.cross(up, first)])
 
 
-def find_legs(slicer: Slicer, up: FloatArray) -> tuple[float, FloatArray | None]:
-    """Rate how much the mesh is like a standing body if `up` is up.
+def find_legs(slicer: Slicer, up: FloatArray, *, sits: bool = False) -> tuple[float, FloatArray | None]:
+    """Rate how much the mesh is like a standing body if `up` is up; or like one that sits, its legs before its trunk.
 
     Returns:
-        A score from 0 to 1, and the direction from leg to leg; None without legs.
+        A score from 0 to 1, and the direction from leg to leg; None without legs. That of a body that sits is the one across the way
+        from its trunk to its legs, towards its left.
     """
     points = slicer.vertices
     low, high = float((points @ up).min()), float((points @ up).max())
     across = _plane_axes(up)
 
     def parts(share: float) -> list[_Part]:
-        return _large_parts(slicer, up, low + share * (high - low), across)
+        """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
+        cut = slicer.cut(up, low + share * (high - low))
+        found = sorted((_hull_area_and_middle(part.points @ across.T) for part in cut), key=lambda part: -part[0])
+        return [part for part in found if part[0] > 0.15 * found[0][0]]
 
-    levels = np.linspace(0.07, 0.40, 12)
+    # Whoever sits shows lower legs alone.
+    levels = np.linspace(0.07, 0.25 if sits else 0.40, 12)
     pairs = [legs for share in levels if _is_pair(legs := parts(float(share)))]
     if not pairs:
         return 0.0, None
@@ -66,15 +74,14 @@ def find_legs(slicer: Slicer, up: FloatArray) -> tuple[float, FloatArray | None]
     if np.linalg.norm(direction) == 0.0:
         return 0.0, None
     middle = np.mean([0.5 * (legs[0][1] + legs[1][1]) for legs in pairs], axis=0)
-    stands = _is_body(middle, parts(0.62), parts(0.93), high - low)
-    return len(pairs) / len(levels) if stands else 0.0, direction @ across
-
-
-def _large_parts(slicer: Slicer, up: FloatArray, height: float, across: FloatArray) -> list[_Part]:
-    """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
-    found = [_hull_area_and_middle(part.points @ across.T) for part in slicer.cut(up, height)]
-    found.sort(key=lambda part: -part[0])
-    return [part for part in found if part[0] > 0.15 * found[0][0]]
+    sideways, trunk, score = direction @ across, parts(0.62), len(pairs) / len(levels)
+    if sits and trunk:
+        ahead = middle - trunk[0][1]
+        away, middle = float(np.linalg.norm(ahead)), trunk[0][1]
+        if not _BEFORE[0] * (high - low) < away < _BEFORE[1] * (high - low):
+            return 0.0, None
+        sideways = np.cross(up, ahead @ across)
+    return score if _is_body(middle, trunk, parts(0.93), high - low) else 0.0, sideways
 
 
 def _is_pair(legs: list[_Part]) -> bool:

@@ -106,6 +106,10 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     slicer = Slicer(points, triangles)
     rated = [(find_legs(slicer, _AXES[a]), a) for a in candidates]
     (score, sideways), up_name = max(rated, key=lambda r: r[0][0])
+    sits = options.keep_pose and score < 0.6
+    if sits:
+        rated = [(find_legs(slicer, _AXES[a], sits=True), a) for a in candidates]
+        (score, sideways), up_name = max(rated, key=lambda r: r[0][0])
     if score < 0.6 or sideways is None:
         seen = "with the given up axis " if options.up else "in any direction "
         raise InputError(
@@ -123,7 +127,7 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit}")
     if up_name != "+y":
         notes.append(f"the scan's head was found towards {up_name}")
-    left = across_trunk(slicer, up, sideways)
+    left = sideways / np.linalg.norm(sideways) if sits else across_trunk(slicer, up, sideways)
     ahead = np.cross(left, up)
     if options.facing:
         wished = _AXES[options.facing] - up * (_AXES[options.facing] @ up)
@@ -131,7 +135,7 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
             raise InputError(f"scan: it does not face {options.facing}: its legs stand side by side along that axis")
         turn = float(np.sign(ahead @ wished))
     else:
-        turn = find_facing(slicer, up, ahead)
+        turn = 1.0 if sits else find_facing(slicer, up, ahead)
     frame = np.array([left * turn, up, ahead * turn])
     if options.facing is None and frame[2, 2] < 0.9:
         notes.append(f"the scan was found to face ({frame[2, 0]:+.2f}, {frame[2, 1]:+.2f}, {frame[2, 2]:+.2f})")
@@ -148,7 +152,12 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
             f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
+    if sits:
+        notes.append(
+            "the scan sits; its mannequin stands, and warpflat fit --keep-pose carries a garment to it as it sits"
+        )
     upright = Slicer(new, triangles, noise * _UNITS[unit], len(scanned))
+    upright.sits = sits
     upright.placed = frame.T * _UNITS[unit], new[0] - points[0] @ frame.T * _UNITS[unit]
     return upright, notes
 

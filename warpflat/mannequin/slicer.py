@@ -42,6 +42,8 @@ class Slicer:
     ) -> None:
         #: How the mesh came here from its file: a matrix, 3 by 3, that multiplies points from the right, and a shift [m].
         self.placed: tuple[FloatArray, FloatArray] = np.eye(3), np.zeros(3)
+        #: Whether it is a body that sits.
+        self.sits = False
         #: How far noise moved the vertices before it was smoothed [m].
         self.noise = noise
         #: Triangles from this one on close holes.

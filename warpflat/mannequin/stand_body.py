@@ -72,6 +72,7 @@ class StandingBody:
         together: #V by 3 [m], `vertices` with the hip's flesh moved with the legs, as a tape with the legs together asks; None where they
             stand so.
         undone: whether arms or joints were bent so far that their pose is undone.
+        raised: how far the more raised arm is from hanging plumb [rad].
         notes: on the pose, one sentence each.
         turned: whether the scan faces -Z.
     """
@@ -86,6 +87,7 @@ class StandingBody:
     unsure: str | None
     together: FloatArray | None = None
     undone: bool = False
+    raised: float = 0.0
     notes: tuple[str, ...] = ()
     turned: bool = False
 
@@ -193,6 +195,7 @@ def stand_body(
     *,
     faces_ahead: bool = False,
     as_scanned: bool = False,
+    sits: bool = False,
     landmarks: Mapping[str, float] | None = None,
 ) -> StandingBody:
     """Fit the model to an upright scan, lay it on the scan, and undo its pose where no tape is laid in it.
@@ -203,13 +206,14 @@ def stand_body(
         scanned: triangles from this one on close holes.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
         as_scanned: whether the mannequin keeps the scan's pose.
+        sits: whether the scan does.
         landmarks: known heights [m], which the fit follows.
     """
     corners = vertices[triangles]
     if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
         triangles = triangles[:, ::-1]
-    found = _stand(fit_body(vertices, triangles, landmarks), vertices, triangles, scanned, as_scanned)
-    if found.unsure is not None and not faces_ahead:
+    found = _stand(fit_body(vertices, triangles, landmarks, sits=sits), vertices, triangles, scanned, as_scanned)
+    if found.unsure is not None and not faces_ahead and not sits:
         vertices = vertices * [-1.0, 1.0, -1.0]
         fit = fit_body(vertices, triangles, landmarks)
         if fit.cost < found.fit.cost:
@@ -326,6 +330,7 @@ def _stand(
         unsure=unsure,
         together=together,
         undone=other is relaxed,
+        raised=raised,
         notes=tuple(notes),
     )
 
@@ -369,8 +374,9 @@ def _unsure(
             return f"the scan does not show {shown}"
     trunk = np.isin(part, [names.index("spine03"), names.index("pelvis")])
     bands = np.floor(standing[trunk, 1] / _BAND).astype(int)
-    count = np.bincount(bands)
-    share = np.where(count < _FEW, 1.0, np.bincount(bands, seen[trunk]) / np.maximum(count, 1))
+    # A band and its neighbours, or a hole of a hand's breadth at the shoulders would do.
+    count, shown_in = (np.convolve(np.bincount(bands, each), np.ones(3), "same") for each in (None, seen[trunk]))
+    share = np.where(count < _FEW, 1.0, shown_in / np.maximum(count, 1))
     if share.min() < _SEEN:
         return f"the scan does not show the trunk at {_BAND * float(np.argmin(share)):.2f} m"
     return None

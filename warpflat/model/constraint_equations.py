@@ -211,17 +211,25 @@ def length_equations(line: IntArray, lengths: FloatArray) -> ConstraintEquations
     return _equations(ends, LENGTHS, ratio=0.0, target=lengths, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
-def girth_equations(edges: IntArray, lengths: FloatArray, shares: FloatArray) -> ConstraintEquations:
+def girth_equations(
+    edges: IntArray, lengths: FloatArray, shares: FloatArray, positions: FloatArray
+) -> ConstraintEquations:
     """Return equations by which edges have a given length together, each counted by its share.
+
+    The length is measured along the edges' present directions: rows that must become longer would find it in waves.
 
     Args:
         edges: #E by 2, vertices.
         lengths: #E [m], lengths with which they have it.
         shares: #E.
+        positions: #V by 2, where the directions are taken [m].
     """
-    equations = _equations(
-        np.column_stack([edges, edges]), LENGTHS, target=lengths, tolerance=np.inf, sum_tolerance=_GIRTH_TOLERANCE
-    )
+    along = positions[edges[:, 1]] - positions[edges[:, 0]]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    coefficient = np.zeros((len(edges), 4, 2))
+    coefficient[:, 0], coefficient[:, 1] = -along, along
+    ends, sums = np.column_stack([edges, edges]), _GIRTH_TOLERANCE
+    equations = _equations(ends, LINEAR, target=lengths, coefficient=coefficient, tolerance=np.inf, sum_tolerance=sums)
     return replace(equations, soft=_SHARED * shares, share=shares)
 
 

@@ -18,6 +18,8 @@ STEP, FEWEST, MOST = 0.003, 24, 200
 LEAST_BEND = np.radians(1.0)
 #: Waves that are tried: the first [m], the factor from each to the next, and how many.
 FIRST_WAVE, GROWTH, WAVES = 0.03, 1.3, 20
+#: How much more a point that the line must meet counts than another place.
+_MET = 1e6
 #: An inflection is drawn away if the line need not move farther than this for it [m]. The waist of a side seam is one to keep.
 WORTH = 0.0006
 
@@ -64,6 +66,7 @@ def fair_line(
     wave: float,
     *,
     straight: BoolArray | None = None,
+    met: BoolArray | None = None,
     mirrored: tuple[bool, bool] = (False, False),
 ) -> FairLine:
     """Return the line p that minimises the integral of |p - p0|^2 + (wave / 2 pi)^6 |p'''|^2 along its length.
@@ -75,25 +78,30 @@ def fair_line(
         points: #P by 2 [m], p0.
         wave: [m].
         straight: #P, points in a row that come to lie on one straight line, if some do.
+        met: #P, points that the line goes through, as those at which a girth was measured; of a straight row only where it allows.
         mirrored: whether the line goes on beyond its first and its last point as its mirror image in an upright line.
     """
-    return next(_fair_lines(points, [wave], straight, mirrored))
+    return next(_fair_lines(points, [wave], straight, met, mirrored))
 
 
 def _fair_lines(
-    points: FloatArray, waves: Iterable[float], straight: BoolArray | None, mirrored: tuple[bool, bool]
+    points: FloatArray,
+    waves: Iterable[float],
+    straight: BoolArray | None,
+    met: BoolArray | None,
+    mirrored: tuple[bool, bool],
 ) -> Iterator[FairLine]:
     """Yield the line of :func:`fair_line` for each wave [m]; the waves share the equations."""
     places, even = _evenly(points)
     arc = arc_lengths(points)
-    is_straight = _straight_places(points, places, straight)
+    is_straight, weight = _straight_places(points, places, straight), _weights(points, places, met)
     first = 0
     for at_end in (False, True):
         if mirrored[at_end]:
             image = even * [-1.0, 1.0] + [2.0 * even[-1 if at_end else first, 0], 0.0]
             added = slice(-2, None, -1) if at_end else slice(None, 0, -1)
-            rows = [(even, image[added]), (is_straight, is_straight[added])]
-            even, is_straight = (np.concatenate(row if at_end else row[::-1]) for row in rows)
+            rows = [(even, image[added]), (is_straight, is_straight[added]), (weight, weight[added])]
+            even, is_straight, weight = (np.concatenate(row if at_end else row[::-1]) for row in rows)
             first += 0 if at_end else len(image) - 1
     # The points are sums of free ones (#P by #F): those in a straight row lie between the ends of the row.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_straight, [False]]).astype(np.int8)))
@@ -107,7 +115,8 @@ def _fair_lines(
         inner[begin + 1 : last] = True
     basis = sums[:, ~inner]
     bend = np.diff(basis, n=3, axis=0)
-    near, bent, wanted = basis.T @ basis, bend.T @ bend, basis.T @ even
+    weighed = basis.T * weight
+    near, bent, wanted = weighed @ basis, bend.T @ bend, weighed @ even
     for wave in waves:
         solved = np.linalg.solve(near + (wave / (2 * np.pi * places[1])) ** 6 * bent, wanted)
         smooth = (basis @ solved)[first : first + len(places)]
@@ -116,7 +125,9 @@ def _fair_lines(
         yield FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
 
 
-def bend_one_way(points: FloatArray, wave: float, *, straight: BoolArray | None = None) -> FairLine | None:
+def bend_one_way(
+    points: FloatArray, wave: float, *, straight: BoolArray | None = None, met: BoolArray | None = None
+) -> FairLine | None:
     """Return the line that is as near and as fair as that of :func:`fair_line` among those that bend to one side only.
 
     The line is a graph over the chord of its ends: a straight line and hinges of one sign (non-negative least squares).
@@ -124,7 +135,7 @@ def bend_one_way(points: FloatArray, wave: float, *, straight: BoolArray | None 
     Args:
         points: #P by 2 [m].
         wave: as in :func:`fair_line` [m].
-        straight: #P, points in a row that come to lie on one straight line, if some do.
+        straight, met: as in :func:`fair_line`.
 
     Returns:
         The line; None if it is no graph over its chord.
@@ -144,7 +155,9 @@ def bend_one_way(points: FloatArray, wave: float, *, straight: BoolArray | None 
     # The straight line's height and slope may have either sign.
     basis = np.column_stack([np.ones_like(x), -np.ones_like(x), x, -x, -np.maximum(x[:, None] - x[bends], 0.0)])
     bend = (wave / (2 * np.pi * places[1])) ** 3 * np.diff(basis, n=3, axis=0)
-    shares, _ = nnls(np.vstack([basis, bend]), np.concatenate([side * y, np.zeros(len(bend))]), maxiter=100 * len(x))
+    root = np.sqrt(_weights(points, places, met))
+    rows, wanted = np.vstack([root[:, None] * basis, bend]), np.concatenate([root * side * y, np.zeros(len(bend))])
+    shares, _ = nnls(rows, wanted, maxiter=100 * len(x))
     smooth = even[0] + x[:, None] * along + side * (basis @ shares)[:, None] * across
     placed = points_at_lengths(smooth, np.interp(arc_lengths(points), places, arc_lengths(smooth)))
     return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
@@ -155,19 +168,20 @@ def fairest_line(
     bound: float,
     *,
     straight: BoolArray | None = None,
+    met: BoolArray | None = None,
     mirrored: tuple[bool, bool] = (False, False),
     one_way: bool = False,
 ) -> FairLine | None:
     """Return the line within a bound that has few inflections for little shift; None if no line is within it.
 
     Args:
-        points, straight, mirrored: as in :func:`fair_line`.
+        points, straight, met, mirrored: as in :func:`fair_line`.
         bound: [m].
         one_way: whether a line that bends to one side only is preferred, with the longest wave within the bound.
     """
     best: FairLine | None = None
     least = np.inf
-    for tried in _fair_lines(points, FIRST_WAVE * GROWTH ** np.arange(WAVES), straight, mirrored):
+    for tried in _fair_lines(points, FIRST_WAVE * GROWTH ** np.arange(WAVES), straight, met, mirrored):
         if tried.shift > bound:
             break
         cost = tried.shift + WORTH * tried.inflections
@@ -178,7 +192,7 @@ def fairest_line(
     if not one_way or (best is not None and best.inflections == 0):
         return best
     for wave in FIRST_WAVE * GROWTH ** np.arange(WAVES):
-        bent = bend_one_way(points, float(wave), straight=straight)
+        bent = bend_one_way(points, float(wave), straight=straight, met=met)
         if bent is None or bent.shift > bound:
             break
         best = bent
@@ -191,6 +205,14 @@ def _straight_places(points: FloatArray, places: FloatArray, straight: BoolArray
         return np.zeros(len(places), dtype=bool)
     first, last = arc_lengths(points)[straight][[0, -1]] + places[1] * np.array([-1.0, 1.0])
     return np.asarray((places >= first) & (places <= last))
+
+
+def _weights(points: FloatArray, places: FloatArray, met: BoolArray | None) -> FloatArray:
+    """Return how much each place along a line counts: those nearest to points that are to be met count more."""
+    weight = np.ones(len(places))
+    if met is not None:
+        weight[np.rint(arc_lengths(points)[met] / places[1]).astype(np.int64)] = _MET
+    return weight
 
 
 def _evenly(points: FloatArray) -> tuple[FloatArray, FloatArray]:

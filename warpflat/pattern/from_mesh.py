@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -39,6 +39,7 @@ class MeshFeatures:
             found where the border turns back sharply between two equally long legs that end in corners.
         fisheyes: by name, the vertices on both sides of a crack inside: a fish-eye dart. Other border loops inside are
             cutouts.
+        ends: vertices of the border at which edges end, beside its corners.
         grain_line: the feature line whose direction, from its first vertex to its last, is the grain; None takes y.
     """
 
@@ -47,6 +48,7 @@ class MeshFeatures:
     allowances: Mapping[str, float] = field(default_factory=dict)
     darts: Mapping[str, DartPlaces] = field(default_factory=dict)
     fisheyes: Mapping[str, ArrayLike] = field(default_factory=dict)
+    ends: Collection[int] = ()
     grain_line: str | None = None
 
 
@@ -122,6 +124,7 @@ def piece_from_mesh(
         turn = np.array([[y, -x], [x, y]])
         grain = default_grain(flat[outer] @ turn.T) @ turn
     changes = {i for i in range(len(labels)) if labels[i] != labels[i - 1]}
+    changes |= {where[vertex] for vertex in features.ends if vertex in where}
     # Places strictly between the two mouths of a dart.
     inside_leg = {
         (left + k) % len(labels) for left, _, right in darts.values() for k in range(1, (right - left) % len(labels))

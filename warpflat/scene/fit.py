@@ -200,12 +200,13 @@ class FitJob:
             path=path, read=read, layers=layers, body=worn, turn=turn, shift=shift, notes=tuple(notes), sources=tuple(sources)
         )  # fmt: skip
 
-    def to(self, body: str, ease: Mapping[str, float]) -> Carried:
+    def to(self, body: str, ease: Mapping[str, float], *, keep_pose: bool = False) -> Carried:
         """Carry the garment to another body.
 
         Args:
             body: a size, or a scan's file.
             ease: by level [m]; what is not named is kept.
+            keep_pose: whether it ends on that body as its scan is posed; the ease is that of the body standing as the first one.
 
         Raises:
             InputError: it is no body, or the garment does not go around a level.
@@ -217,11 +218,17 @@ class FitJob:
         from warpflat.mannequin.common_body import skin_triangles
         from warpflat.mannequin.fit_body import Mesh
 
-        wearer = _common_body(body, "--to").in_pose_of(self.body)
-        moved = []
-        for (vertices, triangles), layer in zip(self.layers, self.read.layers, strict=True):
-            surface = replace(layer, vertices=vertices, faces=_as_faces(triangles))
-            moved.append(carry(surface, self.body.vertices, wearer.vertices, skin_triangles()))
+        posed = _common_body(body, "--to", keep_pose=keep_pose)
+        wearer = posed.in_pose_of(self.body)
+        cloths = [
+            replace(
+                layer,
+                vertices=vertices,
+                faces=np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32),
+            )
+            for (vertices, triangles), layer in zip(self.layers, self.read.layers, strict=True)
+        ]
+        moved = [carry(one, self.body.vertices, wearer.vertices, skin_triangles()) for one in cloths]
         faces = [triangles for _, triangles in self.layers]
         before, after = level_ease(self.body, self.layers), level_ease(wearer, list(zip(moved, faces, strict=True)))
         for level in ease:
@@ -250,6 +257,14 @@ class FitJob:
             notes.append(
                 f"{100 * deep[1]:.0f} % of the cloth lies within {wearer.name}, {100 * deep[0]:.0f} % within {self.body.name}"
             )
+        if keep_pose:
+            down = float(wearer.vertices[:, 1].min() - posed.vertices[:, 1].min())
+            sits = posed.vertices + np.array([0.0, down, 0.0])
+            moved = [
+                carry(replace(one, vertices=vertices), wearer.vertices, sits, skin_triangles())
+                for one, vertices in zip(cloths, moved, strict=True)
+            ]
+            cloth, wearer = np.concatenate(moved), replace(wearer, vertices=sits)
         # The mesh as it stands in its file moves as its layers do; what they left out, as buttons, as the nearest cloth.
         raw = self.read.raw.vertices * self.read.scale @ self.turn + self.shift
         near = cKDTree(was).query(raw)[1]
@@ -450,20 +465,27 @@ def study_table(fitted: Sequence[Fitted]) -> list[str]:
 
 
 @lru_cache(maxsize=4)
-def _common_body(text: str, option: str) -> CommonBody:
-    """Return the body of a size, or of a scan's file."""
+def _common_body(text: str, option: str, *, keep_pose: bool = False) -> CommonBody:
+    """Return the body of a size, or of a scan's file, which may sit if its pose is to be kept."""
     from warpflat.mannequin.common_body import common_body_of_mannequin, common_body_of_scan
     from warpflat.mannequin.mannequin import Mannequin
+    from warpflat.mannequin.scan_pose import ScanOptions
     from warpflat.surface.io.read import read_scan
 
     if not Path(text).suffix:
+        if keep_pose:
+            raise InputError(
+                f"--keep-pose: {option} {quote_value(text)} is a size, which stands; give the file of a scan"
+            )
         try:
             return common_body_of_mannequin(Mannequin.from_size(text), name=text)
         except InputError as error:
             raise InputError(f"{option}: {error}; or give the file of a scan") from None
     vertices, faces = read_scan(text)
     try:
-        return common_body_of_scan(vertices, faces.astype(np.int64), name=make_file_name(Path(text).stem))
+        options = ScanOptions(keep_pose=keep_pose)
+        name = make_file_name(Path(text).stem)
+        return common_body_of_scan(vertices, faces.astype(np.int64), name=name, options=options)
     except InputError as error:
         raise InputError(f"{option}: {text}: {error}") from None
 
@@ -487,10 +509,6 @@ def _joined(layers: Sequence[tuple[FloatArray, NDArray[np.int64]]]) -> tuple[Flo
     first = np.cumsum([0, *(len(vertices) for vertices, _ in layers)])
     triangles = [corners + start for (_, corners), start in zip(layers, first[:-1].tolist(), strict=True)]
     return np.concatenate([vertices for vertices, _ in layers]), np.concatenate(triangles)
-
-
-def _as_faces(triangles: NDArray[np.int64]) -> NDArray[np.int32]:
-    return np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32)
 
 
 def _obj_lines(vertices: FloatArray, read: GarmentFile) -> str:

@@ -50,6 +50,9 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
 
+# Work units that a piece takes alone at most before it is sewn to others.
+_ALONE = 4000
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshPlan:
@@ -123,7 +126,10 @@ class MeshPlan:
                     ],
                     model=settings.model,
                     wear=scene_wear(scene),
-                    relax=relax,
+                    # How a piece would lie alone is where sewing begins: it need not be known to the last where it is found slowly.
+                    relax=replace(relax, max_steps=min(_ALONE, relax.max_steps))
+                    if self.found and self.found.seams
+                    else relax,
                     callback=None if callback is None else lambda number, progress: callback(names[number], progress),
                     device=self.device or settings.device,
                 )

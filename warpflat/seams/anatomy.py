@@ -12,11 +12,14 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core.arrays import FloatArray
 from warpflat.seams.cloth import Cloth, section
 from warpflat.seams.fields import MirrorMap, Operators, mirror_map
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
+from warpflat.surface.half_edges import mesh_edges
 
 __all__ = ["AXES", "HOLE", "ROLES", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
 
@@ -58,6 +61,9 @@ _NECKS, _SHOULDERS, _LIES = 0.62, 0.35, 0.5
 _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
 # A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
 _SLANT, _ENOUGH_ABOVE = 0.15, 0.2
+# A front opening's area vector is less than this of a ring's; a hem's lies along the height by this cosine; cloth that goes on from all its
+# hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a ball's from 1.2 on).
+_RING, _DOWN, _TUBE = 0.6, 0.5, 1.16
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
 
@@ -416,7 +422,10 @@ def _kind(
         return float(own.min()), float(own.max())
 
     spans = {i: (reach(i)[1] - reach(i)[0]) / tall for i in middles}
-    open_front = any(span > _OPEN for span in spans.values()) and len(limbs) > 0
+    # An opening from top to bottom is no ring.
+    open_front = len(limbs) > 0 and any(
+        span > _OPEN and np.linalg.norm(borders[i].normal) < _RING for i, span in spans.items()
+    )
     kind: Kind = "other"
     if not borders or all(role == "hole" for role in roles.values()):
         kind = "closed"
@@ -482,8 +491,24 @@ def _kind(
             top = max([level[i] for i, role in roles.items() if role == "neck"] or [above])
             if top - reach(hem)[0] > _LONG or (top - reach(hem)[0]) > 1.9 * _trunk_width(cloth, borders, upward):
                 kind = "dress"
+            faces_down = abs(borders[hem].normal @ upward) > _DOWN * np.linalg.norm(borders[hem].normal)
+            if not (faces_down and min(_widening(cloth, borders[i]) for i in (hem, *arms)) < _TUBE):
+                # A ball with holes.
+                kind = "other"
+                roles = {i: "hole" if role == "hole" else "border" for i, role in roles.items()}
     made = [replace(border, role=roles[i]) for i, border in enumerate(borders)]
     return kind, made, open_front
+
+
+def _widening(cloth: Cloth, border: Border) -> float:
+    """Return the area within a border's radius of it, over that of a tube: more than 1 for a ball."""
+    radius = border.length / (2.0 * np.pi)
+    edges = mesh_edges(cloth.faces.astype(np.int32)).astype(np.int64)
+    long = np.linalg.norm(cloth.vertices[edges[:, 0]] - cloth.vertices[edges[:, 1]], axis=1)
+    graph = coo_array((long, (edges[:, 0], edges[:, 1])), shape=(len(cloth.vertices),) * 2).tocsr()
+    far = dijkstra(graph, directed=False, indices=border.vertices, min_only=True)
+    near = far[cloth.faces].mean(axis=1) <= radius
+    return float(cloth.face_areas[near].sum() / max(radius * border.length, 1e-300))
 
 
 def _trunk_width(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> float:
@@ -566,16 +591,10 @@ def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -
 
 def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Kind, size: float) -> list[Limb]:
     """Return the limbs with their forks, which the shortest ways between borders pass through."""
-    from scipy.sparse.csgraph import dijkstra
-
-    from warpflat.surface.half_edges import mesh_edges
-
     arms = [i for i, border in enumerate(borders) if border.role == "sleeve"]
     legs = [i for i, border in enumerate(borders) if border.role == "leg"]
     if not arms and not legs:
         return []
-    from scipy.sparse import coo_array
-
     edges = mesh_edges(cloth.faces.astype(np.int32)).astype(np.int64)
     long = np.linalg.norm(cloth.vertices[edges[:, 0]] - cloth.vertices[edges[:, 1]], axis=1)
     graph = coo_array((long, (edges[:, 0], edges[:, 1])), shape=(len(cloth.vertices),) * 2).tocsr()

@@ -65,7 +65,7 @@ class Cloth:
         """The half-edges of the faces."""
         return half_edges(self.faces.astype(np.int32))
 
-    @property
+    @cached_property
     def face_areas(self) -> FloatArray:
         """#F [m2]."""
         return 0.5 * np.linalg.norm(self._normals(), axis=1)

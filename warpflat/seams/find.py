@@ -169,7 +169,13 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
     notes += [*left, *kept, *inside]
     if auto:
         shape = anatomy.kind not in TAILORED and not is_panel(cloth)
-        cloth, more = part_solids(cloth, shape=shape, most=options.most_pieces)
+        both = mirrored(cloth, anatomy) if even and shape else None
+        cloth, more = part_solids(
+            both or cloth,
+            shape=shape,
+            mirror=None if both is None else anatomy,
+            most=options.most_pieces,
+        )
         notes += more
     cloth = (mirrored(cloth, anatomy) if even else None) or cloth
     for name in list(cloth.seams):

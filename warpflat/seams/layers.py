@@ -15,7 +15,7 @@ from warpflat.seams.options import SeamCut
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.layers import Layer, surplus_layers
+from warpflat.surface.repair.layers import Layer, surplus_faces, surplus_layers
 from warpflat.surface.repair.validate import make_surface, parts_of_faces
 
 __all__ = ["GarmentFile", "read_garment", "read_layers"]
@@ -67,8 +67,15 @@ def read_garment(
     file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim or ALL_PRIMS, name=name)
     vertices, title = raw.vertices * scale, name or make_file_name(file.stem)
     notes = list(raw.notes)
+    polygons = raw.polygons
     try:
-        part = parts_of_faces(vertices, raw.polygons, weld=True, notes=notes)
+        apart = parts_of_faces(vertices, polygons, weld=False)
+        # Faces that share no vertices are a soup, whose second layer falls away as they are joined.
+        if 0 < apart.max() < len(polygons) // 2:
+            surplus_of, told = surplus_faces(vertices, polygons, apart)
+            notes += told
+            polygons = polygons[~surplus_of]
+        part = parts_of_faces(vertices, polygons, weld=True, notes=notes)
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
     found: list[Surface] = []
@@ -79,7 +86,7 @@ def read_garment(
     for number in order[:_MOST_LAYERS].tolist():
         try:
             surface = make_surface(
-                vertices, raw.polygons[part == number], name=title, weld=True, closed=True, source=str(file)
+                vertices, polygons[part == number], name=title, weld=True, closed=True, source=str(file)
             )
         except InputError as error:
             faults.append(error)

@@ -15,7 +15,7 @@ from warpflat.surface.connectivity import join_labels
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
 
-__all__ = ["even_sides", "mirror_images", "mirror_partners"]
+__all__ = ["even_sides", "mirror_images", "mirror_partners", "mirror_plane"]
 
 #: Layouts of which one is the other's mirror image within this [m] become so exactly.
 NEARLY = 5e-4
@@ -83,6 +83,19 @@ def _unlike(vertex: int) -> str:
         f"the mesh is not its own mirror image about the line (first seen at vertex {vertex}): symmetry needs a mesh whose "
         "faces lie alike on both sides, as a mannequin's do"
     )
+
+
+def mirror_plane(points: FloatArray, images: FloatArray) -> tuple[FloatArray, float]:
+    """Return the plane at which points (#P by 3 [m]) are mirrored nearest to their images (#P by 3): its unit normal, and its distance [m].
+
+    The sum of squares is least for the normal n in which the middles of points and images spread least and their differences most:
+    sum 4 (n . (m - mean m))^2 - (n . (p - q))^2. The plane goes through the mean of the middles.
+    """
+    middle, apart = 0.5 * (points + images), points - images
+    spread = middle - middle.mean(axis=0)
+    normal = np.linalg.eigh(4.0 * spread.T @ spread - apart.T @ apart)[1][:, 0]
+    normal = normal * np.sign(normal[np.abs(normal).argmax()])
+    return normal, float(middle.mean(axis=0) @ normal)
 
 
 def mirror_images(surfaces: Mapping[str, Surface]) -> dict[str, tuple[str, IntArray]]:

@@ -17,7 +17,7 @@ from warpflat.core.text import area_words, format_count
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.layers import Layer, surplus_layers
+from warpflat.surface.repair.layers import Layer, overlap_notes, surplus_layers
 from warpflat.surface.repair.meet import MEET, meet_borders
 from warpflat.surface.repair.polygons import split_polygons
 from warpflat.surface.repair.sheets import face_vectors
@@ -93,6 +93,8 @@ def read_pieces(
     layers = [Layer(surface.vertices, surface.faces) for surface in named]
     surplus = surplus_layers(layers, [surface.name for surface in named])
     notes += surplus.values()
+    rest = [number for number in range(len(named)) if number not in surplus]
+    notes += overlap_notes([layers[number] for number in rest], [named[number].name for number in rest])
     # Without its second layer a piece may be alone of its name.
     kept, met = meet_borders(
         _named_apart([surface for number, surface in enumerate(found) if number not in surplus]), meet

@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.errors import InputError
 from warpflat.core.text import area_words, format_count
-from warpflat.surface.repair.sheets import inner_sheets
+from warpflat.surface.closest import nearest_on_triangles
+from warpflat.surface.connectivity import orient
+from warpflat.surface.half_edges import half_edges
+from warpflat.surface.repair.polygons import distinct_corners, split_polygons
+from warpflat.surface.repair.sheets import face_vectors, inner_sheets, outer_sheet
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["SAME_LAYER", "Layer", "doubled_layers", "lies_within", "surplus_layers"]
+__all__ = [
+    "SAME_LAYER",
+    "Layer",
+    "covered_faces",
+    "doubled_layers",
+    "lies_within",
+    "overlap_notes",
+    "surplus_layers",
+]
 
 #: Layers nowhere further apart than this [m] are one: thinner than any cloth.
 SAME_LAYER = 5e-5
@@ -22,6 +38,8 @@ SAME_LAYER = 5e-5
 _SAME_AREA = 0.02
 # Triangles that are tried as the nearest to a point, by their middles.
 _TRIED = 24
+# Layers that lie on each other over more than this [m2] are told. So many parts of a mesh, the largest, are compared.
+_OVERLAP, _MOST_PARTS = 1e-4, 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +65,35 @@ class Layer:
         """Area [m2]."""
         a, b, c = self.corners.transpose(1, 0, 2)
         return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+    @cached_property
+    def _near(self) -> Any:
+        """Its corners (#T by 3 by 3 [m]), a search tree of the middles of its triangles, and how far their corners reach at most [m]."""
+        from scipy.spatial import cKDTree
+
+        corners = self.corners
+        middles = corners.mean(axis=1)
+        reach = float(np.linalg.norm(corners - middles[:, None], axis=2).max(initial=0.0))
+        return corners, cKDTree(middles), reach
+
+    def is_at(self, points: FloatArray, distance: float) -> BoolArray:
+        """Return which points (#P by 3 [m]) lie within a distance [m] of it; some that do may count as further off."""
+        found = (
+            (points >= self.vertices.min(axis=0) - distance) & (points <= self.vertices.max(axis=0) + distance)
+        ).all(axis=1)
+        left = np.flatnonzero(found)
+        found[left] = False
+        if not len(left):
+            return np.asarray(found)
+        corners, tree, reach = self._near
+        left = left[np.isfinite(tree.query(points[left], distance_upper_bound=reach + distance)[0])]
+        tried = np.asarray(tree.query(points[left], k=min(_TRIED, len(corners)))[1]).reshape(len(left), -1)
+        for column in tried.T:
+            open_ = ~found[left]
+            at, triangles = left[open_], corners[column[open_]]
+            place = np.einsum("tc,tcx->tx", nearest_on_triangles(triangles, points[at]), triangles)
+            found[at] = np.linalg.norm(place - points[at], axis=1) <= distance
+        return np.asarray(found)
 
     def describe(self) -> str:
         """Return how many faces of which area it has, in words."""
@@ -112,22 +159,85 @@ def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:
 
 def lies_within(layer: Layer, other: Layer, distance: float) -> bool:
     """Return whether each vertex of a layer is within a distance [m] of another one; some that are may count as further off."""
-    import trimesh
-    from scipy.spatial import cKDTree
-
     if other.vertices_at(layer.vertices, distance)[1].all():
         return True
-    corners = other.corners
-    count = min(_TRIED, len(corners))
-    _, tried = cKDTree(corners.mean(axis=1)).query(layer.vertices, k=count)
-    tried = np.asarray(tried).reshape(len(layer.vertices), count)
-    left = np.arange(len(layer.vertices))
-    for column in tried.T:
-        nearest = trimesh.triangles.closest_point(corners[column[left]], layer.vertices[left])
-        left = left[np.linalg.norm(nearest - layer.vertices[left], axis=1) > distance]
-        if len(left) == 0:
-            return True
-    return False
+    return bool(other.is_at(layer.vertices, distance).all())
+
+
+def covered_faces(layer: Layer, other: Layer) -> BoolArray:
+    """Return #F, which faces of a layer lie on another one: their corners and their middles do."""
+    corners = np.where(layer.faces >= 0, layer.faces, layer.faces[:, :1])
+    covered: BoolArray = np.all(other.is_at(layer.vertices, SAME_LAYER)[corners], axis=1)
+    rows = np.flatnonzero(covered)
+    middles = layer.vertices[layer.faces[rows, :3]].mean(axis=1)
+    covered[rows] = other.is_at(middles, SAME_LAYER)
+    return covered
+
+
+def overlap_notes(layers: Sequence[Layer], names: Sequence[str]) -> list[str]:
+    """Return a note on each two layers that lie on each other in part, with the area."""
+    notes = []
+    for one, two in combinations(range(len(layers)), 2):
+        a, b = layers[one], layers[two]
+        # The finer one of both says how far it goes.
+        area = max(area_of(layer, covered_faces(layer, other)) for layer, other in ((a, b), (b, a)))
+        if area > _OVERLAP:
+            notes.append(
+                f"{names[one]} and {names[two]} lie on each other over {area_words(area)}: both are kept; delete one of them there, unless "
+                "it is a pocket or a facing"
+            )
+    return notes
+
+
+def surplus_faces(vertices: FloatArray, polygons: NDArray[np.int64], part: IntArray) -> tuple[BoolArray, list[str]]:
+    """Return which polygons (#F) are no cloth of their own, and notes, before vertices at one place are joined.
+
+    Of a closed part that is thick cloth these are the inner sheet and the rim, which else would be joined to those of the next; of others
+    what lies on a larger part with vertices of its own.
+
+    Args:
+        vertices: #V by 3 [m].
+        polygons: #F by k vertices, filled up with -1.
+        part: #F, the connected part of each; -1 for those that repair drops.
+    """
+    given = np.flatnonzero(part >= 0)
+    distinct, keep, _ = distinct_corners(polygons[given])
+    given = given[keep]
+    faces, of = split_polygons(vertices, distinct[keep])
+    own = part[given[of]]
+    single = np.ones(len(faces), dtype=bool)
+    rows, layers, notes = list[NDArray[np.int64]](), list[Layer](), list[str]()
+    for number in np.argsort(-np.bincount(own), kind="stable")[:_MOST_PARTS].tolist():
+        row = np.flatnonzero(own == number)
+        used, place = np.unique(faces[row], return_inverse=True)
+        points, corners = vertices[used[used >= 0]], place.reshape(-1, 4).astype(np.int32) - np.int32(used[0] < 0)
+        he = half_edges(corners)
+        if (he.count == 2).all():
+            with suppress(InputError):  # a one-sided part has no sides
+                corners = orient(he)[0]
+                if (sheet := outer_sheet(points, half_edges(corners))) is not None:
+                    notes.append(sheet.describe())
+                    single[row[~sheet.faces]] = False
+                    row, corners = row[sheet.faces], corners[sheet.faces]
+        rows.append(row)
+        layers.append(Layer(points, corners))
+    order = sorted(range(len(rows)), key=lambda number: -layers[number].area)
+    second = np.zeros(len(faces), dtype=bool)
+    for after, small in enumerate(order):
+        for large in order[:after]:
+            second[rows[small]] |= covered_faces(layers[small], layers[large])
+    if second.any():
+        area = float(np.linalg.norm(face_vectors(vertices, faces[second]), axis=1).sum())
+        count = format_count(len(np.unique(of[second])), "face")
+        notes.append(f"{count} of {area_words(area)} dropped: a second layer that lies on another part there")
+    surplus = np.zeros(len(polygons), dtype=bool)
+    surplus[given] = np.bincount(of, single & ~second, minlength=len(given)) == 0.0
+    return surplus, notes
+
+
+def area_of(layer: Layer, chosen: BoolArray) -> float:
+    """Return the area [m2] of the chosen faces (#F)."""
+    return float(np.linalg.norm(face_vectors(layer.vertices, layer.faces[chosen]), axis=1).sum())
 
 
 def _has_faces(whole: Layer, part: Layer) -> bool:

@@ -12,14 +12,16 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.surface.connectivity import components, join_labels
 from warpflat.surface.half_edges import HalfEdges, border_edges, paired_half_edges
 
-__all__ = ["OuterSheet", "face_vectors", "inner_sheets", "outer_sheet", "part_sheets"]
+__all__ = ["THICKEST", "OuterSheet", "face_vectors", "inner_sheets", "outer_sheet", "part_sheets"]
 
-# Cloth is no thicker than this [m], nor than this share of its size, the square root of the area of one side.
-_THICKEST, _THICK_SHARE = 0.015, 0.03
+#: Cloth is no thicker than this [m], nor than this share of its size, the square root of the area of one side.
+THICKEST, _THICK_SHARE = 0.015, 0.03
 # Sheets of one cloth are at their usual distance within this share, over this share of the area.
 _EVEN, _MOSTLY = 0.6, 0.85
 # A part of less than this share of all cloth has no inner sheet looked for.
 _CRUMB = 1e-3
+# Sheets whose flux about their common middle agrees within this share are flat.
+_FLAT = 1e-6
 # Two open sheets whose flux about their own middle is less than this share of their area times their size curve to neither side.
 _CURVED = 0.02
 # The nearest face that looks the other way: a difference in direction of 1 counts like this share of the size.
@@ -136,7 +138,7 @@ def _facing(middle: FloatArray, vector: FloatArray, reach: FloatArray) -> tuple[
     mate, depth, aside = mates(np.arange(len(area)), 0.0)
     order = np.argsort(depth)
     thickness = float(depth[order[np.searchsorted(np.cumsum(area[order]), 0.5 * area.sum())]])
-    if not 0.0 < thickness <= min(_THICKEST, _THICK_SHARE * size):
+    if not 0.0 < thickness <= min(THICKEST, _THICK_SHARE * size):
         return None
     # Another layer on top, as a pocket, is nearer.
     above = np.flatnonzero(depth <= 0.0)
@@ -160,6 +162,13 @@ class OuterSheet:
     faces: BoolArray
     thickness: float
     left_out: float
+
+    def describe(self) -> str:
+        """Return what was taken, as a note."""
+        return (
+            f"cloth drawn {1e3 * self.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
+            f"({1e4 * self.left_out:.0f} cm2) left out"
+        )
 
 
 def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
@@ -202,7 +211,11 @@ def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
         side[fresh] = np.sign(vote[fresh])
     outer = np.where(paired, side[part], 0.0)
     flux = (vector * (middle - np.average(middle, axis=0, weights=area))).sum(axis=1)
-    if float(flux[outer > 0.0].sum()) < float(flux[outer < 0.0].sum()):
+    one_side, other_side = float(flux[outer > 0.0].sum()), float(flux[outer < 0.0].sum())
+    way = vector[outer > 0.0].sum(axis=0)
+    # Of flat cloth the side that looks along an axis, so that panels beside each other keep the same one.
+    flat = abs(one_side - other_side) <= _FLAT * (one_side + other_side)
+    if way[np.abs(way).argmax()] < 0.0 if flat else one_side < other_side:
         outer = -outer
     # Faces without a partner that lie wholly within the outer sheet are of it.
     loose = outer == 0.0
@@ -246,7 +259,7 @@ def inner_sheets(layers: Sequence[tuple[FloatArray, IntArray]]) -> dict[int, tup
     for one in np.argsort(-areas, kind="stable").tolist():
         if areas[one] < _CRUMB * areas.sum():
             break
-        within = (low >= low[one] - _THICKEST).all(axis=1) & (high <= high[one] + _THICKEST).all(axis=1)
+        within = (low >= low[one] - THICKEST).all(axis=1) & (high <= high[one] + THICKEST).all(axis=1)
         others = [k for k in np.flatnonzero(within).tolist() if k != one and k not in taken]
         if one in taken or not others:
             continue
@@ -282,7 +295,10 @@ def inner_sheets(layers: Sequence[tuple[FloatArray, IntArray]]) -> dict[int, tup
         # A rim is a strip along both, as wide as they lie apart.
         around = cKDTree(np.concatenate([layers[k][0] for k in (one, *(group[k] for k in partners))]))
         for k in others:
-            narrow = k not in taken and areas[k] <= 0.75 * thickness * _border_length(*layers[k])
+            points, faces = layers[k]
+            border = points[border_edges(faces)]
+            length = float(np.linalg.norm(border[:, 1] - border[:, 0], axis=1).sum())
+            narrow = k not in taken and areas[k] <= 0.75 * thickness * length
             if narrow and around.query(layers[k][0])[0].max() <= thickness:
                 taken.add(k)
                 found[k] = outer, thickness
@@ -293,8 +309,3 @@ def _longest_sides(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return #F, the longest side of each face (#F by 4) [m]."""
     places = vertices[np.where(faces >= 0, faces, faces[:, :1])]
     return np.asarray(np.linalg.norm(places - np.roll(places, -1, axis=1), axis=2).max(axis=1))
-
-
-def _border_length(vertices: FloatArray, faces: IntArray) -> float:
-    ends = border_edges(faces)
-    return float(np.linalg.norm(vertices[ends[:, 1]] - vertices[ends[:, 0]], axis=1).sum())

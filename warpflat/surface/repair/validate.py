@@ -30,7 +30,7 @@ from warpflat.surface.repair.polygons import (
     split_polygons,
     split_quads,
 )
-from warpflat.surface.repair.sheets import face_vectors, outer_sheet, part_sheets
+from warpflat.surface.repair.sheets import THICKEST, face_vectors, outer_sheet, part_sheets
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
 
@@ -41,6 +41,8 @@ __all__ = ["ClosedSurfaceError", "check_positions", "make_surface", "parts_of_fa
 _SMALLEST, _LARGEST = 1e-20, 1e20
 # So many sheets at most meet at an edge. One that comes off with less than this share of the area is left out if one piece is asked for.
 _MOST_SHEETS, _FIN = 8, 0.05
+# A wall between two sheets is joined to others along this share of its border.
+_WALL = 0.8
 # Odd factors by which the vertices of a face are mixed to one number.
 _HASH = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93], dtype=np.uint64)
 
@@ -150,10 +152,7 @@ def make_surface(
         if (mesh.half_edges.count == 2).all() and (sheet := outer_sheet(mesh.vertices, mesh.half_edges)) is not None:
             # A closed surface that is cloth drawn with its thickness.
             mesh.keep(sheet.faces)
-            mesh.notes.append(
-                f"cloth drawn {1e3 * sheet.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
-                f"({1e4 * sheet.left_out:.0f} cm2) left out"
-            )
+            mesh.notes.append(sheet.describe())
         _separate_touching_fans(mesh)
         kept = _used_vertices(mesh.faces)
         if len(kept) < len(mesh.vertices):
@@ -485,11 +484,26 @@ def _part_sheets(mesh: _Mesh) -> None:
     faces, origin = part_sheets(mesh.vertices, he)
     before = int(mesh.part.max()) + 1
     mesh.faces, mesh.vertices, mesh.index = faces, mesh.vertices[origin], mesh.index[origin]
-    areas = np.sort(np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, faces), axis=1)))[::-1]
+    # A narrow strip that was joined along both sides is a wall between two sheets of thick cloth, as where panels were glued rim to rim.
+    parted = mesh.half_edges
+    alone = parted.count[parted.edge] == 1
+    sides = np.stack([parted.tail[alone], parted.head[alone]], axis=1)
+    digits = (len(origin), 1)
+    met = np.isin(np.sort(origin[sides], axis=1).astype(np.int64) @ digits, he.edges[crowded].astype(np.int64) @ digits)
+    length, own = np.linalg.norm(np.diff(mesh.vertices[sides], axis=1)[:, 0], axis=1), mesh.part[parted.face[alone]]
+    border, joined = (np.bincount(own, each, minlength=int(mesh.part.max()) + 1) for each in (length, length * met))
+    area = np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, faces), axis=1))
+    walls = (area <= 0.5 * THICKEST * border) & (joined >= _WALL * border) & (border > 0.0)
+    left_out = ""
+    if walls.any() and not walls.all():
+        left_out = f", {format_count(int(walls.sum()), 'wall')} between sheets left out ({area_words(float(area[walls].sum()))})"
+        mesh.keep(~walls[mesh.part])
+    areas = np.sort(np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1)))[::-1]
     off = [area_words(area) for area in areas[1 : 1 + max(len(areas) - before, 0)]]
     mesh.notes.append(
         f"{format_count(len(crowded), 'edge')} at which more than two faces meet: the sheets were parted there"
         + (f", {format_count(len(off), 'sheet')} came off ({', '.join(off[:4])})" if off else "")
+        + left_out
     )
 
 
