@@ -1,4 +1,4 @@
-"""Partners across a line: by how faces hang together, wherever they lie."""
+"""Partners across a line, by how faces hang together, wherever they lie; layouts that are nearly mirror images."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.surface.mirror import mirror_partners
+from warpflat.surface.mirror import even_sides, mirror_partners
 from warpflat.surface.shapes import make_shape
 
 
@@ -43,3 +43,25 @@ def test_triangles_and_quads_together():
 def test_a_mesh_without_a_mirror_image_is_told(faces: list[list[int]], axis: list[int], message: str):
     with pytest.raises(InputError, match=message):
         mirror_partners(np.array(faces, dtype=np.int32), np.array(axis, dtype=np.int32), vertex_count=8)
+
+
+def test_layouts_that_are_nearly_mirror_images_become_so_where_they_lie() -> None:
+    random = np.random.default_rng(5)
+    left = random.uniform(0.0, 0.3, (12, 2))
+    order = random.permutation(12)
+    # The image, a tenth of a millimetre off, at another place on the table; the middle is its own image.
+    right = (left * [-1.0, 1.0])[order] + [0.7, 0.2] + 1e-4 * random.uniform(-1.0, 1.0, (12, 2))
+    aside = np.array([1.4, 0.0])
+    back = np.concatenate([left + aside, left * [-1.0, 1.0] + aside])
+    itself = np.concatenate([np.arange(12) + 12, np.arange(12)])
+    images = {"left": ("right", np.argsort(order)), "right": ("left", order), "back": ("back", itself)}
+    even = even_sides({"left": left, "right": right, "back": back}, images)
+    shapes = [even[name] - even[name].mean(axis=0) for name in ("left", "right")]
+    np.testing.assert_allclose(shapes[0] * [-1.0, 1.0], shapes[1][np.argsort(order)], atol=1e-12)
+    for name, was in (("left", left), ("right", right), ("back", back)):
+        np.testing.assert_allclose(even[name].mean(axis=0), was.mean(axis=0), atol=1e-12)
+        assert np.abs(even[name] - was).max() < 2e-4
+    # All or none.
+    far = right + 1e-3 * random.uniform(-1.0, 1.0, (12, 2))
+    same = even_sides({"left": left, "right": far, "back": back}, images)
+    assert all(np.array_equal(same[name], was) for name, was in (("left", left), ("right", far), ("back", back)))
