@@ -18,6 +18,7 @@ from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.beside import two_at_a_time
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core.text import find_unused_name
 from warpflat.cutting.ledger import coarse_options
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.flatten_piece import flatten
@@ -223,7 +224,11 @@ def cut_by_energy(
             if twin is None and _is_lopsided(candidate, anatomy):
                 # Both sides of a piece are cut alike.
                 target = _mesh_at(made, worst.mesh)
-                made = (None if target is None else _cut(made, target, _mirrored(candidate, anatomy), _MATE)) or made
+                both = None if target is None else _cut(made, target, _mirrored(candidate, anatomy), _MATE)
+                if both is None and candidate.parts:
+                    # A panel on one side alone is no tailor's.
+                    return None
+                made = both or made
             # Where a twin is cut alike, it adds as many.
             more = (int(made.parts.max()) + 1 - len(pieces)) * (1 if twin is None else 2)
             if more and len(pieces) + more > most:
@@ -763,8 +768,11 @@ def _candidates(
 
 def _is_lopsided(candidate: _Candidate, anatomy: Anatomy) -> bool:
     """Return whether a line has a mirror image that is another one."""
-    lopsided = candidate.start is not None or candidate.level is not None
-    return lopsided and anatomy.mirror is not None and abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
+    if anatomy.mirror is None or (candidate.start is None and candidate.level is None):
+        return False
+    # A line around the front runs on both sides, wherever its place is.
+    around = candidate.level is not None and candidate.level[0] == FACING
+    return around or abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
 
 
 def _across(candidate: _Candidate, anatomy: Anatomy) -> float:
@@ -879,7 +887,5 @@ def _renamed(cloth: Cloth, old: str, new: str) -> Cloth:
 
 def _free_name(cloth: Cloth, candidate: _Candidate, side: float) -> str:
     """Return an unused name of a seam or a dart, with its side: positive left, negative right."""
-    from warpflat.core.text import find_unused_name
-
     word = "" if side == 0.0 else f" {side_word(side)}"
     return find_unused_name(f"{candidate.name}{word}", cloth.seams)

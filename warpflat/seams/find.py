@@ -349,8 +349,9 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
             of_hood = sleeve >= len(anatomy.limbs_of("sleeve"))
             name = f"{side_word(side)}_{'hood' if of_hood else 'sleeve'}"
         elif anatomy.kind == "trousers":
-            rims = [border.vertices for border in anatomy.borders if border.role == "leg"]
-            part = "leg" if any(np.isin(rim, mesh.vertex_of).any() for rim in rims) else "yoke"
+            # By its role: vertices of a cloth that has been mirrored have other numbers.
+            ends = np.round(cloth.values["role"][mesh.vertex_of]) == 1 + ROLES.index("leg")
+            part = "leg" if ends.any() else "yoke"
             name = "_".join(filter(None, [side_word(side) if lopsided else "", face, part]))
         elif anatomy.kind in ("top", "dress", "skirt", "jumpsuit"):
             name = f"{side_word(side)}_{face or 'side'}" if lopsided else face or "body"
