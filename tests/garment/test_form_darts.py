@@ -14,7 +14,6 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.darts import FormDart
 from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
-from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.half_pieces import halved
@@ -43,14 +42,6 @@ def sewn(body, block):
         for dart in block.darts
     ]
     return flatten_form(body, body.form(replace(block, darts=tuple(darts))))
-
-
-def test_an_apple_has_no_darts_in_a_skirt():
-    """Its waist is wider than what lies below it, in front and behind; above the waist it has its darts."""
-    apple = Mannequin.from_measurements(bust=1.1, waist=1.14, hip=1.06, stature=1.66, resolution_mm=30.0)
-    darts = shaped_form(apple.layout, shipped_form("basic_block"), "darts", apple.vertices).darts
-    assert {dart.piece for dart in darts} == {"front_bodice", "back_bodice"}
-    assert not shaped_form(apple.layout, shipped_form("trousers"), "darts", apple.vertices).darts
 
 
 def test_names_of_seams_stay_with_darts(body, block):

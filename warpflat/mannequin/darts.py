@@ -23,8 +23,6 @@ __all__ = ["FormDart", "PlacedDart", "dart_along", "dart_part", "place_darts", "
 _TIPS = {"bust": 25.0, "front": 20.0, "back": 20.0, "front skirt": 100.0, "back skirt": 130.0, "back shoulder": 75.0}
 #: A skirt's second dart lies half-way from the first to the side and is this share as long.
 _SECOND = 0.9
-#: Both darts of a skirt's front or back together take up at least this [m]: 5 mm each, below which nobody sews one.
-_LEAST_INTAKE = 0.010
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,29 +165,16 @@ def place_darts(
     return tuple(found)
 
 
-def standard_darts(
-    layout: Layout, bricks: Mapping[str, Sequence[str]], body: FloatArray | None = None
-) -> tuple[FormDart, ...]:
+def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple[FormDart, ...]:
     """Return the darts of a pattern book's block that fit the pieces (Aldrich, Metric Pattern Cutting for Women's Wear).
 
-    Bust and waist darts in the front bodice, a waist dart in the back; in the skirt one a side in front, two in the back. A skirt has
-    none in front, or behind, where the body is not wider below its waist: on an apple.
+    Bust and waist darts in the front bodice, a waist dart in the back; in the skirt one a side in front, two in the back.
 
     Args:
         layout: the grid.
         bricks: by piece, both sides of the body.
-        body: its vertices, #V by 3 [m]; without them it is as in the book.
     """
     found: list[FormDart] = []
-    widens = {"front": True, "back": True}
-    if body is not None:
-        for face, middle in (("front", 0), ("back", 2 * layout.quarter)):
-            columns = np.arange(middle - layout.quarter, middle + layout.quarter + 1) % layout.rings.shape[1]
-            waist, *below = (
-                arc_lengths(body[layout.rings[layout.level_row[level], columns]])[-1]
-                for level in ("waist", "abdomen", "hip")
-            )
-            widens[face] = max(below) > waist + _LEAST_INTAKE
     for piece, chosen in bricks.items():
         cloth = _cloth(layout, chosen)
         if _bust_mouth(layout, cloth, "bust") is not None:
@@ -198,12 +183,9 @@ def standard_darts(
             dart = FormDart(name="waist dart", piece=piece, line=f"princess {face} left")
             run = _longest_run(_grid_line(layout, dart), cloth)
             at_waist = {int(run[at]) for at in (0, -1)} & set(layout.lines["waist"].tolist()) if len(run) else set()
-            below_waist = bool(at_waist) and int(run[-1]) in at_waist
-            if below_waist and not widens[face]:
-                continue
             if at_waist or _waist_of_fisheye(layout, run) is not None:
                 found.append(dart)
-            if below_waist and face == "back":
+            if at_waist and int(run[-1]) in at_waist and face == "back":
                 found.append(replace(dart, name="second waist dart", towards="side left", like=dart.name))
     return tuple(found)
 

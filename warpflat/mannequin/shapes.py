@@ -48,7 +48,7 @@ def shaped_form(
     if shape == "none":
         return form
     if shape == "darts":
-        darts = standard_darts(layout, bricks, vertices)
+        darts = standard_darts(layout, bricks)
         # Legs are straight where the cloth hangs straight over the hollows of the body.
         ruled = [_UNDER_BUST] if any(dart.line == "bust" for dart in darts) else []
         bridged = [_SMALL_OF_BACK] if any(dart.line == "princess back left" for dart in darts) else []
