@@ -248,6 +248,14 @@ def test_a_pattern_as_it_is_is_not_changed(command: Command, more: tuple[str, ..
     assert "leave" in told
 
 
+def test_a_piece_has_no_dot_in_its_name(tmp_path: Path):
+    """As of Blender's second material: an edge is "piece.edge"."""
+    file = write_obj(tmp_path / "skirt.obj", 0.01)
+    file.write_text(file.read_text().replace("g front", "g Lining.001").replace("g back", "g Lining.002"))
+    pattern = read_cut_pattern(file, units="m", name="skirt").pattern
+    assert {piece.name for piece in pattern.pieces[""]} == {"Lining_001", "Lining_002"}
+
+
 def test_names_of_islands_are_those_of_the_file(tmp_path: Path):
     panels = read_sewn_panels(write_obj(tmp_path / "skirt.obj"), units="m")
     assert [panel.surface.name for panel in panels] == ["front", "back"]
