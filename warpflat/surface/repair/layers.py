@@ -87,6 +87,8 @@ class Layer:
             return np.asarray(found)
         corners, tree, reach = self._near
         left = left[np.isfinite(tree.query(points[left], distance_upper_bound=reach + distance)[0])]
+        if not len(left):
+            return np.asarray(found)
         tried = np.asarray(tree.query(points[left], k=min(_TRIED, len(corners)))[1]).reshape(len(left), -1)
         for column in tried.T:
             open_ = ~found[left]
