@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from command import Command
+from scipy.spatial import cKDTree
 
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.export.read_pattern import read_pattern
 from warpflat.export.sewn_usd import write_sewn_usd
 from warpflat.garment.as_cut import read_cut_pattern, worn_at
+from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.scene.outside_pattern import OutsideJob
@@ -48,8 +51,9 @@ def skirt(wide: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
     return points[index[1]], index[2].ravel()[np.concatenate(quads)], np.concatenate(flat), np.concatenate(cut)
 
 
-def write_obj(path: Path, unit: float = 0.01, *, wide: float = 1.0, change: Any = None) -> Path:
+def write_obj(path: Path, unit: float = 0.01, *, wide: float = 1.0, change: Any = None, move: Any = None) -> Path:
     points, quads, flat, cut = skirt(wide)
+    points = points if move is None else move(points)
     places = flat / unit
     places = places if change is None else change(places)
     rows = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points] + [f"vt {u:.9g} {v:.9g}" for u, v in places]
@@ -115,6 +119,42 @@ def test_a_worn_mesh_is_draped_by_its_pattern_from_where_it_is_worn(command: Com
         [job.lifts[piece.name](edge.points) for piece in job.pattern.pieces[""] for edge in piece.edges]
     )
     assert max(np.linalg.norm(places - vertex, axis=1).min() for vertex in border) < 1e-4
+
+
+def test_a_worn_mesh_lies_on_the_scan_that_stands_where_it_does(tmp_path: Path):
+    """The scan is in cm, turned, aside and below, its legs apart; a garment beside it starts as on any other body."""
+    body, corners = finer_body()
+    model = BodyModel.load()
+    person = Person(
+        shape=np.zeros(len(model.shapes)),
+        bend=rotation(np.zeros((len(model.joints), 3))),
+        turn=np.eye(3),
+        scale=1.7,
+        place=np.zeros(3),
+    )
+    skin = body @ model.vertices(person)
+    turn = rotation(np.array([[0.0, 0.6, 0.0]]))[0]
+    aside = np.array([0.4, -1.2, 0.7])
+    trimesh.Trimesh(100.0 * (skin @ turn + aside), corners, process=False).export(tmp_path / "scan.obj")
+    hip = np.array([0.0, skin[:, 1].min() + 0.75, 0.0])
+    for beside in (np.zeros(3), np.array([1.0, 0.0, 0.0])):
+        file = write_obj(
+            tmp_path / "worn.obj", move=lambda points, beside=beside: (points + hip + beside) @ turn + aside
+        )
+        job = OutsideJob.read(file, units="m", body=str(tmp_path / "scan.obj"))
+        places, raw = (
+            np.concatenate([lifts[piece.name](edge.points) for piece in job.pattern.pieces[""] for edge in piece.edges])
+            for lifts in (job.lifts, OutsideJob.read(file, units="m").lifts)
+        )
+        assert job.body is not None
+        assert job.body.scan is not None
+        if beside.any():
+            np.testing.assert_array_equal(places, raw)
+            continue
+        near, was = cKDTree(job.body.scan[0]).query(places)[0], cKDTree(skin @ turn + aside).query(raw)[0]
+        np.testing.assert_allclose(near, was, atol=1e-5)
+        assert "the mannequin keeps the scan's pose" in job.body.notes
+        assert np.ptp(places, axis=0) == pytest.approx(np.ptp(skirt()[0], axis=0), abs=5e-3)
 
 
 def test_what_is_written_as_style3d_has_it_is_read_back(tmp_path: Path):
@@ -206,6 +246,14 @@ def test_a_pattern_as_it_is_is_not_changed(command: Command, more: tuple[str, ..
     write_obj(Path("skirt.obj"))
     told = command("flatten", "skirt.obj", "--units", "m", "--pattern", "uv", "--out", "out", *more, *QUIET).refusal
     assert "leave" in told
+
+
+def test_a_piece_has_no_dot_in_its_name(tmp_path: Path):
+    """As of Blender's second material: an edge is "piece.edge"."""
+    file = write_obj(tmp_path / "skirt.obj", 0.01)
+    file.write_text(file.read_text().replace("g front", "g Lining.001").replace("g back", "g Lining.002"))
+    pattern = read_cut_pattern(file, units="m", name="skirt").pattern
+    assert {piece.name for piece in pattern.pieces[""]} == {"Lining_001", "Lining_002"}
 
 
 def test_names_of_islands_are_those_of_the_file(tmp_path: Path):

@@ -8,7 +8,15 @@ import unicodedata
 from warpflat.core.errors import InputError
 from warpflat.core.text import control_in, plain_letters, quote_value
 
-__all__ = ["check_file_name", "check_label", "make_file_name", "plain_label", "plain_name", "same_file"]
+__all__ = [
+    "check_file_name",
+    "check_label",
+    "make_file_name",
+    "make_piece_name",
+    "plain_label",
+    "plain_name",
+    "same_file",
+]
 
 # Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
 _FORBIDDEN = '/\\:*?"<>|'
@@ -55,6 +63,11 @@ def make_file_name(name: str, otherwise: str = "piece") -> str:
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
     return f"_{short}" if _is_device(short) else short or otherwise
+
+
+def make_piece_name(name: str) -> str:
+    """Return a piece's name made of one that was not chosen for it, such as that of a material: an edge of it is "piece.edge"."""
+    return make_file_name(name).replace(".", "_")
 
 
 def plain_name(name: str, others: str = " _.-") -> str:

@@ -14,7 +14,7 @@ from warpflat.core.input_files import FARTHEST, reading
 from warpflat.pattern.pieces import Piece
 from warpflat.pattern.whole_pieces import MIRRORED
 
-__all__ = ["Lift", "read_lift", "surface_lift", "whole_lifts"]
+__all__ = ["Lift", "moved_lift", "read_lift", "surface_lift", "whole_lifts"]
 
 #: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]).
 Lift = Callable[[FloatArray], FloatArray]
@@ -65,6 +65,11 @@ def surface_lift(space: FloatArray, flat: FloatArray, triangles: IntArray) -> Li
         triangles: #T by 3, of both.
     """
     return _lift(space[triangles], flat[triangles])
+
+
+def moved_lift(lift: Lift, turn: FloatArray, shift: FloatArray) -> Lift:
+    """Return the map to a surface that was moved: its points @ turn (3 by 3) + shift [m]."""
+    return lambda points: lift(points) @ turn + shift
 
 
 def _lift(surface: FloatArray, pattern: FloatArray) -> Lift:

@@ -65,6 +65,7 @@ class Mannequin:
         measures: for a scan, tapes around the scan itself, by name.
         lengths: for a body of a size or of measurements, all of these by name [m].
         scan: for a scan, its vertices (#P by 3 [m]) upright with the legs moved together, and its triangles; else None.
+        placed: for a scan, how its file's points come upright, before the legs move: points @ placed[0] + placed[1] [m]; else None.
         sources: files from which a scan was read; none of them is ever replaced by what is made of it.
     """
 
@@ -78,6 +79,7 @@ class Mannequin:
     measures: Mapping[str, ScanMeasure] = field(default_factory=dict)
     lengths: Mapping[str, float] = field(default_factory=dict)
     scan: tuple[FloatArray, NDArray[np.int64]] | None = None
+    placed: tuple[FloatArray, FloatArray] | None = None
     sources: tuple[Path, ...] = ()
 
     @classmethod
@@ -129,7 +131,7 @@ class Mannequin:
         return cls(
             layout=layout, vertices=average_sides(scanned, layout) if options.symmetric else scanned,
             source=found.source, notes=(*found.notes, *sides_note(scanned, layout, averaged=options.symmetric)),
-            sections=found.sections, measures=found.measures, scan=found.scan,
+            sections=found.sections, measures=found.measures, scan=found.scan, placed=found.placed,
         )  # fmt: skip
 
     @classmethod

@@ -56,6 +56,7 @@ class ScanFound:
         sections: length [m] of the body's own section, hollows followed, at every closed level.
         measures: tapes around the scan itself, by name.
         scan: vertices (#P by 3 [m]) upright with the legs moved together, and triangles.
+        placed: a matrix (3 by 3) and a shift [m], by which points of the scan come upright, before the legs move.
     """
 
     blueprint: Blueprint
@@ -64,6 +65,7 @@ class ScanFound:
     sections: Mapping[str, float]
     measures: Mapping[str, ScanMeasure]
     scan: tuple[FloatArray, NDArray[np.int64]]
+    placed: tuple[FloatArray, FloatArray]
 
 
 def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
@@ -84,6 +86,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         raise InputError(
             f"scan: landmark {next(iter(options.landmarks))}: the scan sits, and heights are those of standing bodies; leave it out"
         )
+    turn, shift = scan.placed
     # A landmark beyond its neighbours would pull the fit off the body.
     stature = float(scan.vertices[:, 1].max())
     about = {name: LEVELS[name][0] * stature for name in LEVELS_UP if name in LEVELS} | dict(options.landmarks)
@@ -109,6 +112,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         )
     if laid.turned:
         scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise, scan.scanned)
+        turn, shift = turn * [-1.0, 1.0, -1.0], shift * [-1.0, 1.0, -1.0]
         notes.append("the scan was found to face the other way by the body model")
     sits = scan.sits
     if sits:
@@ -166,6 +170,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         sections={level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
         measures=measures,
         scan=(moved.vertices, scan.triangles),
+        placed=(turn, shift),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError, is_number, nearest
-from warpflat.core.file_names import make_file_name
+from warpflat.core.file_names import make_piece_name
 from warpflat.core.input_files import check_values, reading
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.core.text import find_unused_name, format_count, quote_value
@@ -199,7 +199,7 @@ def _named_by_file(found: FoundSeams, seams: FileSeams, read: GarmentFile) -> Fo
     ways = [seams.way] if seams.way in named else ["groups", "materials"]
     names = [piece.name for piece in found.pieces]
     for way in ways:
-        own = [make_file_name(title[list(named).index(way)]) for title in titles]
+        own = [make_piece_name(title[list(named).index(way)]) for title in titles]
         if all(title[list(named).index(way)] for title in titles) and (way == seams.way or len(set(own)) == len(own)):
             taken: set[str] = set()
             names = []

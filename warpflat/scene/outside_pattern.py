@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from warpflat.core.errors import InputError
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     from warpflat.pattern.pieces import Pattern, Piece, Seam
 
 __all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
+
+# A garment lies on a scan if half of its borders are nearer than this to the scan's vertices [m].
+_BESIDE = 0.2
 
 
 class SewnSeamTable(Table):
@@ -133,7 +137,8 @@ class OutsideJob:
                     f"{path}: names no seams; give --seams FILE with [[seams]] sides = "
                     f"[{', '.join(_examples(pattern))}] (warpflat drape {path.name} --edges prints all edges)"
                 )
-            mannequin = _body(body, table, run_body, path, designed=bool(lifts))
+            worn = _worn_scan(body, table, lifts, pattern) if lifts and run_body is None else None
+            mannequin, lifts = worn or (_body(body, table, run_body, path, designed=bool(lifts)), lifts)
         name = make_file_name((path if path.is_dir() else path.with_suffix("")).resolve().name)
         return cls(name=name, pattern=pattern, sewing=table, body=mannequin, lifts=lifts, sources=tuple(sources))
 
@@ -224,6 +229,49 @@ def _examples(pattern: Pattern) -> list[str]:
     return [f'"{pieces[0].name}.{pieces[0].edges[0].name}"', f'"{second.name}.{second.edges[-1].name}"']
 
 
+def _asked(given: str | None, table: SewingTable) -> MannequinTable | None:
+    """Return the body that --body or the sewing file names."""
+    if given is None:
+        return table.mannequin
+    return check_table(MannequinTable, {"scan" if Path(given).suffix else "size": given}, "--body")
+
+
+def _worn_scan(
+    given: str | None, table: SewingTable, lifts: Mapping[str, Lift], pattern: Pattern
+) -> tuple[Mannequin, dict[str, Lift]] | None:
+    """Return the mannequin of a scan on which the designed surface of a mesh lies, in the scan's pose, and the way to that surface.
+
+    Both come to the mannequin's axes together. None if the body is no scan, or the surface does not lie on it as their files stand.
+    """
+    from scipy.spatial import cKDTree
+
+    from warpflat.draping.lift import moved_lift
+
+    asked = _asked(given, table)
+    if asked is None or asked.scan is None:
+        return None
+    kept = asked.model_copy(update={"pose": "scan", "symmetric": False})
+    try:
+        body = mannequin_from_table(kept, path_of=lambda file: Path(expand_variables(file)))
+    except InputError:
+        # The body as it is asked for may be one; if not, it says why.
+        return None
+    assert body.placed is not None
+    assert body.scan is not None
+    turn, shift = body.placed
+    # The surface is in metres, whatever the scan's unit.
+    turn = turn / np.cbrt(np.linalg.det(turn))
+    moved = {name: moved_lift(lift, turn, shift) for name, lift in lifts.items()}
+    borders = [
+        moved[piece.name](edge.points)
+        for piece in pattern.pieces[pattern.sample]
+        if piece.name in moved
+        for edge in piece.edges
+    ]
+    far = cKDTree(body.scan[0]).query(np.concatenate(borders))[0]
+    return (body, moved) if np.median(far) <= _BESIDE else None
+
+
 def _body(
     given: str | None, table: SewingTable, run: dict[str, Any] | None, path: Path, *, designed: bool
 ) -> Mannequin | None:
@@ -232,11 +280,8 @@ def _body(
     Raises:
         InputError: there is none, or it cannot be built.
     """
-    if given is not None:
-        key = "scan" if Path(given).suffix else "size"
-        found = check_table(MannequinTable, {key: given}, "--body")
-    elif table.mannequin is not None:
-        found = table.mannequin
+    if (asked := _asked(given, table)) is not None:
+        found = asked
     elif run is not None:
         if "scan" in run:
             raise InputError(f"{path}: was made on the scan {run['scan']!r}; give it with --body FILE")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name
+from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import area_words, format_count
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
@@ -130,7 +130,7 @@ def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int
     for number, (first, name) in enumerate(objects):
         polygons = raw.polygons[of == number]
         if len(polygons):
-            yield make_file_name(name) if name else stem, first, np.where(polygons >= 0, polygons - first, -1)
+            yield make_piece_name(name) if name else stem, first, np.where(polygons >= 0, polygons - first, -1)
 
 
 def _named_apart(surfaces: list[Surface]) -> tuple[Surface, ...]:

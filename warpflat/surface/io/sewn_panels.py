@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name
+from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import format_count
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.injective import overlap_area
@@ -209,7 +209,7 @@ def _titles(raw: RawMesh, island: np.ndarray, name: str) -> list[str]:
         if given is None:
             continue
         of = [int(np.bincount(given[0][island == number]).argmax()) for number in range(count)]
-        own = [make_file_name(given[1][each]) if given[1][each] else "" for each in of]
+        own = [make_piece_name(given[1][each]) if given[1][each] else "" for each in of]
         if all(own) and len(set(own)) == count:
             return own
     return [f"{name}_{number + 1}" if count > 1 else name for number in range(count)]
