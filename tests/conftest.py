@@ -46,7 +46,10 @@ def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
         if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
             patch.setattr("warpflat.pattern.tile_nesting.ORDERS", 2)
         # What has crashed OpenUSD once is not read in this process.
-        if request.path.parent.name in ("surface", "export", "review") and request.path.name != "test_regression_meshes.py":
+        if (
+            request.path.parent.name in ("surface", "export", "review")
+            and request.path.name != "test_regression_meshes.py"
+        ):
             patch.setattr("warpflat.surface.io.read.read_apart", _read_here)
             patch.setattr("warpflat.review.film.read_apart", _read_here)
         yield
