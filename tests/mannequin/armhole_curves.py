@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.forms import FormResult
@@ -15,7 +16,8 @@ def _turning(curve: np.ndarray, step: float) -> np.ndarray:
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
     count = max(4, round(s[-1] / step))
     at = np.linspace(0.0, s[-1], count + 1)
-    even = np.column_stack([np.interp(at, s, curve[:, k]) for k in (0, 1)])
+    # The smooth curve that is drawn through them: chords are shorter than a mesh edge, and no corner falls between two of them.
+    even = CubicSpline(s, curve)(at)
     way = np.diff(even, axis=0)
     cross = way[:-1, 0] * way[1:, 1] - way[:-1, 1] * way[1:, 0]
     return np.degrees(np.arctan2(cross, (way[:-1] * way[1:]).sum(axis=1)))
@@ -45,9 +47,7 @@ def corner_degrees(flat: np.ndarray, armhole: np.ndarray, side: np.ndarray) -> f
     for edge in (armhole, side):
         line = flat[edge if edge[0] == joint else edge[::-1]]
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-        start, near, far = (
-            np.array([np.interp(at, s, line[:, k]) for k in range(line.shape[1])]) for at in (0, 0.01, 0.02)
-        )
+        start, near, far = CubicSpline(s, line)([0.0, 0.01, 0.02])
         ways.append(4.0 * near - far - 3.0 * start)
     a, b = ways
     return float(np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))

@@ -108,11 +108,14 @@ def test_a_t_shirt_on_a_scan_has_no_hook_under_the_arm_and_a_round_neck(name: st
     assert np.ptp(side[:, 2]) < 0.0047
     assert abs(side[-1, 0] - side[-5, 0]) < 0.4 * (side[-1, 1] - side[-5, 1])
     garment = flatten_form(body, made, fabric="interlock")
+    corners = []
     for key in ("front", "back"):
         piece, flat = made.pieces[key], garment.pieces[key]
         assert flat.flipped_faces == 0
-        assert sharpest_turn(flat.positions[piece.edges["armhole left"]]) < 32.0, key
-        corner = corner_degrees(flat.positions, piece.edges["armhole left"], piece.edges["side left"])
-        assert 75.0 < corner < 125.0, key
+        assert sharpest_turn(flat.positions[piece.edges["armhole left"]]) < 27.0, key
+        corners.append(corner_degrees(flat.positions, piece.edges["armhole left"], piece.edges["side left"]))
         neck = next(ids for edge, ids in piece.edges.items() if "neck" in edge)
         assert sharpest_turn(flat.positions[neck]) < 27.0, key
+    # Sewn together at the side the armhole runs on without a hook; a side seam that leans makes one corner sharper, one blunter.
+    assert min(corners) > 65.0
+    assert 165.0 < sum(corners) < 195.0

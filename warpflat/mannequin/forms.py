@@ -34,6 +34,7 @@ from warpflat.mannequin.sleeves import (
     drop_shoulders,
     recut_sleeves,
     slide_raglan,
+    straighten_hems,
 )
 
 if TYPE_CHECKING:
@@ -291,6 +292,7 @@ def realise(
             vertices = slide_raglan(layout, vertices, form.sleeve)
         elif form.sleeve.cut == "dropped":
             vertices = drop_shoulders(layout, vertices, form.sleeve)
+        vertices = straighten_hems(layout, vertices, {name: (bricks[name], r.open) for name, r in form.pieces.items()})
     else:
         vertices = before.vertices
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}

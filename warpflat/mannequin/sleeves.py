@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,16 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.mannequin.layout import Layout
 
-__all__ = ["RAGLAN_LINES", "SET_IN", "SLEEVE_CUTS", "SleeveCut", "drop_shoulders", "recut_sleeves", "slide_raglan"]
+__all__ = [
+    "RAGLAN_LINES",
+    "SET_IN",
+    "SLEEVE_CUTS",
+    "SleeveCut",
+    "drop_shoulders",
+    "recut_sleeves",
+    "slide_raglan",
+    "straighten_hems",
+]
 
 #: Of a piece its patterns of bricks, and the lines along which it is open.
 BricksAndOpen = tuple[tuple[str, ...], tuple[str, ...]]
@@ -23,6 +32,8 @@ SLEEVE_CUTS = ("set-in", "dropped", "raglan", "kimono")
 RAGLAN_LINES = {f"yoke {face} {side}": f"armhole {side}" for face in ("front", "back") for side in ("left", "right")}
 # The seam of a raglan sleeve meets the armhole at least so far from the shoulder and above the line across the chest [m].
 _LEAST = 0.02
+# A hem that has moved lies on other cloth, which unfolds in another way: after so many rounds it moves by less than .1 mm.
+_HEM_ROUNDS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,3 +173,65 @@ def drop_shoulders(layout: Layout, vertices: FloatArray, cut: SleeveCut) -> Floa
                 moved = [0.0, knee + 0.01 * cut.drop_cm * near, arc[-1]]
                 out[ids] = points_at_lengths(vertices[ids], np.interp(arc, [0.0, knee, arc[-1]], moved))
     return out
+
+
+def straighten_hems(
+    layout: Layout, vertices: FloatArray, pieces: Mapping[str, tuple[Collection[str], Collection[str]]]
+) -> FloatArray:
+    """Return a form's vertices (#V by 3 [m]) with the hems of its sleeves where they are straight once the sleeve lies flat.
+
+    A level of the arm around a sleeve that narrows lies flat as an arc. The hem slides along the columns of the grid until it is the
+    shortest line on the sleeve. The shortest sleeve, which ends at the biceps, keeps its seam under the arm, and longer ones the length
+    over the arm.
+
+    Args:
+        layout: the grid.
+        vertices: #V by 3 [m].
+        pieces: of each piece its bricks, and the lines along which it is open.
+    """
+    count = np.zeros(len(vertices), np.int32)
+    for bricks, _ in pieces.values():
+        count[np.unique(layout.faces[layout.faces_of(bricks)])] += 1
+    for _, opened in pieces.values():
+        count[np.concatenate([layout.lines[line] for line in opened] or [np.zeros(0, np.int32)])] += 1
+    out = vertices.copy()
+    for arm in layout.arms.values():
+        hem = int(np.flatnonzero((count[arm] > 0).all(axis=1))[-1]) if (count[arm[0]] > 0).all() else 0
+        sewn = np.flatnonzero(count[arm[hem]] > 1)
+        if hem == 0 or not len(sewn):
+            continue
+        levels = sorted(layout.arm_row.values())
+        start = max(level for level in levels if level < hem)
+        end = min([level for level in levels if level > hem], default=hem)
+        for _ in range(_HEM_ROUNDS):
+            further = np.zeros(arm.shape[1])
+            for first, last in zip(sewn, [*sewn[1:], sewn[0] + arm.shape[1]], strict=True):
+                columns = np.arange(first, last + 1) % arm.shape[1]
+                flat = _unfolded(out[arm[(start + hem) // 2, columns]], out[arm[hem, columns]])
+                along = (flat[-1] - flat[0]) / np.linalg.norm(flat[-1] - flat[0])
+                further[columns] = (flat - flat[0]) @ [-along[1], along[0]]
+            if hem > layout.arm_row["biceps"]:
+                further -= further[arm.shape[1] // 2]
+            for column, more in enumerate(further):
+                ids = arm[start : end + 1, column]
+                # Beyond the wrist a sleeve runs on as it comes.
+                line = np.vstack([out[ids], 2.0 * out[ids[-1]] - out[arm[end - 1, column]]])
+                arc = arc_lengths(line)
+                moved = np.interp(arc, [0.0, arc[hem - start], arc[-1]], [0.0, arc[hem - start] + more, arc[-1]])
+                out[ids] = points_at_lengths(line, moved[:-1])
+    return out
+
+
+def _unfolded(upper: FloatArray, lower: FloatArray) -> FloatArray:
+    """Return the lower line (#P by 2) of a strip of triangles between two lines (#P by 3) as it lies flat, the upper one above it."""
+    flat = [np.zeros(2), np.array([0.0, np.linalg.norm(upper[0] - lower[0])])]
+    strip = np.stack([lower, upper], axis=1).reshape(-1, 3)
+    for k in range(2, len(strip)):
+        a, b = flat[-2], flat[-1]
+        base, r, s = np.linalg.norm(strip[[k - 2, k - 2, k - 1]] - strip[[k - 1, k, k]], axis=1)
+        x = (base**2 + r**2 - s**2) / (2.0 * base)
+        y = np.sqrt(max(r**2 - x**2, 0.0))
+        along = (b - a) / base
+        # Triangles turn to and fro; the strip runs to the right.
+        flat.append(a + x * along + y * np.array([along[1], -along[0]]) * (1.0 if k % 2 == 0 else -1.0))
+    return np.array(flat[::2])
