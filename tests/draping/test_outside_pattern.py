@@ -20,7 +20,7 @@ from warpflat.draping.lift import read_lift, whole_lifts
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
-from warpflat.draping.wrap_pieces import wrap_pieces
+from warpflat.draping.wrap_pieces import continue_pieces, wrap_pieces
 from warpflat.export.dxf import write_dxf
 from warpflat.export.read_dxf import read_dxf
 from warpflat.export.read_svg import read_svg
@@ -530,3 +530,55 @@ def test_a_drawing_of_freesewing_is_read_by_its_sewing_lines(tmp_path: Path) -> 
     drawing.write_text(drawing.read_text().replace("L 180,300 L 0,300 z", "L 180,300 L 0,300 L 0,10"))
     with pytest.raises(InputError, match=r"open by 10\.0 mm"):
         read_svg(drawing)
+
+
+@pytest.mark.parametrize("top", ["e3", "e1"])
+def test_a_band_goes_on_beyond_its_seam_as_the_cloth_does(top: str):
+    """A tube of radius 10 cm, with a band of two tiers sewn to its upper or, drafted upside down, its lower edge."""
+    radius, wide, tall = 0.1, 0.2 * np.pi, 0.2
+    band = [(0.0, 0.0), (wide, 0.0), (wide, 0.05), (0.0, 0.05)]
+    pieces = {
+        "tube": polygon("tube", [(0.0, 0.0), (wide, 0.0), (wide, tall), (0.0, tall)]),
+        "band": polygon("band", band),
+        "fall": polygon("fall", [(x, 2.0 * y) for x, y in band]),
+    }
+    # The band's lower edge to the tube's upper one, or its upper one to the tube's lower one.
+    seams = [
+        seam("upper", f"tube.{top}", f"band.{'e1' if top == 'e3' else 'e3'}"),
+        seam("turn", f"band.{top}", f"fall.{'e1' if top == 'e3' else 'e3'}"),
+        seam("side", "tube.e2", "tube.e4"),
+    ]
+    meshes, welds = mesh_pieces(pieces, seams, 0.02)
+    flat = meshes["tube"].points
+    lies = np.column_stack([radius * np.sin(flat[:, 0] / radius), flat[:, 1], radius * np.cos(flat[:, 0] / radius)])
+    found = continue_pieces({"tube": lies}, meshes, welds)
+    np.testing.assert_array_equal(found["tube"], lies)
+    for name, begins in (("band", tall), ("fall", tall + 0.05)):
+        x, y = meshes[name].points.T
+        up = begins + y if top == "e3" else tall - begins - (meshes[name].points[:, 1].max() - y)
+        asked = np.column_stack([radius * np.sin(x / radius), up, radius * np.cos(x / radius)])
+        # Chords of 2 cm slant by up to .1 beside the arc's tangent, 15 cm away from the seam as well.
+        assert np.linalg.norm(found[name] - asked, axis=1).max() < 0.015
+        assert np.linalg.norm(found[name] - asked, axis=1).mean() < 0.006
+    with pytest.raises(InputError, match="'fall' is sewn to no piece that has a designed surface"):
+        continue_pieces({"tube": lies}, meshes, welds[:1])
+
+
+def test_a_cuff_is_sewn_to_both_sleeves():
+    """Two cuffs, not cut turned over, to a sleeve that is; a yoke in two layers, which both sleeves meet, stays one."""
+    square = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.0, 0.1)]
+    pieces = [
+        polygon("sleeve", square, quantity=2),
+        polygon("cuff", square, quantity=2, paired=False),
+        polygon("yoke", square, quantity=2, paired=False),
+    ]
+    other = Seam(
+        name="over",
+        sides=((SeamSide(piece="sleeve", edge="e3", mirrored=True),), (SeamSide(piece="yoke", edge="e3"),)),
+    )
+    seams = [seam("wrist", "sleeve.e1", "cuff.e3"), seam("over the arm", "sleeve.e3", "yoke.e1"), other]
+    whole, sewn, _ = whole_pieces(pieces, seams)
+    assert set(whole) == {"sleeve", "sleeve mirrored", "cuff", "cuff mirrored", "yoke"}
+    joined = [{side.piece for chain in each.sides for side in chain} for each in sewn]
+    assert {"sleeve mirrored", "cuff mirrored"} in joined
+    assert {"sleeve mirrored", "yoke"} in joined

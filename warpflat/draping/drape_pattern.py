@@ -21,7 +21,7 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.draping.wrap_pieces import UNITS, draw_together, wrap_pieces
+from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.pieces import Pattern, Piece
@@ -94,6 +94,20 @@ def drape_pattern(
     chosen = pattern.sample if placement.size is None else placement.size
     pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
     pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
+    # The second layer of a collar, sewn to the first one alone, has no place of its own.
+    pairs = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
+    layers = {name for name in pieces if name.endswith(MIRRORED) and name.removesuffix(MIRRORED) not in placement.lifts}
+    layers = layers if placement.lifts else set()
+    while held_by := {
+        name
+        for name in layers
+        if not set[str]().union(*(pair for pair in pairs if name in pair)) <= layers | {name.removesuffix(MIRRORED)}
+    }:
+        layers -= held_by
+    if layers:
+        pieces = {name: piece for name, piece in pieces.items() if name not in layers}
+        seams = [seam for seam, pair in zip(seams, pairs, strict=True) if not pair & layers]
+        notes.append(f"worn in one layer: {', '.join(sorted(name.removesuffix(MIRRORED) for name in layers))}")
     if not pattern.seams:
         raise InputError(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
@@ -117,7 +131,7 @@ def drape_pattern(
     solid = None if surface is None else Body(surface.vertices, surface.faces, device=where)
     # On another body than that of its designed surface a garment starts as one that has none, if it can.
     placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
-    lifted = len(placed) == len(meshes)
+    lifted = len(placed) == len(meshes) or bool(placed and body is not None)
     if lifted:
         placed = _mirrored_in_place(placed, welds)
     elsewhere = _elsewhere(placed, meshes, solid) if lifted and solid is not None else ""
@@ -133,12 +147,14 @@ def drape_pattern(
             if lifted:
                 notes.append(f"{elsewhere}: the pieces are placed by their seams")
             lifted = False
+    drafted = [name for name in meshes if name not in placed]
+    placed = continue_pieces(placed, meshes, welds)
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
     begins = dict(zip(meshes, ends[:-1], strict=True))
-    pairs = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
-    first, second = (np.array(column, dtype=np.int64) for column in zip(*pairs, strict=True))
+    joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    first, second = (np.array(column, dtype=np.int64) for column in zip(*joints, strict=True))
     welded = join_labels(ends[-1], first, second)
     space = np.concatenate([placed[name] for name in meshes])
     total = np.stack([np.bincount(welded, column) for column in space.T], axis=1)
@@ -171,8 +187,11 @@ def drape_pattern(
     )
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if solid is None else solid
-    if not lifted:
-        cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid))
+    if not lifted or drafted:
+        stays = np.zeros(len(total), dtype=bool)
+        for name in set(meshes) - set(drafted) if lifted else ():
+            stays[welded[cloth.piece_vertices[name]]] = True
+        cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid, fixed=stays))
     held, frames = held_vertices(cloth, placement.hold), list[NDArray[np.float32]]()
     worn = relax_drape(
         cloth, solid, options=options, held=held, callback=callback,
@@ -182,7 +201,9 @@ def drape_pattern(
     if not lifted:
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
-    return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
+    return Drape(
+        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames), drafted=drafted
+    ), notes
 
 
 def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequence[Weld]]) -> dict[str, FloatArray]:
@@ -197,7 +218,7 @@ def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequenc
         for joint in seam
         for turned, i in joint
         for other, j in joint
-        if turned.endswith(MIRRORED) and not other.endswith(MIRRORED)
+        if turned.endswith(MIRRORED) and not other.endswith(MIRRORED) and {turned, other} <= placed.keys()
     ]
     if not met:
         return dict(placed)
@@ -221,7 +242,7 @@ def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh],
     if deep > _WITHIN:
         return f"{100 * deep:.0f} % of the designed surface lies in this body"
     off = float(np.median(gap[points[:, 1] >= np.quantile(points[:, 1], _TOP)]))
-    corner = np.concatenate([placed[name][mesh.triangles] for name, mesh in meshes.items()])
+    corner = np.concatenate([points[meshes[name].triangles] for name, points in placed.items()])
     vector = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     facing = np.einsum("ta,ta->t", vector, body.nearest(corner.mean(axis=1))[1])
     alike = float(np.linalg.norm(vector[facing > 0.0], axis=1).sum() / np.linalg.norm(vector, axis=1).sum())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -56,6 +56,7 @@ class Drape:
         frames: #V by 3 each, where the cloth was on its way to rest [m].
         hangs_below: the height under which cloth hangs freely [m]: that of a mannequin's hip.
         cuts: by piece those that were advised for it: what to cut, and where on the designed surface (#P by 3 [m]).
+        drafted: pieces that have no designed surface, such as bands and collars; they misfit nowhere.
     """
 
     __repr__ = short_repr
@@ -69,6 +70,7 @@ class Drape:
     frames: tuple[NDArray[np.float32], ...] = ()
     hangs_below: float = -np.inf
     cuts: Mapping[str, Sequence[tuple[str, FloatArray]]] = field(default_factory=dict)
+    drafted: Collection[str] = ()
 
     @property
     def converged(self) -> bool:
@@ -131,7 +133,10 @@ class Drape:
     @property
     def misfit(self) -> FloatArray:
         """#V, the distance that no hollow explains [m]."""
-        return np.asarray(self.distance - self.bridged)
+        found = np.asarray(self.distance - self.bridged)
+        for name in self.drafted:
+            found[self.cloth.welded[self.cloth.piece_vertices[name]]] = 0.0
+        return found
 
     @cached_property
     def strains(self) -> dict[str, FloatArray]:

@@ -14,7 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array
+from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
@@ -24,7 +26,7 @@ from warpflat.draping.mesh_pieces import FlatMesh, Weld
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["UNITS", "draw_together", "wrap_pieces"]
+__all__ = ["UNITS", "continue_pieces", "draw_together", "wrap_pieces"]
 
 #: Where a file's units stand.
 UNITS = (
@@ -49,6 +51,8 @@ _CAP = 0.95
 _ROUNDS, _STILL = 300, 1e-4
 # The cloth is kept this far off the body [m], with this stiffness over the cloth's, and drawn by this share to where it was.
 _OFF, _HOLD_OFF, _INERTIA = 0.001, 30.0, 0.02
+# What stays is held with this stiffness over the cloth's; what is drafted follows so many of the nearest vertices of its seams.
+_STAY, _NEXT = 1e3, 4
 
 
 @dataclass(frozen=True)
@@ -337,13 +341,87 @@ def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[lis
     return shoulders, max(around, default=whole), bool(around)
 
 
-def draw_together(cloth: SewnCloth, start: FloatArray, body: Body) -> FloatArray:
+def continue_pieces(
+    placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]
+) -> dict[str, FloatArray]:
+    """Place bands, collars, pockets and whatever else was drafted flat: as if the cloth that they are sewn to ran on beyond the seam.
+
+    The piece with the longest seams to those that lie comes first.
+
+    Args:
+        placed: by piece the points (#P by 3 [m]) of those that lie.
+        meshes: all pieces.
+        welds: for each seam the vertices that it joins.
+
+    Raises:
+        InputError: a piece hangs together with none that lies.
+    """
+    found = dict(placed)
+    while lost := [name for name in meshes if name not in found]:
+        # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
+        sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
+        for join in _joins(welds, list(meshes)):
+            for (name, other), (own, its) in (
+                (join.pieces, join.vertices),
+                (join.pieces[::-1], join.vertices[::-1]),
+            ):
+                if name in lost and other in found:
+                    across = _border_frames(meshes[name], own).transpose(0, 2, 1)
+                    # Into this piece is out of the other one.
+                    flat = _border_frames(meshes[other], its) * [1.0, -1.0] @ across
+                    sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
+        lengths = {
+            name: sum(
+                float(np.linalg.norm(np.diff(meshes[name].points[own], axis=0), axis=1).sum()) for own, _, _ in rows
+            )
+            for name, rows in sewn.items()
+        }
+        name = max(lost, key=lambda each: lengths[each])
+        if not sewn[name]:
+            raise InputError(f"piece {name!r} is sewn to no piece that has a designed surface")
+        own, place, way = (np.concatenate(column) for column in zip(*sewn[name], strict=True))
+        flat = meshes[name].points
+        far, near = cKDTree(flat[own]).query(flat, k=min(_NEXT, len(own)))
+        weight = 1.0 / np.maximum(far, 1e-6) ** 2
+        weight /= weight.sum(axis=1, keepdims=True)
+        off = flat[:, None] - flat[own[near]]
+        found[name] = np.einsum("pk,pka->pa", weight, place[near] + np.einsum("pkab,pkb->pka", way[near], off))
+    return found
+
+
+def _border_frames(mesh: FlatMesh, row: IntArray) -> FloatArray:
+    """Return the directions along a row of border vertices (#R) and into the piece as columns, #R by 2 by 2."""
+    points = mesh.points
+    along = np.gradient(points[row], axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    inwards = np.column_stack([-along[:, 1], along[:, 0]])
+    middle = points[mesh.triangles[np.isin(mesh.triangles, row).sum(axis=1) == 2]].mean(axis=1)
+    place = cKDTree(points[row]).query(middle)[1]
+    left = np.einsum("ta,ta->t", middle - points[row[place]], inwards[place])
+    return np.stack([along, inwards * (1.0 if np.median(left) > 0.0 else -1.0)], axis=-1)
+
+
+def _slopes(mesh: FlatMesh, points: FloatArray) -> FloatArray:
+    """Return where a piece's x and y lead in space at its vertices, #P by 3 by 2, for places #P by 3."""
+    flat, space = mesh.points[mesh.triangles], points[mesh.triangles]
+    sides, edges = ((each[:, 1:] - each[:, :1]).transpose(0, 2, 1) for each in (flat, space))
+    area = np.linalg.det(sides)
+    of_triangles = (edges @ np.linalg.inv(sides)).reshape(-1, 6) * area[:, None]
+    corner, count = mesh.triangles.ravel(), len(points)
+    total = np.stack([np.bincount(corner, np.repeat(column, 3), count) for column in of_triangles.T], axis=1)
+    return np.asarray((total / np.bincount(corner, np.repeat(area, 3), count)[:, None]).reshape(-1, 3, 2))
+
+
+def draw_together(
+    cloth: SewnCloth, start: FloatArray, body: Body, *, fixed: NDArray[np.bool_] | None = None
+) -> FloatArray:
     """Draw sewn cloth together around a body, nearly without strain.
 
     Args:
         cloth: the sewn cloth.
         start: #V by 3, where its vertices are [m].
         body: what it stays outside of.
+        fixed: #V, the vertices that stay there.
 
     Returns:
         #V by 3 [m].
@@ -363,6 +441,7 @@ def draw_together(cloth: SewnCloth, start: FloatArray, body: Body) -> FloatArray
     hold = laplacian.diagonal().mean()
     x = start.copy()
     outside = np.zeros(count, dtype=bool)
+    stays = np.zeros(count, dtype=bool) if fixed is None else fixed
     solve = None
     for number in range(_ROUNDS):
         centre, normal = body.nearest(x)
@@ -371,10 +450,11 @@ def draw_together(cloth: SewnCloth, start: FloatArray, body: Body) -> FloatArray
         # The factor is renewed where contact has changed, not in every round.
         if solve is None or number % 10 == 0:
             outside = near
-            pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside)
+            pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside + _STAY * stays)
             solve = factor_symmetric(laplacian + diags_array(pull))
         target = np.where((near & outside)[:, None], centre + _OFF * normal, x)
-        pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside)
+        target[stays] = start[stays]
+        pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside + _STAY * stays)
         turned = _nearest_isometries((derivative @ x).reshape(-1, 2, 3))
         right = derivative.T @ (stiffness[:, None] * turned.reshape(-1, 3)) + pull[:, None] * target
         before, x = x, solve(right)

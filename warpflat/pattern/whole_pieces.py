@@ -44,6 +44,15 @@ def whole_pieces(
     twice = {
         name for name, p in given.items() if name not in halves and (name in asked or (p.quantity == 2 and p.paired))
     }
+    # A cuff is sewn to each of two sleeves, whether it is cut turned over or not.
+    pairs = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
+    flagged = {
+        side.piece for seam in seams if any(s.mirrored for c in seam.sides for s in c) for c in seam.sides for side in c
+    }
+    for name in set(given) - halves - twice - flagged:
+        others = set().union(*(pair for pair in pairs if name in pair)) - {name}
+        if given[name].quantity % 2 == 0 and others and others <= twice:
+            twice.add(name)
     whole = {name: _unfolded(piece) if name in halves else piece for name, piece in given.items() if name in sewn}
     for side in sides:
         if side.copy:
