@@ -34,12 +34,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
     """What is no claim of a test is had sooner.
 
-    A body of a size is built once in a process, sheets and cloth are laid in two orders of the pieces instead of eight, and the rooms
-    that read and write most USD read it in this process; all others, and the command's own processes, in one of its own.
+    A body of a size is built, and a scan fitted, once in a process, sheets and cloth are laid in two orders of the pieces instead of
+    eight, and the rooms that read and write most USD read it in this process; all others, and the command's own processes, in one of
+    its own.
     """
-    from bodies import built_once, laid_once
+    from bodies import built_once, laid_once, stood
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("warpflat.mannequin.scan.stand_body", stood)
         if request.path.parent.name != "mannequin":
             patch.setattr("warpflat.mannequin.mannequin.Mannequin.from_size", built_once)
             patch.setattr("warpflat.mannequin.common_body.common_body_of_mannequin", laid_once)
