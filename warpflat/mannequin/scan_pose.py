@@ -123,7 +123,12 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         )
     up = _AXES[up_name]
     height = float(np.ptp(points @ up))
-    unit = options.unit or _unit_of(height)
+    could_be = (unit for unit, factor in _UNITS.items() if _STATURE[0] <= height * factor <= _STATURE[1])
+    unit = options.unit or next(could_be, None)
+    if unit is None:
+        raise InputError(
+            f"scan: {height:.4g} tall in its own unit, which is a body's height in none of {', '.join(_UNITS)}; scale it"
+        )
     size = height * _UNITS[unit]
     if not _STATURE[0] <= size <= _STATURE[1]:
         raise InputError(
@@ -216,15 +221,6 @@ def _without_loose_pieces(
         return points, triangles, 0
     used, kept = np.unique(triangles[~small[piece.ravel()]], return_inverse=True)
     return points[used], kept.reshape(-1, 3), int(small.sum())
-
-
-def _unit_of(height: float) -> str:
-    for unit, factor in _UNITS.items():
-        if _STATURE[0] <= height * factor <= _STATURE[1]:
-            return unit
-    raise InputError(
-        f"scan: {height:.4g} tall in its own unit, which is a body's height in none of {', '.join(_UNITS)}; scale it"
-    )
 
 
 # --- which way it stands and looks, found from legs, trunk and feet
