@@ -1,13 +1,17 @@
-"""Bodies of a size, each built once in a process, whoever asks; nobody changes one."""
+"""Bodies of a size and bodies fitted to scans, each made once in a process, whoever asks; nobody changes one."""
 
 from __future__ import annotations
 
 import functools
+from typing import Any
+
+import numpy as np
 
 from warpflat.mannequin.common_body import CommonBody, common_body_of_mannequin
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.stand_body import StandingBody, stand_body
 
-__all__ = ["body_of_size", "built_once", "laid_once"]
+__all__ = ["body_of_size", "built_once", "laid_once", "stood"]
 
 _from_size = Mannequin.from_size
 
@@ -31,3 +35,14 @@ def body_of_size(resolution_mm: float, size: str = "EU 38") -> Mannequin:
 def laid_once(mannequin: Mannequin, *, name: str) -> CommonBody:
     """In place of `common_body_of_mannequin`."""
     return common_body_of_mannequin(mannequin, name=name)
+
+
+_stood: dict[object, StandingBody] = {}
+
+
+def stood(vertices: np.ndarray, triangles: np.ndarray, scanned: int, **asked: Any) -> StandingBody:
+    """The body that is fitted to a scan: one fit for all that asks other things of the same scan; in place of `stand_body`."""
+    key = (vertices.tobytes(), triangles.tobytes(), scanned, repr(sorted(asked.items())))
+    if key not in _stood:
+        _stood[key] = stand_body(vertices, triangles, scanned, **asked)
+    return _stood[key]

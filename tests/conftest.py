@@ -34,17 +34,21 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
     """What is no claim of a test is had sooner.
 
-    A body of a size is built once in a process, sheets and cloth are laid in two orders of the pieces instead of eight, and the rooms
-    that read and write most USD read it in this process; all others, and the command's own processes, in one of its own.
+    A body of a size is built, and a scan fitted, once in a process, sheets and cloth are laid in one order of the pieces instead of
+    eight, and the rooms that read and write most USD read it in this process; all others, and the command's own processes, in one of
+    its own.
     """
-    from bodies import built_once, laid_once
+    from bodies import built_once, laid_once, stood
+
+    from warpflat.pattern.tile_nesting import orders
 
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("warpflat.mannequin.scan.stand_body", stood)
         if request.path.parent.name != "mannequin":
             patch.setattr("warpflat.mannequin.mannequin.Mannequin.from_size", built_once)
             patch.setattr("warpflat.mannequin.common_body.common_body_of_mannequin", laid_once)
         if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
-            patch.setattr("warpflat.pattern.tile_nesting.ORDERS", 2)
+            patch.setattr("warpflat.pattern.tile_nesting.orders", lambda masks: orders(masks)[:1])
         # What has crashed OpenUSD once is not read in this process.
         if (
             request.path.parent.name in ("surface", "export", "review")

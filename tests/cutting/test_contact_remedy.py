@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from devices import DEVICE
 
-from warpflat.cutting.contact_remedy import contact_note, cut_between_contacts
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.cut_plan import CutPlan
-from warpflat.cutting.remedies import advise
+from warpflat.cutting.remedies import advise, contact_note, cut_between_contacts
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.surface.repair.validate import make_surface

@@ -10,13 +10,13 @@ from __future__ import annotations
 import functools
 import json
 import math
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
+
+from warpflat.cli.main import main
 
 from .promise import Case
 
@@ -190,8 +190,7 @@ def run_folder() -> dict[str, bytes]:
     """The files of a small run, by name."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "bodice.toml").write_text(_SCENE)
-        command = [sys.executable, "-m", "warpflat", "run", "bodice.toml", "--out", "out", "--quiet"]
-        subprocess.run(command, cwd=folder, check=False, capture_output=True)
+        main(["run", f"{folder}/bodice.toml", "--out", f"{folder}/out", "--quiet"])
         return {file.name: file.read_bytes() for file in (Path(folder) / "out").iterdir()}
 
 

@@ -7,12 +7,11 @@ import hashlib
 import json
 import math
 import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
+from warpflat.cli.main import main
 from warpflat.core.output import seal_of
 
 from .promise import Case
@@ -359,7 +358,6 @@ def pattern() -> dict[str, Any]:
         (Path(folder) / "cut.toml").write_text(
             SCENES["cut"].replace("[output]", "[pattern]\nformats = ['json']\n[output]")
         )
-        command = [sys.executable, "-m", "warpflat", "run", "cut.toml", "--out", "out", "--quiet"]
-        subprocess.run(command, cwd=folder, check=False, capture_output=True)
+        main(["run", f"{folder}/cut.toml", "--out", f"{folder}/out", "--quiet"])
         found: dict[str, Any] = json.loads((Path(folder) / "out" / "pattern.json").read_text())
     return found

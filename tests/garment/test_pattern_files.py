@@ -37,6 +37,7 @@ from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece
+from warpflat.pattern.tile_nesting import orders
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.repair.validate import make_surface
@@ -113,7 +114,7 @@ def test_a_sheet_without_a_clear_place_has_its_name_where_most_room_is(
     dress: DraftedGarment, monkeypatch: pytest.MonkeyPatch
 ):
     # Its names keep off words as well, so that the lay decides how much room is left beside lines.
-    monkeypatch.setattr("warpflat.pattern.tile_nesting.ORDERS", 8)
+    monkeypatch.setattr("warpflat.pattern.tile_nesting.orders", orders)
     tiling, drawings = draw_sheet(halved(dress), "A4")
     lines = shapely.union_all(
         [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import os
 from pathlib import Path
-from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -17,7 +16,6 @@ from body_tapes import armpit_and_crotch
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.scan import ScanFound, blueprint_from_scan
 from warpflat.mannequin.scan_pose import ScanOptions
-from warpflat.mannequin.stand_body import StandingBody, stand_body
 from warpflat.surface.io.read import read_scan
 
 needs_bodies = pytest.mark.skipif(
@@ -31,17 +29,6 @@ def scan(name: str) -> tuple[np.ndarray, np.ndarray]:
     points, faces = read_scan(Path(os.environ["WARPFLAT_DATA"]) / f"body_{name}.obj")
     points = np.asarray(points, float)
     return points - [0.0, points[:, 1].min(), 0.0], np.asarray(faces)
-
-
-_stood: dict[object, StandingBody] = {}
-
-
-def stood(vertices: np.ndarray, triangles: np.ndarray, scanned: int, **asked: Any) -> StandingBody:
-    """The body that is fitted to a scan: one fit for all that asks other things of the same scan; in place of `stand_body`."""
-    key = (vertices.tobytes(), triangles.tobytes(), scanned, repr(sorted(asked.items())))
-    if key not in _stood:
-        _stood[key] = stand_body(vertices, triangles, scanned, **asked)
-    return _stood[key]
 
 
 @functools.cache

@@ -7,7 +7,8 @@ import functools
 import numpy as np
 import pytest
 from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_turn
-from scans import needs_bodies, scan, scanned_body, stood
+from bodies import stood
+from scans import needs_bodies, scan, scanned_body
 
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import flatten_form

@@ -7,8 +7,7 @@ import pytest
 from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.blend import blend_forms
-from warpflat.mannequin.bridging import bridge_rows
+from warpflat.mannequin.blend import blend_forms, bridge_rows
 from warpflat.mannequin.forms import form_from_mapping, form_names
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.profiles import convex_girth

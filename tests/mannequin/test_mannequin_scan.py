@@ -338,7 +338,7 @@ def test_limbs_agree_with_tapes_laid_without_the_package_with_arms_level() -> No
 
 @needs_bodies
 def test_distances_to_the_scan_are_small_and_drawn(tmp_path: Path) -> None:
-    from warpflat.mannequin.distance_picture import signed_distances, write_distance_picture
+    from warpflat.mannequin.picture import signed_distances, write_distance_picture
 
     body = scanned_body("female")
     far = np.abs(signed_distances(body))

@@ -11,7 +11,7 @@ from scans import needs_bodies, posed_body, posed_scan, scan, scanned_body, tria
 
 from warpflat.core.errors import InputError
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.scan_axes import across_trunk
+from warpflat.mannequin.scan_pose import across_trunk
 from warpflat.mannequin.slicer import Slicer
 
 

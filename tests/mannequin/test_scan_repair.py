@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from warpflat.mannequin.scan_holes import close_holes
-from warpflat.mannequin.scan_noise import smooth_noise
+from warpflat.mannequin.scan_repair import close_holes, smooth_noise
 
 
 def ball() -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Remedies: cuts that would help where a garment does not fit, each tried on its piece."""
+"""Remedies: cuts that would help where a garment does not fit, or would lie over itself, each tried on its piece."""
 
 from __future__ import annotations
 
@@ -9,33 +9,34 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
+from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import polyline_length
-from warpflat.cutting.contact_remedy import TRIAL_TOLERANCE, contact_note
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.fit_report import Remedy
+from warpflat.flattening.progress import CONTACT
 from warpflat.flattening.result import Flattening
 from warpflat.model.fit import Misfit, WornFit, assess_fit
+from warpflat.solver.contact import Barrier
 from warpflat.surface.connectivity import border_of
+from warpflat.surface.half_edges import half_edges_of
+from warpflat.surface.injective import border_edges_of
 from warpflat.surface.paths.lines import line_between
 
-__all__ = ["advise", "remedies"]
+__all__ = ["advise", "contact_note", "cut_between_contacts", "remedies"]
 
 # A line that passes within this distance of the worst place can take the dart for it [m].
 _NEARBY = 0.03
-
-
-_MOST_TRIALS = 8
-
-
-# So many remedies are kept.
-_KEPT = 3
-
-
+# So many cuts are tried, and so many kept.
+_MOST_TRIALS, _KEPT = 8, 3
 # Nobody sews a dart shorter than this [m].
 _LEAST_CUT = 0.025
+# Tolerances of a trial are looser by this factor: what it is asked for settles long before the energy.
+_TRIAL_TOLERANCE = 20.0
 
 
 def advise(result: Flattening) -> Flattening:
@@ -76,8 +77,8 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
     options = unsewn.options
     quick = replace(
         options,
-        energy_tolerance=min(TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
-        residual_tolerance=TRIAL_TOLERANCE * options.residual_tolerance,
+        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
+        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
         max_steps=min(options.max_steps, unsewn.stages[-1].steps + 2000),
         gap_mm=0.0,
     )
@@ -146,3 +147,95 @@ def _remedy(result: Flattening, path: NDArray[np.integer], what: str, table: Map
         length=length,
         table=table,
     )
+
+
+def contact_note(result: Flattening) -> str | None:
+    """Return a note on a contact that costs more than the share of the energy that is allowed, with the cut that would restore it.
+
+    The cut is made on trial. None if contact costs less, or if the cut does not help.
+    """
+    last = result.stages[-1]
+    if last.name != CONTACT or len(result.stages) < 2:
+        return None
+    free = result.stages[-2].model_energy_j
+    if result.contact_energy <= result.options.contact_share * free:
+        return None
+    path = cut_between_contacts(result)
+    piece = result.unsewn or result
+    options = piece.options
+    quick = replace(
+        options,
+        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
+        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
+        gap_mm=0.0,
+    )
+    try:
+        opened = None if path is None else cut(piece, CutPlan(name="trial", paths=(path,)), relax=quick)
+    except InputError:
+        opened = None  # The path meets a cut that was made before.
+    price = f"contact costs more than {100 * options.contact_share:.3g} % of the energy"
+    if (
+        path is None
+        or opened is None
+        or opened.overlap
+        or opened.stages[-1].model_energy_j >= piece.stages[-1].model_energy_j
+    ):
+        return f"{price}; no single cut across the piece was found that would restore it"
+    surface = result.surface
+    first, end = (int(surface.input_index[vertex]) for vertex in (path[0], path[-1]))
+    return (
+        f"{price}; a cut of {100 * polyline_length(surface.vertices[path]):.1f} cm from vertex {first} to vertex {end} would restore it "
+        f"({1e3 * opened.stages[-1].model_energy_j:.3g} instead of {1e3 * piece.stages[-1].model_energy_j:.3g} mJ, no overlap)"
+    )
+
+
+def cut_between_contacts(result: Flattening) -> IntArray | None:
+    """Return a cut across a piece between the two places of its border that press on each other; None if none do.
+
+    They part their border loop into two arcs. The cut is the shortest path along edges inside between the middle halves of both; where
+    they lie on two loops, between these.
+
+    Returns:
+        Vertices of the uncut surface.
+    """
+    surface, positions = result.network.surface, result.positions
+    edges = border_edges_of(surface)
+    touch = Barrier(surface, 1e-3 * result.options.gap_mm, 1.0)(positions).vertices
+    if len(touch) == 0:
+        return None
+    at = np.full(len(surface.vertices), -1)
+    at[edges.tail] = np.arange(len(edges.tail))
+    a, b = at[touch[:, 0]], at[touch[:, 1]]
+    one_loop = edges.first[a] == edges.first[b]
+    apart = np.abs(a - b)
+    around = np.where(one_loop, np.minimum(apart, edges.count[a] - apart), np.iinfo(np.int32).max)
+    low, high = sorted(int(end[around.argmax()]) for end in (a, b))
+    loops = [np.arange(edges.first[end], edges.first[end] + edges.count[end]) for end in (low, high)]
+    if edges.first[low] == edges.first[high]:
+        turn = np.roll(loops[0], -(low - loops[0][0]))
+        halves = []
+        for arc in (edges.tail[turn[: high - low]], edges.tail[turn[high - low :]]):
+            station = arc_lengths(surface.vertices[arc])
+            middle = np.abs(station - 0.5 * station[-1]) <= 0.25 * station[-1]
+            halves.append(arc[middle] if middle.any() else arc[len(arc) // 2 : len(arc) // 2 + 1])
+    else:
+        halves = [edges.tail[loop] for loop in loops]
+    sources, targets = halves
+    he = half_edges_of(surface)
+    on_border = np.zeros(len(surface.vertices), dtype=bool)
+    on_border[border_of(surface)] = True
+    ends = np.zeros(len(surface.vertices), dtype=bool)
+    ends[sources] = ends[targets] = True
+    inside = he.edges[(~on_border | ends)[he.edges].all(axis=1) & ~on_border[he.edges].all(axis=1)]
+    length = np.linalg.norm(surface.vertices[inside[:, 1]] - surface.vertices[inside[:, 0]], axis=1)
+    graph = csr_array((length, inside.T), shape=(len(on_border), len(on_border)))
+    far, before, _ = dijkstra(graph, directed=False, indices=sources, min_only=True, return_predecessors=True)
+    end = int(targets[far[targets].argmin()])
+    if not np.isfinite(far[end]):
+        return None
+    path = [end]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    # A path through an end of the same side would touch the border twice.
+    row = np.array(path, dtype=np.int32)
+    return None if on_border[row[1:-1]].any() else result.vertex_origin[row]

@@ -49,7 +49,11 @@ class DraftedRows:
             width: of the rows [in].
             page_scale: of the other pieces [in/m]; where the longest piece does not fit at that, all are drawn smaller.
         """
-        outlines = [_across(piece.points) for piece in pieces]
+        outlines = []
+        for piece in pieces:
+            wide, high = np.ptp(piece.points, axis=0)
+            upright = np.column_stack([piece.points[:, 1], -piece.points[:, 0]])
+            outlines.append(piece.points if wide >= high else upright)
         self._scale = min(page_scale, (width - _GAP) / max(float(np.ptp(points[:, 0])) for points in outlines))
         self._smaller = self._scale < page_scale * (1.0 - 1e-9)
         self._names = [piece.name for piece in pieces]
@@ -78,9 +82,3 @@ class DraftedRows:
             corner = np.array([left + across, top - down - _NAME])
             at = corner + (points - [points[:, 0].min(), points[:, 1].max()])
             pen.axes.add_patch(Polygon(at, facecolor=_CLOTH, edgecolor=INK, linewidth=0.8, zorder=3))
-
-
-def _across(points: FloatArray) -> FloatArray:
-    """Return an outline (#P by 2 [m]) with its longer side across."""
-    wide, high = np.ptp(points, axis=0)
-    return points if wide >= high else np.column_stack([points[:, 1], -points[:, 0]])

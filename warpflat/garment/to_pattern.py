@@ -244,6 +244,8 @@ def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair
 
     A mesh may stand beside that plane, and lean. One that faces sideways is left as it is.
     """
+    from scipy.spatial.transform import Rotation
+
     points, images = list[FloatArray](), list[FloatArray]()
     for pair in pairs:
         partners = garment.mirror_vertices(pair.of, pair.name)
@@ -253,10 +255,7 @@ def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair
     normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
     if normal[0] < _UPRIGHT:
         return pattern
-    # The shortest turn that takes the normal to x (Rodrigues).
-    x = np.array([1.0, 0.0, 0.0])
-    over = np.cross(np.eye(3), np.cross(normal, x))
-    turn = np.eye(3) + over + over @ over / (1.0 + normal[0])
+    turn = Rotation.align_vectors([1.0, 0.0, 0.0], normal)[0].as_matrix()
 
     def hung(piece: Piece) -> Piece:
         if piece.placement is None:

@@ -14,7 +14,6 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
-from warpflat.mannequin.both_sides import average_sides, sides_note
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_trunk, build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout, make_layout
@@ -121,7 +120,7 @@ class Mannequin:
         Raises:
             InputError: if the mesh is not a standing body with arms and legs that can be told apart.
         """
-        from warpflat.mannequin.scan import blueprint_from_scan
+        from warpflat.mannequin.scan import average_sides, blueprint_from_scan, sides_note
         from warpflat.mannequin.scan_pose import ScanOptions
 
         layout = make_layout(resolution_mm)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
 from warpflat.core.output import atomic_path, optional_file, output_folder, require_own_metrics, write_report
-from warpflat.mannequin.distance_picture import write_distance_picture
-from warpflat.mannequin.picture import write_mannequin_picture
+from warpflat.mannequin.picture import write_distance_picture, write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.body_landmarks import LEVELS
 from warpflat.mannequin.body_model import finer_body
 from warpflat.mannequin.closest import Closest
-from warpflat.mannequin.layout import RING_LEVELS
-from warpflat.mannequin.profiles import convex_girth
+from warpflat.mannequin.layout import RING_LEVELS, Layout
+from warpflat.mannequin.normals import vertex_normals
+from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.rays import ray_radii
-from warpflat.mannequin.scan_legs import leg_curves
-from warpflat.mannequin.scan_limbs import underarm_point, upper_curves
+from warpflat.mannequin.scan_limbs import leg_curves, underarm_point, upper_curves
 from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, find_levels, guess_note, missing_note
 from warpflat.mannequin.scan_pose import LEVELS_UP, ScanOptions, turn_scan_upright
 from warpflat.mannequin.scan_sections import BodySections
@@ -28,11 +28,13 @@ from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.stand_body import StandingBody, stand_body
 from warpflat.mannequin.table_body import PRINCESS
 
-__all__ = ["ScanFound", "blueprint_from_scan"]
+__all__ = ["ScanFound", "average_sides", "blueprint_from_scan", "sides_note"]
 
 # Smoothing of the sampled hulls: up the body [rows] and around it [harmonics kept].
 _UP_SIGMA = 1.5
 _HARMONICS = 28
+# Left and right may differ by so much [m] before a note says so.
+_TOLD = 0.010
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
 # A level of a body lies at most so far from where the mean body has it, as a share of the stature.
@@ -325,3 +327,43 @@ def _upper_hull(points: FloatArray, x: FloatArray) -> FloatArray:
     chain = np.roll(hull, -right, axis=0)
     upper = chain[: (left - right) % len(hull) + 1][::-1]
     return np.asarray(np.interp(x, upper[:, 0], upper[:, 1]))
+
+
+def average_sides(vertices: FloatArray, layout: Layout) -> FloatArray:
+    """Return the average of a body and its mirror image, girths kept (layout.vertex_count by 3 [m])."""
+    out = 0.5 * (vertices + _mirror_image(vertices, layout))
+    for ring in layout.rings[: layout.level_row["bust"] + 1]:
+        out[ring] = scale_to_girth(out[ring], convex_girth(vertices[ring]))
+    for grid in layout.legs.values():
+        for row in grid[layout.leg_row["leg_thigh"] :]:
+            girth = 0.5 * (convex_girth(vertices[row]) + convex_girth(vertices[layout.mirror[row]]))
+            out[row] = scale_to_girth(out[row], girth)
+    return out
+
+
+def sides_note(vertices: FloatArray, layout: Layout, *, averaged: bool) -> tuple[str, ...]:
+    """Return one sentence if left and right of a body differ by more than 10 mm across its surface, else nothing.
+
+    Args:
+        vertices: layout.vertex_count by 3 [m], before they are averaged.
+        layout: the grid.
+        averaged: whether they will be.
+    """
+    normals = vertex_normals(vertices, layout.faces)
+    apart = np.abs(np.einsum("vk,vk->v", vertices - _mirror_image(vertices, layout), normals))
+    limbs = {"arms": list(layout.arms.values()), "legs": list(layout.legs.values())}
+    parts = {name: np.unique(np.concatenate([grid.ravel() for grid in grids])) for name, grids in limbs.items()}
+    parts = {"trunk": np.setdiff1d(np.arange(layout.vertex_count), np.concatenate([*parts.values()])), **parts}
+    unlike = []
+    for name, of_part in parts.items():
+        worst = of_part[np.argmax(apart[of_part])]
+        if apart[worst] > _TOLD:
+            unlike.append(f"{name} by up to {1000.0 * apart[worst]:.0f} mm at a height of {vertices[worst, 1]:.2f} m")
+    if not unlike:
+        return ()
+    done = "their average is taken; symmetric = false keeps them" if averaged else "they are kept"
+    return (f"left and right differ: {', '.join(unlike)}; {done}",)
+
+
+def _mirror_image(vertices: FloatArray, layout: Layout) -> FloatArray:
+    return vertices[layout.mirror] * np.array([-1.0, 1.0, 1.0])

@@ -268,7 +268,8 @@ def _move_end(
     given = [(0, "from"), (-1, "to")]
     if "from" in table:
         # Whichever end of the table lies nearer.
-        known = {key: _as_point(surface.vertices, table[key]) for key in ("from", "to")}
+        places = ((key, table[key]) for key in ("from", "to"))
+        known = {key: surface.vertices[place] if isinstance(place, int) else np.array(place) for key, place in places}
         moved_end = surface.vertices[seam.path[end]]
         key = min(known, key=lambda key: float(np.linalg.norm(known[key] - moved_end)))
         cuts[number] = {**table, key: _rounded(point)}
@@ -276,10 +277,6 @@ def _move_end(
         name = table.get("name", table.get("line"))
         cuts[number] = {"name": name, **{key: _rounded(ends[at]) for at, key in given}}
     return {"cuts": cuts}
-
-
-def _as_point(vertices: FloatArray, place: int | Sequence[float]) -> FloatArray:
-    return np.asarray(vertices[place] if isinstance(place, int) else place, dtype=float)
 
 
 def _rounded(point: FloatArray) -> list[float]:
