@@ -189,13 +189,14 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
 
 
 def _facing_of_armhole(anatomy: Anatomy, limb: Limb, along: FloatArray) -> FloatArray:
-    """Return the normal of an armhole's plane: half way from the side to the sleeve, and not far below the level."""
-    outwards, up = limb.side * anatomy.normal, anatomy.up
-    outwards = outwards - (outwards @ up) * up
-    outwards /= np.linalg.norm(outwards)
-    rise = 0.5 * np.arctan2(float(along @ up), max(float(along @ outwards), 1e-3))
-    angle = np.clip(rise, _HANGS, _RAISED) - _LEAN
-    return np.asarray(np.cos(angle) * outwards + np.sin(angle) * up)
+    """Return the normal of an armhole's plane: half way from the side to the sleeve, forwards too, and not far below the level."""
+    up = anatomy.up
+    outwards = limb.side * (anatomy.normal - (anatomy.normal @ up) * up)
+    half = outwards / np.linalg.norm(outwards) + along
+    level = half - (half @ up) * up
+    length = float(np.linalg.norm(level))
+    angle = np.clip(np.arctan2(float(half @ up), length), _HANGS, _RAISED) - _LEAN
+    return np.asarray(np.cos(angle) * level / max(length, 1e-300) + np.sin(angle) * up)
 
 
 def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> tuple[float, FloatArray] | None:
