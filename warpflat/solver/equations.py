@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -147,9 +146,8 @@ def relax_under_equations(
                 contradictory=contradictory,
             )
         if network.seams is not None:
-            grown = correction(
-                residuals, partial(_respond, network, descent.point.positions, problem.solver(descent.point))
-            )
+            respond = _response(network, descent.point.positions, problem.solver(descent.point))
+            grown = correction(residuals, respond)
             network.seams.offset.assign(network.seams.offset.numpy() + grown)
         is_stale = descent.iterations - factored_at > _STEPS_PER_FACTOR
         if is_stale:
@@ -158,13 +156,16 @@ def relax_under_equations(
         descent.renew(forget=is_stale)
 
 
-def _respond(network: SpringNetwork, positions: FloatArray, solve: Solve, growth: FloatArray) -> FloatArray:
+def _response(network: SpringNetwork, positions: FloatArray, solve: Solve) -> Callable[[FloatArray], FloatArray]:
     """Return by how much residuals change, by a metric, where offsets grow by given lengths, each #P [m]."""
     assert network.seams is not None
-    root = np.sqrt(network.seams.stiffness.numpy())
-    rows = equation_rows(network, positions)
-    moved = -solve((rows.T @ (root * growth)).reshape(-1, 2))
-    return np.divide(rows @ moved.ravel(), root, out=np.zeros(len(root)), where=root > 0.0)
+    root, rows = np.sqrt(network.seams.stiffness.numpy()), equation_rows(network, positions)
+
+    def respond(growth: FloatArray) -> FloatArray:
+        moved = -solve((rows.T @ (root * growth)).reshape(-1, 2))
+        return np.divide(rows @ moved.ravel(), root, out=np.zeros(len(root)), where=root > 0.0)
+
+    return respond
 
 
 def _relax_by_steps(
