@@ -20,7 +20,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier
 from warpflat.solver.energy import Energy
 from warpflat.solver.grain import align_grain
-from warpflat.solver.metric import Metric, Solve, StiffnessFactor, equation_rows
+from warpflat.solver.metric import Metric, StiffnessFactor, equation_rows
 from warpflat.solver.minimise import Cloth, Descent
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation, relax_by_steps, take_first_steps
@@ -146,8 +146,7 @@ def relax_under_equations(
                 contradictory=contradictory,
             )
         if network.seams is not None:
-            respond = _response(network, descent.point.positions, problem.solver(descent.point))
-            grown = correction(residuals, respond)
+            grown = correction(residuals, _response(network, descent.point.positions, problem.metric))
             network.seams.offset.assign(network.seams.offset.numpy() + grown)
         is_stale = descent.iterations - factored_at > _STEPS_PER_FACTOR
         if is_stale:
@@ -156,14 +155,14 @@ def relax_under_equations(
         descent.renew(forget=is_stale)
 
 
-def _response(network: SpringNetwork, positions: FloatArray, solve: Solve) -> Callable[[FloatArray], FloatArray]:
-    """Return by how much residuals change, by a metric, where offsets grow by given lengths, each #P [m]."""
+def _response(network: SpringNetwork, positions: FloatArray, metric: Metric) -> Callable[[FloatArray], FloatArray]:
+    """Return by how much residuals change, by a metric without contacts, where offsets grow by given lengths, each #P by #K [m]."""
     assert network.seams is not None
-    root, rows = np.sqrt(network.seams.stiffness.numpy()), equation_rows(network, positions)
+    root, rows = np.sqrt(network.seams.stiffness.numpy())[:, None], equation_rows(network, positions)
 
     def respond(growth: FloatArray) -> FloatArray:
-        moved = -solve((rows.T @ (root * growth)).reshape(-1, 2))
-        return np.divide(rows @ moved.ravel(), root, out=np.zeros(len(root)), where=root > 0.0)
+        changed = rows @ -metric.factor.solve(rows.T @ (root * growth))
+        return np.divide(changed, root, out=np.zeros_like(changed), where=root > 0.0)
 
     return respond
 
