@@ -21,7 +21,7 @@ def test_eased_seams_that_push_each_other_settle_in_a_few_rounds(seed: int) -> N
     correction, offset, rounds = Correction(equations), np.zeros(len(equations)), 0
 
     def respond(growth: FloatArray) -> FloatArray:
-        return np.repeat(-0.8 * response @ growth[::2], 2)
+        return np.repeat(-0.8 * response @ growth[::2], 2, axis=0)
 
     while True:
         residuals = np.repeat(unsewn - response @ offset[::2], 2)

@@ -13,7 +13,7 @@ import seam_solids as solids
 
 import warpflat
 from warpflat.garment.sew_pieces import meeting_borders, unsewn_borders
-from warpflat.seams.anatomy import find_anatomy
+from warpflat.seams.anatomy import averaged_limbs, find_anatomy
 from warpflat.seams.fields import Operators
 from warpflat.seams.find import FoundSeams, cloth_of
 from warpflat.seams.thickness import even_line
@@ -290,3 +290,35 @@ def _area(surface: Surface) -> float:
     faces = np.concatenate([surface.faces[:, [0, 1, 2]], surface.faces[surface.faces[:, 3] >= 0][:, [0, 2, 3]]])
     a, b, c = surface.vertices[faces].transpose(1, 0, 2)
     return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+def test_an_armhole_turns_forwards_with_a_raised_sleeve() -> None:
+    way = np.array([1.0, 0.86, 0.64]) / np.linalg.norm([1.0, 0.86, 0.64])
+    parts = [solids.rod([0, -0.05, 0], [0, 0.45, 0], 0.17, 0.65), solids.rod([0, 0.45, 0], [0, 0.75, -0.02], 0.06)]
+    openings: list[solids.Plane] = [([0, 0, 0], [0, -1, 0]), ([0, 0.66, 0.0], [0, 0.94, 0.34])]
+    for side in (1.0, -1.0):
+        mirror = np.array([side, 1.0, 1.0])
+        root = np.array([0.12, 0.5, 0.0])
+        parts.append(solids.rod(root * mirror, (root + 0.35 * way) * mirror, 0.06))
+        openings.append(((root + 0.28 * way) * mirror, way * mirror))
+    shirt = solids.skin(solids.joined(parts, 0.02), [-0.6, -0.2, -0.3], [0.6, 1.0, 0.5], 0.035, openings)
+    found = warpflat.find_seams(shirt)
+    length = {seam.name: seam.length for seam in found.seams}
+    sleeve = next(piece for piece in found.pieces if piece.name == "left_sleeve")
+    rim = sleeve.vertices[sleeve.lines["sleeve"]]
+    # Square to the side it would be a fifth longer than the sleeve is wide.
+    assert length["armhole left"] < 1.18 * float(np.linalg.norm(np.diff(rim, axis=0), axis=1).sum())
+    assert length["armhole left"] == pytest.approx(length["armhole right"], abs=1e-4)
+
+
+def test_limbs_of_a_garment_of_equal_sides_are_mirror_images() -> None:
+    cloth = cloth_of(solids.shirt(0.4))
+    anatomy = find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+    left, right = sorted(anatomy.limbs, key=lambda limb: -limb.side)
+    off = replace(left, along=np.array([0.6, 0.0, 0.8]), fork=left.fork + np.array([0.0, 0.3, 0.0]))
+    anatomy = replace(anatomy, limbs=(off, right))
+    apart = averaged_limbs(anatomy, alike=False)
+    assert apart[0] is off
+    one, other = averaged_limbs(anatomy, alike=True)
+    np.testing.assert_allclose(one.along - 2.0 * (one.along @ anatomy.normal) * anatomy.normal, other.along, atol=1e-12)
+    assert (one.fork + other.fork) @ anatomy.normal == pytest.approx(2.0 * anatomy.offset)

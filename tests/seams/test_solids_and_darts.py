@@ -10,6 +10,7 @@ import seam_solids as solids
 import trimesh
 
 import warpflat
+from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.seams.fields import Operators
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
@@ -192,3 +193,17 @@ def test_wrinkles_are_smoothed_on_request_and_tubes_keep_their_girth() -> None:
     assert own.mean() == pytest.approx(1.0, abs=0.01)
     with pytest.raises(warpflat.InputError, match="smooth = 500 mm is out of range"):
         warpflat.find_seams(rough, warpflat.SeamOptions(smooth=0.5))
+
+
+def test_both_sides_of_a_seam_are_as_long_between_the_corners_at_which_its_pattern_is_parted() -> None:
+    parts = [solids.rod([0, 0, 0], [0, 0.17, 0], 0.045, 0.5), solids.rod([0.02, 0.06, 0], [0.085, 0.14, 0], 0.016)]
+    opening = [([0, 0.0, 0], [0, -1, 0])]
+    mitten = solids.skin(solids.joined(parts, 0.006), [-0.07, -0.07, -0.05], [0.13, 0.24, 0.05], 0.009, opening)
+    found = warpflat.find_seams(mitten, fabric="woven")
+    flat = [warpflat.flatten(piece, fabric="woven") for piece in found.pieces]
+    garment = warpflat.sew_pieces(flat, eased=True)
+    pattern, _ = pattern_of_garment({"": garment}, name="mitten")
+    assert len(pattern.seams) > len(found.seams)
+    for seam in pattern.seams:
+        one, other = (sum(pattern.piece(side.piece, "").edge(side.edge).length for side in row) for row in seam.sides)
+        assert one == pytest.approx(other, abs=5e-5)

@@ -22,6 +22,8 @@ from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.garment import Garment
 from warpflat.garment.sewing import sew
 from warpflat.garment.sewn import Sewn, Stitching
+from warpflat.pattern.corners import find_corners
+from warpflat.pattern.from_mesh import CORNER
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import SAME_PLACE, BorderSeam, surface_seams
 from warpflat.surface.connectivity import border_loops, join_labels
@@ -123,7 +125,12 @@ def sew_pieces(
     }
     for pair in meeting_borders({name: piece.network.surface for name, piece in flat.items()}, without=sewn_edges):
         if len(flat) > 1:
-            pairs.append(replace(pair, sides=pair.pieces, eased=eased and pair.pieces[0] != pair.pieces[1]))
+            if eased and pair.pieces[0] != pair.pieces[1]:
+                for part in _between_corners(pair, flat):
+                    title = find_unused_name(pair.name, {other.name for other in pairs})
+                    pairs.append(replace(part, name=title, sides=pair.pieces, eased=True))
+            else:
+                pairs.append(replace(pair, sides=pair.pieces))
             continue
         # What was cut open before, here or in the file, is sewn like any cut, and called by the line along which that was.
         sides, opening = {frozenset(side[:2].tolist()) for side in pair.vertices}, None
@@ -156,6 +163,18 @@ def sew_pieces(
             )
             pairs[number] = replace(pair, ratio=one / other, eased=True)
     return Garment(name=name or first, pieces=flat, stitching=pairs, border_seams=seams, sewn=sewn)
+
+
+def _between_corners(pair: Stitching, flat: Mapping[str, Flattening]) -> list[Stitching]:
+    """Return a seam parted where both of its sides have a corner: there its pattern is parted, too, and each part has two sides as long."""
+    first, second = pair.vertices
+    corners = set(range(1, len(first) - 1))
+    for name, row in zip(pair.pieces, pair.vertices, strict=True):
+        loop = border_loops(flat[name].network.surface.faces)[0]
+        own = loop[sorted(find_corners(flat[name].positions[loop], CORNER))]
+        corners &= set(np.flatnonzero(np.isin(row, own)).tolist())
+    ends = pairwise([0, *sorted(corners), len(first) - 1])
+    return [replace(pair, vertices=(first[a : b + 1], second[a : b + 1])) for a, b in ends]
 
 
 def _sew_evenly(

@@ -89,7 +89,7 @@ class ConstraintEquations:
 
 
 Response = Callable[[FloatArray], FloatArray]
-"""Returns by how much residuals change where offsets grow by given lengths, each #P [m]."""
+"""Returns by how much residuals change where offsets grow by given lengths, each #P by #K [m]."""
 
 
 class Correction:
@@ -114,10 +114,9 @@ class Correction:
             sums = equations.group_sums(residuals)[groups]
             response = -_RESPONSE * np.diag(np.bincount(of, equations.share[joint]))
             if respond is not None:
-                for number in range(len(groups)):
-                    unit = np.zeros(len(equations))
-                    unit[np.flatnonzero(joint)[of == number]] = 1.0
-                    response[:, number] = equations.group_sums(respond(unit))[groups]
+                unit = np.zeros((len(equations), len(groups)))
+                unit[joint, of] = 1.0
+                response = np.stack([equations.group_sums(change)[groups] for change in respond(unit).T], axis=1)
             missed = float((np.abs(sums) / equations.sum_tolerance[groups]).max())
             if missed > self._missed:
                 self._fraction *= 0.5

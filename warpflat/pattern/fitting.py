@@ -80,6 +80,12 @@ def fit_edges(
             ends = (one.piece, one.edge), (other.piece, other.edge)
             if not more and not others and ends[0] != ends[1]:
                 pairs.append((*ends, one.reversed != other.reversed, seam.ease))
+                continue
+            for key in {(side.piece, side.edge) for row in seam.sides for side in row}:
+                # Of several edges each keeps its own length as it is smoothed: so do both sides.
+                width, arc = fitted[key][1], arc_lengths(lines[key])
+                if width > TOLERANCE and abs(fitted[key][0].length - arc[-1]) > EQUAL:
+                    fitted[key] = fit_curve(lines[key], width, lengths=arc), width
         pairs += [((p.name, dart.left), (p.name, dart.right), True, 0.0) for p in pieces for dart in p.darts]
         for first, second, against, ease in pairs:
             wide = max(fitted[first][1], fitted[second][1])

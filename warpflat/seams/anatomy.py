@@ -21,7 +21,18 @@ from warpflat.seams.fields import MirrorMap, Operators, mirror_map
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 from warpflat.surface.half_edges import mesh_edges
 
-__all__ = ["AXES", "HOLE", "ROLES", "Anatomy", "Border", "Limb", "axis_name", "describe", "find_anatomy"]
+__all__ = [
+    "AXES",
+    "HOLE",
+    "ROLES",
+    "Anatomy",
+    "Border",
+    "Limb",
+    "averaged_limbs",
+    "axis_name",
+    "describe",
+    "find_anatomy",
+]
 
 Ids = NDArray[np.int64]
 Kind = Literal[
@@ -224,7 +235,6 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
             limbs = [replace(limb, side=-limb.side) for limb in limbs]
     mirror = None
     if holds:
-        limbs = _averaged_limbs(limbs, normal, offset, size)
         mirror = mirror_map(cloth.vertices, cloth.faces, normal, offset, reach=0.05 * size)
     elif one_sleeve:
         notes.append("it has a sleeve on one side alone: each side has its own lines")
@@ -639,21 +649,25 @@ def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Ki
     return found
 
 
-def _averaged_limbs(limbs: Sequence[Limb], normal: FloatArray, offset: float, size: float) -> list[Limb]:
-    """Return the limbs, each the mean of itself and its mate's mirror image where both are nearly the same."""
+def averaged_limbs(anatomy: Anatomy, *, alike: bool) -> tuple[Limb, ...]:
+    """Return the limbs, each the mean of itself and its mate's mirror image where both are nearly the same, or all `alike`."""
+    if anatomy.mirror is None:
+        return anatomy.limbs
+    normal, offset = anatomy.normal, anatomy.offset
     made = []
-    for limb in limbs:
-        mates = [one for one in limbs if one.kind == limb.kind and one.side == -limb.side]
-        for mate in mates[:1]:
+    for limb in anatomy.limbs:
+        mate = next((one for one in anatomy.limbs if one.kind == limb.kind and one.side == -limb.side), None)
+        if mate is not None:
             along = mate.along - 2.0 * float(mate.along @ normal) * normal
             fork = mate.fork - 2.0 * (float(mate.fork @ normal) - offset) * normal
-            if along @ limb.along > _SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * size:
+            near = along @ limb.along > _SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
+            if alike or near:
                 both = along + limb.along
                 both /= np.linalg.norm(both)
                 length = 0.5 * (limb.length + mate.length)
                 limb = replace(limb, along=both, fork=0.5 * (fork + limb.fork), length=length)
         made.append(limb)
-    return made
+    return tuple(made)
 
 
 def _fork(points: FloatArray, upward: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float, float]:

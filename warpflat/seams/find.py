@@ -17,7 +17,7 @@ from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.pattern.pieces import FoundSeam
-from warpflat.seams.anatomy import ROLES, Anatomy, axis_name, describe, find_anatomy
+from warpflat.seams.anatomy import ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
 from warpflat.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.energy import Trial, cut_by_energy
@@ -147,6 +147,7 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         cloth, moved, even = averaged(cloth, anatomy, operators)
         turned = [*turned, *moved]
         operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    anatomy = replace(anatomy, limbs=averaged_limbs(anatomy, alike=even))
     role = np.zeros(len(cloth.vertices))
     for border in anatomy.borders:
         role[border.vertices] = 1.0 + ROLES.index(border.role)

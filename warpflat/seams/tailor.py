@@ -189,13 +189,19 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
 
 
 def _facing_of_armhole(anatomy: Anatomy, limb: Limb, along: FloatArray) -> FloatArray:
-    """Return the normal of an armhole's plane: half way from the side to the sleeve, and not far below the level."""
+    """Return the normal of an armhole's plane: half way from the side to the sleeve, and not far below the level.
+
+    It turns forwards with an arm as far as that is raised: a shoulder does. A sleeve that hangs is set forwards in its armhole.
+    """
     outwards, up = limb.side * anatomy.normal, anatomy.up
     outwards = outwards - (outwards @ up) * up
     outwards /= np.linalg.norm(outwards)
-    rise = 0.5 * np.arctan2(float(along @ up), max(float(along @ outwards), 1e-3))
-    angle = np.clip(rise, _HANGS, _RAISED) - _LEAN
-    return np.asarray(np.cos(angle) * outwards + np.sin(angle) * up)
+    half = outwards + along
+    rise = np.clip(np.arctan2(half @ up, max(float(half @ outwards), 1e-3)), _HANGS, _RAISED)
+    level = half - (half @ up) * up
+    level -= (1.0 - max(rise / _RAISED, 0.0)) * (level - (level @ outwards) * outwards)
+    angle = rise - _LEAN
+    return np.asarray(np.cos(angle) * level / max(float(np.linalg.norm(level)), 1e-300) + np.sin(angle) * up)
 
 
 def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> tuple[float, FloatArray] | None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import Barrier
 from warpflat.solver.energy import Energy
 from warpflat.solver.grain import align_grain
-from warpflat.solver.metric import Metric, Solve, StiffnessFactor, equation_rows
+from warpflat.solver.metric import Metric, StiffnessFactor, equation_rows
 from warpflat.solver.minimise import Cloth, Descent
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation, relax_by_steps, take_first_steps
@@ -147,9 +146,7 @@ def relax_under_equations(
                 contradictory=contradictory,
             )
         if network.seams is not None:
-            grown = correction(
-                residuals, partial(_respond, network, descent.point.positions, problem.solver(descent.point))
-            )
+            grown = correction(residuals, _response(network, descent.point.positions, problem.metric))
             network.seams.offset.assign(network.seams.offset.numpy() + grown)
         is_stale = descent.iterations - factored_at > _STEPS_PER_FACTOR
         if is_stale:
@@ -158,13 +155,16 @@ def relax_under_equations(
         descent.renew(forget=is_stale)
 
 
-def _respond(network: SpringNetwork, positions: FloatArray, solve: Solve, growth: FloatArray) -> FloatArray:
-    """Return by how much residuals change, by a metric, where offsets grow by given lengths, each #P [m]."""
+def _response(network: SpringNetwork, positions: FloatArray, metric: Metric) -> Callable[[FloatArray], FloatArray]:
+    """Return by how much residuals change, by a metric without contacts, where offsets grow by given lengths, each #P by #K [m]."""
     assert network.seams is not None
-    root = np.sqrt(network.seams.stiffness.numpy())
-    rows = equation_rows(network, positions)
-    moved = -solve((rows.T @ (root * growth)).reshape(-1, 2))
-    return np.divide(rows @ moved.ravel(), root, out=np.zeros(len(root)), where=root > 0.0)
+    root, rows = np.sqrt(network.seams.stiffness.numpy())[:, None], equation_rows(network, positions)
+
+    def respond(growth: FloatArray) -> FloatArray:
+        changed = rows @ -metric.factor.solve(rows.T @ (root * growth))
+        return np.divide(changed, root, out=np.zeros_like(changed), where=root > 0.0)
+
+    return respond
 
 
 def _relax_by_steps(

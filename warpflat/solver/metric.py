@@ -151,8 +151,8 @@ class StiffnessFactor:
         self._column: dict[int, FloatArray] = {}
 
     def solve(self, force: FloatArray) -> FloatArray:
-        """Return the inverse times forces, #V by 2."""
-        return self._solve(force.ravel()).reshape(-1, 2)
+        """Return the inverse times forces, #V by 2, or 2 #V by #K."""
+        return self._solve(force.reshape(self._count, -1)).reshape(force.shape)
 
     def spread(self, columns: FloatArray, pull: FloatArray) -> FloatArray:
         """Return the inverse times forces at some vertices."""
@@ -188,7 +188,7 @@ class Metric:
 
     def __init__(self, factor: Factor, alignments: Sequence[GrainAlignment]) -> None:
         """Hold the chords of some pieces over a factor."""
-        self._factor = factor
+        self.factor = factor
         self._chords, self._across = _chords(alignments)
 
     @cached_property
@@ -205,7 +205,7 @@ class Metric:
         return self._solver(vertices, jacobian) if len(vertices) else self._without_contacts
 
     def _solver(self, vertices: IntArray, jacobian: FloatArray) -> Solve:
-        factor, count = self._factor, len(self._chords)
+        factor, count = self.factor, len(self._chords)
         chord = np.zeros((count, 3, 2))
         chord[:, 0], chord[:, 1] = self._across, -self._across
         vertices, jacobian = np.concatenate([self._chords, vertices]), np.concatenate([chord, jacobian])
