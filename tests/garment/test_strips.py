@@ -19,6 +19,7 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import Form, shipped_form
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.fitting import drawn_length
+from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.pieces import Pattern
 from warpflat.pattern.sewing_order import notions, sewing_steps
 
@@ -191,6 +192,8 @@ def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garmen
         for text in ("Join the", "Hem the free edges", "Lay the pleats", "Sew the ruffles on")
     ]
     assert order == sorted(order)
+    # Its pleats all turn one way, so that it is no half on the fold.
+    assert not any(piece.piece.on_fold for piece in halved(drafted).pieces[""] if piece.name == "hip_ruffle")
 
 
 def test_flounce_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garment):
