@@ -159,7 +159,10 @@ def equal_sides(
         # straight one or an S, on all curves, and with more bumps, each in a direction of its own.
         # Curves that are straight in parts stay so, unless no others bend enough.
         trials = [(seam.sides[1:], 1), (seam.sides, 1), (seam.sides, 2), (seam.sides, 4)]
-        for (moved, count), of_curves in [*((each, np.any) for each in trials), *((each, np.all) for each in trials[1:])]:
+        for (moved, count), of_curves in [
+            *((each, np.any) for each in trials),
+            *((each, np.all) for each in trials[1:]),
+        ]:
             bends, total, most = dict[EdgeKey, FloatArray](), 0.0, 0.0
             for row in moved:
                 for key in ((side.piece, side.edge) for side in row):
