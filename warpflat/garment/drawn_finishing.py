@@ -7,7 +7,7 @@ Widths are those of the finishing. How far a flounce stands out, and where a fol
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,8 @@ __all__ = ["finishing_views"]
 
 # Ends of edges that are nearer than this are sewn to each other [m]; points of a chain lie so far apart.
 _MEET, _STEP = 0.012, 0.004
+# What is narrower in the view than this [m] is a sliver at the silhouette.
+_SLIVER = 0.015
 _UP = np.array([0.0, 1.0, 0.0])
 # What a strip stands out for each length that it falls: in pleats, for each share that is gathered, and for each full turn of a flounce;
 # at most so much.
@@ -62,8 +64,12 @@ class _Chain:
         if not self.closed:
             return self
         first = int((self.points[:, 2] - 4.0 * np.abs(self.points[:, 0])).argmax())
+        return replace(self.begun_at(first), closed=False)
+
+    def begun_at(self, first: int) -> _Chain:
+        """Return a ring that begins at another point."""
         rows = [np.concatenate([row[first:-1], row[: first + 1]]) for row in (self.points, self.out, self.beyond)]
-        return _Chain(points=rows[0], out=rows[1], beyond=rows[2], closed=False)
+        return replace(self, points=rows[0], out=rows[1], beyond=rows[2])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,9 +112,9 @@ def _seen(sheet: _Sheet, shown: BoolArray, sign: float, *, lines: bool) -> list[
     for run in (run for run in runs if shown[run[0]]):
         # Halves that meet in the silhouette share a column.
         run = np.arange(max(run[0] - 1, 0), min(run[-1] + 2, len(shown)))
-        if len(run) < 2:
-            continue
         part = flat[:, run]
+        if sheet.outlined and np.ptp(part[:, :, 0]) < _SLIVER and len(run) < len(shown):
+            continue
         rings = []
         if sheet.outlined:
             cells = np.stack([part[:-1, :-1], part[:-1, 1:], part[1:, 1:], part[1:, :-1]], axis=2).reshape(-1, 4, 2)
@@ -168,7 +174,9 @@ def _chains(garment: Garment, called: str) -> Iterator[_Chain]:
         points, out, beyond = (
             np.column_stack([np.interp(places, arc, row[:, axis]) for axis in range(3)]) for row in here
         )
-        yield _Chain(points=points, out=_unit(out), beyond=_unit(beyond), closed=closed)
+        chain = _Chain(points=points, out=_unit(out), beyond=_unit(beyond), closed=closed)
+        # A ring begins in the silhouette, where its near side ends.
+        yield chain.begun_at(int(points[:, 0].argmax())) if closed else chain
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
