@@ -3,8 +3,9 @@
 //     python benchmarks/wardrobe_beside.py --inputs > inputs.json
 //     node benchmarks/draft_wardrobe.mjs inputs.json > benchmarks/drafted_wardrobe.json
 //
-// Needs the packages @freesewing/teagan, simon and charlie (4.10.2, MIT licence), and those that they import, where node finds them from
-// the working folder. Prints key lengths of each garment and size [mm]; see wardrobe_beside.py.
+// Needs the packages @freesewing/teagan, simon and charlie (4.10.2, MIT licence), and those that they import (core, brian, titan, library,
+// config, snapseries, plugin-flip, plugin-bust, plugin-transform; `npm install --legacy-peer-deps`), where node finds them from the working
+// folder. Prints key lengths of each garment and size [mm]; see wardrobe_beside.py.
 
 import { readFileSync } from 'node:fs'
 import { createRequire } from 'node:module'

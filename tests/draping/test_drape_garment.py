@@ -16,8 +16,10 @@ import warpflat
 from warpflat.cli.tables import warnings_of
 from warpflat.core.errors import InputError
 from warpflat.draping.frames import choose_frames, write_drape_frames
+from warpflat.draping.places import find_places
 from warpflat.draping.result import HOLLOW_REACH, hollow_depths
 from warpflat.draping.sewn_cloth import sew_cloth
+from warpflat.surface.connectivity import border_loops
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +43,18 @@ def test_seams_are_welded_and_the_rest_state_is_the_flat_pattern(bodice: warpfla
     laplacian, stiffness = cloth.laplacian()
     np.testing.assert_allclose((laplacian @ np.ones(len(cloth.designed))), 0.0, atol=1e-12)
     assert (stiffness > 0.0).sum() > 0.8 * len(stiffness)
+
+
+def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
+    cloth, borders = worn.cloth, np.concatenate(border_loops(worn.cloth.faces))
+    away = np.linalg.norm(cloth.designed[:, None] - cloth.designed[borders], axis=2).min(axis=1)
+    for vertex, words in ((int(away.argmax()), "stands off 20.0 mm farther"), (int(borders[0]), "gapes by 20.0 mm")):
+        near = np.linalg.norm(cloth.designed - cloth.designed[vertex], axis=1) < 0.05
+        lift, none = np.where(near, 0.02, 0.0), np.zeros(len(near))
+        (place,) = find_places(
+            cloth, worn.areas, misfit=lift, meant_to_touch=near, bridged=none, lift=lift, gap=lift, strains={}
+        )
+        assert words in place.words
 
 
 def test_a_bodice_without_darts_gapes_at_the_armholes(worn: warpflat.Drape):

@@ -26,7 +26,8 @@ def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_si
     garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=True)
     views = describe_worn({"": garment}, "").views
     for name, sign in (("front", 1.0), ("back", -1.0)):
-        *pieces, band, zipped = views[name]
+        # What of the band is on the far side lies behind all pieces.
+        _, *pieces, band, zipped = views[name]
         top = max(float(piece.outlines[0][:, 1].max()) for piece in pieces)
         (ring,) = band.outlines
         assert float(ring[:, 1].max()) == pytest.approx(top + 0.03, abs=0.003)
@@ -56,3 +57,38 @@ def test_a_zip_at_the_centre_back_is_not_seen_from_the_front():
     assert drawn["front"] == []
     (zipped,) = drawn["back"]
     assert all(abs(float(line.mean(axis=0)[0])) < 0.01 for line in zipped.lines)
+
+
+@pytest.mark.parametrize(
+    ("wish", "wider", "lines"),
+    [
+        (Finishing(kind="ruffle", edge="knee", width=0.2, share=3.0, pleat=0.05), 0.015, 11),
+        (Finishing(kind="ruffle", edge="knee", width=0.1, share=1.8), 0.04, 17),
+        (Finishing(kind="flounce", edge="knee", width=0.2, turns=1.0), 0.14, 7),
+    ],
+)
+def test_ruffle_hangs_below_its_edge_with_its_folds(wish: Finishing, wider: float, lines: int):
+    garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=True)
+    plain, drawn = (describe_worn({"": replace(garment, finishing=row)}, "").views for row in ((), (wish,)))
+    for name in ("front", "back"):
+        before, after = (
+            np.concatenate([ring for piece in row[name] for ring in piece.outlines]) for row in (plain, drawn)
+        )
+        assert float(before[:, 1].min() - after[:, 1].min()) == pytest.approx(wish.width, abs=0.02)
+        knee = before[before[:, 1] < before[:, 1].min() + 0.02, 0]
+        assert float(np.ptp(after[:, 0]) - np.ptp(knee)) > wider
+        # Folds of the near side alone are seen.
+        seen = [sum(len(piece.lines) for piece in row[name]) for row in (plain, drawn)]
+        assert seen[1] - seen[0] == pytest.approx(lines, abs=2)
+
+
+def test_right_half_of_a_wrap_covers_the_left_one():
+    garment = skirt(Opening(kind="wrap", line="centre front", length=np.inf, width=0.12), half=False)
+    views = describe_worn({"": garment}, "").views
+    shell = [piece for piece in views["front"] if piece.outlines][1:-1]
+    # To the viewer's right of the centre by its width; nothing of the centre line is seen on it.
+    upper = shell[-1]
+    (ring,) = upper.outlines
+    assert float(ring[:, 0].max()) == pytest.approx(0.12, abs=0.01)
+    assert float(ring[:, 0].min()) < -0.15
+    assert not any(np.abs(line[:, 0]).max() < 0.01 for line in upper.lines)

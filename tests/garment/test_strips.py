@@ -19,6 +19,7 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import Form, shipped_form
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.fitting import drawn_length
+from warpflat.pattern.half_pieces import halved
 from warpflat.pattern.pieces import Pattern
 from warpflat.pattern.sewing_order import notions, sewing_steps
 
@@ -156,12 +157,60 @@ def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
     whole = ruffle.edge("lower").length
     folds = sorted(line[0, 0] for name, line in ruffle.internal_lines.items() if name.startswith("pleat fold"))
     ends = sorted(line[0, 0] for name, line in ruffle.internal_lines.items() if name.startswith("pleat lies"))
-    # The first fold is the end of the strip.
-    count = len(ends)
-    assert count == len(folds) + 1 == round(whole / 3.0 / 0.05)
-    starts = np.array([0.0, *folds])
-    assert np.diff(starts) == pytest.approx(whole / count)
-    # A third of each stays visible.
-    assert np.array(ends) - starts == pytest.approx(2.0 / 3.0 * whole / count)
+    count, stretch = round(whole / 3.0 / 0.05), 3.0 * 0.05 * whole / 3.0 / 0.05 / round(whole / 3.0 / 0.05)
+    assert len(folds) == len(ends) == count
+    assert np.diff(folds) == pytest.approx(stretch)
+    # A third of each stays visible, and the strip begins and ends in the inner fold of a pleat.
+    assert np.array(folds) - ends == pytest.approx(stretch / 3.0)
+    assert ends[0] == pytest.approx(stretch / 3.0) == pytest.approx(whole - folds[-1])
     assert "Lay the pleats" in " ".join(step.words for step in sewing_steps(draft_garment(pattern), ""))
     lengths(pattern)
+
+
+@pytest.mark.parametrize(("cloth", "count"), [(1.4, 3), (0.9, 4), (4.0, 1)])
+def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garment, cloth: float, count: int):
+    wish = Finishing(kind="ruffle", edge="hip", width=0.2, share=3.0, pleat=0.04)
+    pattern, _ = pattern_of_garment({"": replace(shirt, finishing=[wish])}, name="garment", cloth_width=cloth)
+    panel = pattern.piece("hip_ruffle", "")
+    assert panel.quantity == count
+    assert np.ptp(panel.outline[:, 0]) + 2.0 * panel.edge("right end").width <= cloth
+    found = lengths(pattern)
+    assert found["hip ruffle"][1] == pytest.approx(count * 1000 * panel.edge("lower").length, abs=0.1)
+    joints = [seam for seam in pattern.seams if seam.name.startswith("hip ruffle ends")]
+    assert len(joints) == count
+    # All are sewn alike, and where they lie along the edge is marked there, not on the panel.
+    drafted = draft_garment(pattern)
+    own = [
+        notch
+        for notch in next(piece for piece in drafted.pieces[""] if piece.name == "hip_ruffle").notches
+        if notch.edge == "lower"
+    ]
+    assert len(own) == 1
+    steps = [step.words for step in sewing_steps(drafted, "")]
+    order = [
+        next(k for k, step in enumerate(steps) if text in step and "hip ruffle" in step)
+        for text in ("Join the", "Hem the free edges", "Lay the pleats", "Sew the ruffles on")
+    ]
+    assert order == sorted(order)
+    # Its pleats all turn one way, so that it is no half on the fold.
+    assert not any(piece.piece.on_fold for piece in halved(drafted).pieces[""] if piece.name == "hip_ruffle")
+
+
+def test_flounce_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garment):
+    wish = Finishing(kind="flounce", edge="hip", width=0.6, turns=1.0)
+    pattern, _ = pattern_of_garment({"": replace(shirt, finishing=[wish])}, name="garment", cloth_width=1.15)
+    panels = [piece for piece in pattern.pieces[""] if "flounce" in piece.name]
+    assert max(piece.quantity for piece in panels) > 1
+    assert all(np.ptp(piece.outline[:, 0]) < 1.15 for piece in panels)
+    lengths(pattern)
+    whole = sum(piece.quantity * (piece.edge("hem").length - piece.edge("hip").length) for piece in panels)
+    assert whole == pytest.approx(2.0 * np.pi * 0.6, rel=1e-3)
+    # Every end of every panel is sewn once.
+    ends = [
+        (side.piece, side.edge, side.copy, side.mirrored)
+        for seam in pattern.seams
+        for row in seam.sides
+        for side in row
+        if "flounce" in side.piece and side.edge != "hip"
+    ]
+    assert len(ends) == len(set(ends)) == 2 * sum(piece.quantity for piece in panels)

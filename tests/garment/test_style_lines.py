@@ -86,7 +86,8 @@ def test_godets_left_edge_is_sewn_to_the_piece_on_its_left(skirt: Garment):
 def test_ruffle_goes_along_the_godet_too(skirt: Garment):
     ruffle = Finishing(kind="ruffle", edge="knee", width=0.1, share=1.5)
     made = [replace(skirt, openings=openings, finishing=(ruffle,)) for openings in ((), tuple(GODETS))]
-    lengths = [pattern_of(each).piece("knee_ruffle", "").edge("lower").length for each in made]
+    strips = [pattern_of(each).piece("knee_ruffle", "") for each in made]
+    lengths = [strip.quantity * strip.edge("lower").length for strip in strips]
     assert lengths[1] - lengths[0] == pytest.approx(2 * 1.5 * 0.25, rel=1e-2)
 
 
@@ -189,7 +190,8 @@ def test_hem_that_is_higher_in_front_has_no_corner_there(skirt: Garment):
 def test_ruffle_takes_the_place_of_what_a_slanted_hem_loses(skirt: Garment):
     rises = {"side left": 0.2, "side right": 0.05}
     sewn = finish_edges(pattern_of(skirt), [replace(slanted(rises, "ruffle"), share=1.5)])
-    assert sewn.piece("knee_ruffle", "").edge("lower").length > 1.4
+    ruffle = sewn.piece("knee_ruffle", "")
+    assert ruffle.quantity * ruffle.edge("lower").length > 1.4
     assert matches(sewn)
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
+from warpflat.core.polyline import polyline_length
 from warpflat.pattern.curves import chords, fit_curve
 from warpflat.pattern.draft import draft_piece
-from warpflat.pattern.fitting import is_wavy, smooth_line
+from warpflat.pattern.fitting import drawn_length, is_wavy, smooth_line
 from warpflat.pattern.piece_parts import Dart, Edge
 from warpflat.pattern.pieces import Piece
 
@@ -107,3 +108,27 @@ def test_a_sliver_narrower_than_its_tolerance_keeps_the_points_of_its_border():
     edges = [Edge(name="one", points=low), Edge(name="other", points=low[::-1] * [1, -1])]
     drafted = draft_piece(Piece(name="p", edges=edges), tolerance=1e-3)
     assert min(np.ptp(drafted.sew_line, axis=0)) == pytest.approx(8e-4, rel=0.1)
+
+
+def test_a_line_whose_curve_would_cross_itself_is_as_long_as_its_chords():
+    """A back's neckline with corners: a curve that rounds them off turns a loop, so that chords are drawn."""
+    # fmt: off
+    neck = np.array([
+        (0.085138, 0.588926), (0.071108, 0.568379), (0.068319, 0.566933), (0.057702, 0.568961),
+        (0.047573, 0.569919), (0.034658, 0.570619), (0.021451, 0.571161), (0.009195, 0.571456),
+        (0.000022, 0.571527), (-0.009151, 0.571456), (-0.021407, 0.571161), (-0.034614, 0.570619),
+        (-0.047529, 0.569919), (-0.057659, 0.568961), (-0.068275, 0.566933), (-0.071064, 0.568379),
+        (-0.085094, 0.588926),
+    ])
+    # fmt: on
+    assert drawn_length(neck) == pytest.approx(polyline_length(neck), abs=1e-9)
+    drafted = draft_piece(
+        Piece(
+            name="back",
+            edges=[
+                Edge(name="neck", points=neck),
+                Edge(name="rest", points=np.array([neck[-1], (-0.1, 0.4), (0.1, 0.4), neck[0]])),
+            ],
+        )
+    )
+    assert drafted.edge("neck").length == pytest.approx(drawn_length(neck), abs=1e-6)

@@ -16,6 +16,7 @@ from warpflat.garment.linings import add_interfacing, add_lining
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.seam_words import joint_words
 from warpflat.pattern.sewing_order import notions, seam_letters, sewing_steps
 from warpflat.pattern.words import language_words, printed_in
 
@@ -231,7 +232,7 @@ def test_a_waistband_above_a_zip_has_a_hook():
     [
         ("band", 0.85, "Fold the bands lengthwise, wrong sides together, and sew both their edges on"),
         ("binding", 1.0, "Sew the bindings on, fold them over the raw edges and sew them down inside"),
-        ("ruffle", 1.5, "Hem the free edges of ruffles, and sew the ruffles on"),
+        ("ruffle", 1.5, "Sew the ruffles on"),
     ],
 )
 def test_each_strip_is_sewn_on_as_its_kind_is(kind: str, share: float, expected: str):
@@ -266,3 +267,51 @@ def test_a_lining_is_sewn_to_its_vent():
     drafted = draft_garment(add_lining(replace(pattern, pieces={"": pieces}, seams=seams), "lining"))
     (step,) = [step for step in sewing_steps(drafted, "") if step.words.startswith("At the vent, ")]
     assert step.sewn == {f"back_{side}_lining": frozenset({"centre back vent"}) for side in ("right", "left")}
+
+
+def test_ring_is_sewn_after_the_seams_that_it_crosses():
+    # A hat: two sides of 30 by 10 cm, a round crown, and a brim in two halves below the sides.
+    angles = np.linspace(0.0, np.pi, 33)
+    half = 0.3 / np.pi * np.column_stack([np.cos(angles), np.sin(angles)])
+    crown = Piece(name="crown", edges=[Edge(name="front", points=half), Edge(name="back", points=-half)])
+    box = {
+        "bottom": [[0.0, 0.0], [0.3, 0.0]],
+        "right": [[0.3, 0.0], [0.3, 0.1]],
+        "top": [[0.3, 0.1], [0.0, 0.1]],
+        "left": [[0.0, 0.1], [0.0, 0.0]],
+    }
+    others = [
+        Piece(
+            name=name,
+            edges=[
+                Edge(name=edge, points=np.array(points), kind="hem" if "brim" in name and edge == "bottom" else "seam")
+                for edge, points in box.items()
+            ],
+        )
+        for name in ("side_1", "side_2", "brim_1", "brim_2")
+    ]
+
+    def seam(one: str, other: str) -> Seam:
+        first, second = (SeamSide(piece=each.split(".")[0], edge=each.split(".")[1]) for each in (one, other))
+        made = Seam(name=f"{one} {other}", sides=((first,), (replace(second, reversed=True),)))
+        return replace(made, name=f"{joint_words(made)}{' 2' if '2' in one else ''}")
+
+    pairs = [
+        ("crown.front", "side_1.top"), ("side_2.top", "crown.back"), ("side_1.bottom", "brim_1.top"),
+        ("side_2.bottom", "brim_2.top"), ("side_1.right", "side_2.left"), ("side_2.right", "side_1.left"),
+        ("brim_1.right", "brim_2.left"), ("brim_2.right", "brim_1.left"),
+    ]  # fmt: skip
+    drafted = draft_garment(Pattern(name="hat", pieces={"": [crown, *others]}, seams=[seam(*pair) for pair in pairs]))
+    steps = [step.words for step in sewing_steps(drafted, "")]
+    assert [step.partition(",")[0] for step in steps[:3]] == [
+        "Join the panels",
+        "Sew around",
+        "Sew around",
+    ]
+    assert all("crown" in words and "brim" not in words for words in steps[1:2])
+    assert "side 1 to brim 1" in steps[2]
+    assert "side 2 to brim 2" in steps[2]
+    assert "side 1 to side 2" in steps[0]
+    assert "brim 1 to brim 2" in steps[0]
+    # They are called by their pieces once.
+    assert "crown to side: " not in " ".join(steps)

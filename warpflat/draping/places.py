@@ -10,7 +10,7 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.surface.connectivity import join_labels
+from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["Place", "find_places"]
@@ -73,6 +73,9 @@ def find_places(
         strains: #F along warp and weft.
     """
     found = []
+    # Cloth gapes at an edge of the garment. Inside, as in a flute of a skirt, it stands off.
+    edge = np.zeros(len(gap), dtype=bool)
+    edge[np.concatenate(border_loops(cloth.faces))] = True
     parts = {
         "misfit": np.where(meant_to_touch, misfit, 0.0),
         "hang": np.where(meant_to_touch, 0.0, misfit),
@@ -86,7 +89,7 @@ def find_places(
                 size = f"over {1e4 * area:.0f} cm2"
                 if kind == "bridged":
                     words = f"{_called(line)} bridges a hollow, {1e3 * distance:.1f} mm off, {size}"
-                elif lift[worst] > 0.5 * distance and kind == "misfit":
+                elif lift[worst] > 0.5 * distance and kind == "misfit" and edge[part].any():
                     words = f"{_called(line)} gapes by {1e3 * gap[worst]:.1f} mm {size}"
                 elif lift[worst] > 0.5 * distance:
                     words = f"{_called(line)} stands off {1e3 * distance:.1f} mm farther than designed, {size}"

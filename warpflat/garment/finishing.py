@@ -17,7 +17,7 @@ from warpflat.garment.flounces import with_flounce
 from warpflat.garment.free_edges import Break, FreeChain, chain_length, free_chains
 from warpflat.garment.plackets import with_placket, with_slits
 from warpflat.garment.shaped_band import shortened, slant_rises, with_shaped_waistband
-from warpflat.garment.strips import Strip, strip_edges, swept
+from warpflat.garment.strips import CLOTH_WIDTH, Strip, panel_count, strip_edges, swept
 from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
@@ -104,6 +104,7 @@ def finish_edges(
     gaps: Collection[str] = (),
     stands: Sequence[Stand] = (),
     girths: Mapping[str, Mapping[str, float]] | None = None,
+    cloth_width: float = CLOTH_WIDTH,
 ) -> Pattern:
     """Return a pattern with the pieces that finish its edges, and the seams that join them.
 
@@ -113,6 +114,7 @@ def finish_edges(
         gaps: names of seams that an opening leaves open at their upper end; a band ends there.
         stands: button stands; what no facing of an edge beside them takes along gets one of its own.
         girths: of the body by size and level [m], and of the "head", for elastics and hoods.
+        cloth_width: usable width of the cloth [m]; strips and flounces that are wider are cut as equal panels.
 
     Raises:
         InputError: no free edge has the name, or a piece cannot be drawn there.
@@ -159,7 +161,7 @@ def finish_edges(
                 pattern = with_collar(pattern, places, wish.collar, gaps=gaps, breaks=breaks)
             elif wish.kind == "flounce":
                 for chain, _ in free_chains(pattern, places, gaps):
-                    pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge)
+                    pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge, cloth_width)
             elif wish.kind == "casing":
                 pattern = _with_casing(pattern, places, wish)
             elif wish.shaped:
@@ -170,7 +172,7 @@ def finish_edges(
                     pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
                     pattern, places = _opened_up(pattern, wish.edge)
                 for chain, count in free_chains(pattern, places, gaps, breaks):
-                    pattern = _with_strip(pattern, wish, chain, count)
+                    pattern = _with_strip(pattern, wish, chain, count, cloth_width)
         except InputError as error:
             raise InputError(f"finishing[{number}]: {error}") from None
     return pattern
@@ -264,34 +266,76 @@ def _with_casing(pattern: Pattern, places: Sequence[tuple[str, str]], wish: Fini
     return replace(pattern, pieces=pieces)
 
 
-def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int) -> Pattern:
-    """Return a pattern with one strip along a chain of free edges, cut `count` times."""
+def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int, cloth_width: float) -> Pattern:
+    """Return a pattern with one strip along a chain of free edges, cut `count` times.
+
+    A strip that is wider than the cloth is cut as equal panels, of which one is drawn. One that is laid in pleats begins and ends in the
+    inner fold of a pleat, and so does each of its panels: no seam of them shows.
+    """
     taken = {piece.name for piece in pattern.pieces[pattern.sample]}
     name = find_unused_name(wish.name, taken)
     ring = chain.closed and not wish.overlap
-    pieces = {}
-    for size, row in pattern.pieces.items():
-        length = wish.share * chain_length(pattern, chain, size)
-        allowance = pattern.piece(chain.sides[0].piece, size).edge(chain.sides[0].edge).width
-        strip = _strip(wish, name, length, row[0], quantity=count, ring=ring, allowance=allowance)
-        pieces[size] = (*row, strip)
+    lengths = {size: wish.share * chain_length(pattern, chain, size) for size in pattern.pieces}
+    allowance = {
+        size: pattern.piece(chain.sides[0].piece, size).edge(chain.sides[0].edge).width for size in pattern.pieces
+    }
+    folded, (weft, warp), _ = _STRIPS[wish.kind]
+    high = wish.width * (2 if folded else 1)
+
+    def width_of(panels: int) -> float:
+        return max(
+            warp * (length / panels + 2.0 * allowance[size]) + weft * (high + 2.0 * allowance[size])
+            for size, length in lengths.items()
+        )
+
+    # What is cut along the cloth is as long as it likes.
+    panels = panel_count(width_of, cloth_width) if warp > 0.0 and not wish.overlap else 1
+    pieces = {
+        size: (
+            *row,
+            _strip(
+                wish, name, lengths[size] / panels, row[0],
+                quantity=count * panels, joined=ring or panels > 1, allowance=allowance[size],
+            ),
+        )
+        for size, row in pattern.pieces.items()
+    }  # fmt: skip
     called, words = {seam.name for seam in pattern.seams}, name.replace("_", " ")
     sided = any(without_side(side.edge) != side.edge for side in chain.sides)
-    sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]] = ((SeamSide(piece=name, edge="lower"),), chain.sides)
+    whole = tuple(SeamSide(piece=name, edge="lower", copy=copy) for copy in range(panels))
+    sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]] = (whole, chain.sides)
     ease = 1.0 / wish.share - 1.0
     if wish.share > 1.0:
         sides, ease = sides[::-1], wish.share - 1.0
-    sewn = Seam(
-        name=find_unused_name(words, called),
-        sides=sides,
-        ease=ease,
-        notches=None if sided else _centres(pattern, chain),
-    )
+    sewn = Seam(name=find_unused_name(words, called), sides=sides, ease=ease)
+    if wish.pleat:
+        # Lengths of the strip and of its edge fit each other from pleat to pleat alone.
+        size_notches = {}
+        for size, length in lengths.items():
+            row = _pleat_count(wish, length / panels)
+            size_notches[size] = tuple((k + (row // 2) / row) / panels for k in range(panels) if row > 1)
+        sewn = replace(sewn, notches=(), size_notches=size_notches)
+    elif panels > 1:
+        sewn = replace(sewn, notches=tuple((k + 0.5) / panels for k in range(panels)))
+    else:
+        sewn = replace(sewn, notches=None if sided else _centres(pattern, chain))
     seams = [*pattern.seams, sewn]
-    if ring:
-        ends = ((SeamSide(piece=name, edge="right end"),), (SeamSide(piece=name, edge="left end", reversed=True),))
-        seams.append(Seam(name=find_unused_name(f"{words} ends", called), sides=ends))
+    called.add(sewn.name)
+    for copy in range(panels if ring else panels - 1):
+        ends = (
+            (SeamSide(piece=name, edge="right end", copy=copy),),
+            (SeamSide(piece=name, edge="left end", reversed=True, copy=(copy + 1) % panels),),
+        )
+        seams.append(
+            Seam(name=find_unused_name(f"{words} ends", called), sides=ends, notches=() if wish.pleat else None)
+        )
+        called.add(seams[-1].name)
     return replace(pattern, pieces=pieces, seams=seams)
+
+
+def _pleat_count(wish: Finishing, length: float) -> int:
+    """Return how many pleats a panel of a strip of that length [m] is laid in."""
+    return max(1, round(length / wish.share / wish.pleat))
 
 
 def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
@@ -310,14 +354,14 @@ def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
 
 
 def _strip(
-    wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, ring: bool, allowance: float
+    wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, joined: bool, allowance: float
 ) -> Piece:
-    """Return a straight strip of one size."""
+    """Return a straight strip of one size, or a panel of one; `joined` are its ends to each other or to other panels."""
     folded, along, role = _STRIPS[wish.kind]
     high, whole = wish.width * (2 if folded else 1), length + wish.overlap
     # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
     kinds = dict.fromkeys(("overlap", "upper"), "cut")
-    kinds |= {} if ring else dict.fromkeys(("right end", "left end"), "cut")
+    kinds |= {} if joined else dict.fromkeys(("right end", "left end"), "cut")
     widths = dict.fromkeys(("lower", "right end", "left end", "upper", "overlap"), allowance)
     if wish.kind == "binding":
         widths["upper"] = 0.0
@@ -327,16 +371,13 @@ def _strip(
     middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if along[1] == 0.0 else high)
     lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
     if wish.pleat:
-        # Knife pleats: each begins where it is folded, and is laid to the next line.
-        count = max(2, round(length / wish.share / wish.pleat))
+        # Knife pleats: half of what each takes lies at either end of its stretch.
+        count = _pleat_count(wish, length)
+        stretch, hidden = length / count, 0.5 * length / count * (1.0 - 1.0 / wish.share)
         for number in range(count):
-            start = number * length / count
-            for what, x in (
-                ("pleat fold", start),
-                ("pleat lies here", start + length / count * (1.0 - 1.0 / wish.share)),
-            ):
-                if x > 0.0:
-                    lines[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
+            for what, x in (("pleat lies here", hidden), ("pleat fold", stretch - hidden)):
+                x += number * stretch
+                lines[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
     marks = {}
     if wish.kind == "cuff" and wish.overlap:
         # It buttons upon itself, in the middle of its outer half.

@@ -12,12 +12,12 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
-from warpflat.core.text import other_side, without_side
+from warpflat.core.text import other_side
 from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.garment.button_stand import button_depths
+from warpflat.garment.drawn_finishing import finishing_views
 from warpflat.garment.girths import pattern_girths
 from warpflat.garment.openings import Buttons, place_opening
-from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES
 from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.triangles import triangulate
@@ -69,8 +69,10 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
             _with_slanted_hems(garment, list(garment.pieces)[k], drawn[k][index], sign, rises)
             for k in np.argsort(sign * depth, kind="stable")
         ]
-        details = [] if garment.form is None else [*_bands(garment, sign), *_openings(garment, sign)]
-        views[name] = tuple(piece for piece in (*seen, *details) if piece.outlines or piece.lines)
+        seen = _wrapped(garment, seen, [list(garment.pieces)[k] for k in np.argsort(sign * depth, kind="stable")], sign)
+        behind, before = finishing_views(garment, sign)
+        details = [] if garment.form is None else list(_openings(garment, sign))
+        views[name] = tuple(piece for piece in (*behind, *seen, *before, *details) if piece.outlines or piece.lines)
     measures = {}
     for size, each in garments.items():
         if each.form is not None and each.mannequin is not None:
@@ -131,42 +133,44 @@ def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatAr
     return np.asarray(sign * normals[ids, 2])
 
 
-def _bands(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
-    """Yield waistbands, and bands around the trunk, as they are seen: above or below their edge, or on it where they take its place."""
+def _wrapped(garment: Garment, seen: list[ViewedPiece], names: list[str], sign: float) -> list[ViewedPiece]:
+    """Return the pieces as they are seen with those of the right half of a wrap in front, out to their edges on the left half."""
     import shapely
 
-    form, sides = garment.form, (1.0, -1.0) if garment.form is not None and garment.form.half else (1.0,)
-    assert form is not None
-    for wish in garment.finishing:
-        if wish.kind not in ("waistband", "band") or wish.edge in (*ARM_LEVELS, *LEG_LINES.values()):
+    upper = dict[str, ViewedPiece]()
+    for opening in garment.openings:
+        if opening.kind != "wrap" or garment.form is None:
             continue
-        seen, inside = list[FloatArray](), list[float]()
-        for name, piece in form.pieces.items():
-            for edge, ids in piece.edges.items():
-                if without_side(edge).rstrip(" 0123456789") == wish.edge:
-                    inside.append(float(piece.surface.vertices[:, 1].mean()))
-                    near = ids[_towards(garment, name, ids, sign) > _NEAR_SIDE]
-                    seen += [piece.surface.vertices[near, :2] * [sign * side, 1.0] for side in sides]
-        points = np.concatenate(seen) if seen else np.zeros((0, 2))
-        if len(points) < 2:
-            continue
-        # Pieces meet at their ends, and their points run on across the view.
-        points = points[np.argsort(points[:, 0], kind="stable")]
-        above = 1.0 if points[:, 1].mean() > np.mean(inside) else -1.0
-        shift = above * wish.width * (-1.0 if wish.shaped or wish.shorten else 1.0)
-        # Across its edge everywhere: the band of a neck runs around it. Where an edge is upright its points have no order.
-        strip = shapely.LineString(points).simplify(4.0 * _WITHIN).buffer(shift, single_sided=True, join_style="bevel")
-        ring = np.asarray(max(shapely.get_parts(strip), key=lambda part: part.area).exterior.coords)[:-1]
-        yield ViewedPiece(outlines=(ring,), lines=(np.concatenate([ring, ring[:1]]),))
+        for part in place_opening(garment.form, opening, garment.positions):
+            if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
+                continue
+            both = [name for name in {part.piece, other_side(part.piece)} if name in names]
+            right = min(both, key=lambda name: float(garment.pieces[name].surface.vertices[:, 0].mean()))
+            at = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
+            # From the neckline to the waist, and on beside the line.
+            arc = arc_lengths(garment.positions[part.piece][part.vertices])
+            share = arc / arc[-1] if "neck" in garment.form.pieces[part.piece].edges else np.ones(len(arc))
+            edge = at + np.outer(opening.width * share, [sign, 0.0])
+            flap = shapely.Polygon(np.concatenate([at - [sign * _WITHIN, 0.0], edge[::-1]])).buffer(0.0)
+            view = seen[names.index(right)]
+            whole = shapely.union_all([flap, *(shapely.Polygon(ring).buffer(0.0) for ring in view.outlines)])
+            hidden = flap.buffer(2.0 * _WITHIN)
+            rows = [shapely.LineString(line).difference(hidden) for line in view.lines]
+            parts = [each for row in rows for each in shapely.get_parts(row) if each.length > _BAR[1, 0]]
+            upper[right] = ViewedPiece(
+                outlines=tuple(np.asarray(each.exterior.coords)[:-1] for each in shapely.get_parts(whole)),
+                lines=(*(np.asarray(each.coords) for each in parts), edge),
+            )
+    return [*(view for name, view in zip(names, seen, strict=True) if name not in upper), *upper.values()]
 
 
 def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
-    """Yield zips, as teeth and a bar at the lower end, the upper end of slits and vents, as a bar, buttons, edges of godets and wraps."""
+    """Yield zips, as teeth and a bar at the lower end, the upper end of slits and vents, as a bar, buttons, and edges of godets."""
     assert garment.form is not None
     assert garment.mannequin is not None
     bust = garment.mannequin.layout.lines["bust"]
     for opening in garment.openings:
-        if opening.kind == "keyhole":
+        if opening.kind in ("keyhole", "wrap"):
             continue
         parts = place_opening(garment.form, opening, garment.positions)
         end = min(opening.start + opening.length, sum(part.whole for part in parts))
@@ -176,11 +180,6 @@ def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
             seen = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
             # A side seam is the outline of both views.
             if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
-                continue
-            if opening.kind == "wrap":
-                # The edge of the upper half: from the neckline to the waist, and on beside the line.
-                to_waist = arc / arc[-1] if "neck" in garment.form.pieces[part.piece].edges else np.ones(len(arc))
-                lines.append(seen + np.outer(opening.width * np.minimum(to_waist, 1.0), [sign, 0.0]))
                 continue
             if opening.kind == "godet":
                 # Its edges, from the tip down to the hem, where it hangs in folds.

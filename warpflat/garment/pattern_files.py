@@ -13,6 +13,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import format_count, plain_letters
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.linings import add_interfacing, add_lining
+from warpflat.garment.strips import CLOTH_WIDTH
 from warpflat.pattern.shrinkage import Shrinkage, enlarged
 
 if TYPE_CHECKING:
@@ -85,6 +86,14 @@ class PatternOptions:
     interfacing: str = ""
     true: bool = True
 
+    @property
+    def cloth_width(self) -> float:
+        """Usable width [m] of the cloth that strips and flounces are cut from."""
+        width = CLOTH_WIDTH
+        if self.cloth is not None:
+            width = (0.5 if self.cloth.folded else 1.0) * self.cloth.width - 2.0 * self.cloth.gap
+        return width * (1.0 - self.shrinkage.weft)
+
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenPattern:
@@ -135,7 +144,9 @@ def garment_files(
         check_names(options.names, first.parts)
 
     def make() -> tuple[Pattern, tuple[str, ...]]:
-        pattern, notes = pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size)
+        pattern, notes = pattern_of_garment(
+            garments, name=name, rules=options.rules, sample_size=sample_size, cloth_width=options.cloth_width
+        )
         return replace(pattern, found_seams=tuple(found_seams)), notes
 
     return _write_pattern(make, folder, name, options)

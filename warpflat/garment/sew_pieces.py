@@ -283,7 +283,7 @@ def meeting_borders(
             plain = f"{pieces[0]} to {pieces[1]}"
         else:
             plain = f"{'dart' if (vertices[0] == vertices[1]).any() else 'seam'} of {pieces[0]}"
-        name = find_unused_name(plain, taken)
+        name = find_unused_name(plain.replace("_", " "), taken)
         taken.add(name)
         pairs.append(Stitching(name=name, pieces=pieces, vertices=vertices))
     return pairs

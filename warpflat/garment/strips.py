@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
 from warpflat.pattern.fitting import drawn_length
 from warpflat.pattern.piece_parts import Edge
 
-__all__ = ["Strip", "strip_edges", "swept"]
+__all__ = ["CLOTH_WIDTH", "Strip", "panel_count", "strip_edges", "swept"]
+
+#: Usable width of the cloth [m], if nobody says another one: what is left of a cloth of 1.45 m between its selvedges.
+CLOTH_WIDTH = 1.40
 
 # A curved lower edge has so many points, an odd number: one lies in its middle.
 _POINTS = 97
 # The ends of a strip are drawn out to their tips over this share of half its length.
 _TIP = 0.55
+# More panels than these are a mistake in a length, not a ruffle.
+_MOST_PANELS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +46,22 @@ class Strip:
     even: bool = False
     tip: float | None = None
     lean: float = 0.0
+
+
+def panel_count(width_of: Callable[[int], float], cloth_width: float) -> int:
+    """Return the least number of equal panels of which none is wider than the cloth.
+
+    Args:
+        width_of: width [m] across the cloth of one of so many panels, with its allowances.
+        cloth_width: usable width of the cloth [m].
+
+    Raises:
+        InputError: no number of panels makes them narrow enough.
+    """
+    for count in range(1, _MOST_PANELS + 1):
+        if width_of(count) <= cloth_width:
+            return count
+    raise InputError(f"it would need more than {_MOST_PANELS} panels on a cloth of {cloth_width:g} m; give wider cloth")
 
 
 def swept(shape: Strip) -> tuple[FloatArray, FloatArray]:

@@ -33,6 +33,7 @@ from warpflat.garment.mark_openings import mark_openings
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
 from warpflat.garment.openings import one_sided, place_opening
 from warpflat.garment.pockets import add_pockets
+from warpflat.garment.strips import CLOTH_WIDTH
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.curves import curve_through
 from warpflat.pattern.from_mesh import MeshFeatures, inner_stretches, line_labels, piece_from_mesh
@@ -40,6 +41,7 @@ from warpflat.pattern.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart,
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.placement import default_grain
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
+from warpflat.pattern.seam_words import joint_words
 from warpflat.surface.border_seams import SAME_PLACE
 from warpflat.surface.connectivity import border_loops, join_labels
 from warpflat.surface.cut.dart import fish_eye_measure
@@ -68,6 +70,8 @@ _MOST_EDGES = 8
 BESIDE, ALIGNED = 0.05, 1e-3
 #: How a note on a seam of a mesh begins that its pattern lacks; shorter stretches [m] are not told.
 LACKING, _LACKING = "not sewn in the pattern:", 1e-3
+# What lines along a border are called that nobody has named, with the numbers of their stretches.
+_UNNAMED = re.compile(r"(to .+|edge|seam)(_\d+)?( \d+)*")
 # A plane of symmetry whose normal has this cosine to x at least is that between left and right.
 _UPRIGHT = 0.8
 
@@ -79,6 +83,7 @@ def pattern_of_garment(
     rules: EdgeRules | None = None,
     sample_size: str | None = None,
     twice: bool = True,
+    cloth_width: float = CLOTH_WIDTH,
 ) -> tuple[Pattern, tuple[str, ...]]:
     """Make the pattern of a garment; of one on a form in one or more sizes. For a mesh see :func:`pattern_of_surface`.
 
@@ -92,6 +97,7 @@ def pattern_of_garment(
         rules: exceptions for edges.
         sample_size: see :class:`Pattern`.
         twice: whether of two mirror images of a mesh one is drawn, to be cut twice.
+        cloth_width: usable width of the cloth [m], to which strips and flounces are parted.
 
     Returns:
         The pattern, and what was chosen on the way, one sentence each.
@@ -127,6 +133,7 @@ def pattern_of_garment(
         stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
         pattern = replace(pattern, seams=[_eased(seam, pattern, stretched) for seam in pattern.seams])
         if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
+            pattern = _named_by_pieces(pattern)
             return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
         pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
@@ -135,6 +142,7 @@ def pattern_of_garment(
         drawn, more = _drawn_once(pattern.pieces, pairs)
         pattern = replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs))
         pattern, equal = draw_equal_pieces_once(pattern)
+        pattern = _named_by_pieces(pattern)
         pattern = pattern if sample.as_cut is None else _through_vertices(pattern)
         return pattern, (*notes, *more, *equal)
     forms = {size: garment.form for size, garment in garments.items() if garment.form is not None}
@@ -230,7 +238,7 @@ def pattern_of_garment(
             head = garment.mannequin.extremity("head")
             girths[size] |= {} if head is None else {"head": head}
     rises = hem_rises(pattern, sample.finishing)
-    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths)
+    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width)
     pattern = add_pockets(pattern, sample.pockets)
     if not rises:
         # Godets of one size are equal, unless a slanted hem cuts them.
@@ -263,6 +271,17 @@ def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair
         return replace(piece, placement=turn @ piece.placement - np.outer([off, 0.0, 0.0], [0.0, 0.0, 1.0]))
 
     return replace(pattern, pieces={size: [hung(piece) for piece in row] for size, row in pattern.pieces.items()})
+
+
+def _named_by_pieces(pattern: Pattern) -> Pattern:
+    """Return a pattern of meshes whose seams along lines without a name of the user's are called by the pieces that they join."""
+    seams, taken = list[Seam](), {seam.name for seam in pattern.seams if not _UNNAMED.fullmatch(seam.name)}
+    for seam in pattern.seams:
+        if _UNNAMED.fullmatch(seam.name):
+            seam = replace(seam, name=find_unused_name(joint_words(seam), taken))
+            taken.add(seam.name)
+        seams.append(seam)
+    return replace(pattern, seams=seams)
 
 
 def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:

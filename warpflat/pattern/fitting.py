@@ -163,12 +163,17 @@ def equal_sides(
             continue
         # How the difference grows with each bump: one on every curve of the second side, and where these bend too little, as a nearly
         # straight one or an S, on all curves, and with more bumps, each in a direction of its own.
-        for moved, count in ((seam.sides[1:], 1), (seam.sides, 1), (seam.sides, 2), (seam.sides, 4)):
+        # Curves that are straight in parts stay so, unless no others bend enough.
+        trials = [(seam.sides[1:], 1), (seam.sides, 1), (seam.sides, 2), (seam.sides, 4)]
+        for (moved, count), of_curves in [
+            *((each, np.any) for each in trials),
+            *((each, np.all) for each in trials[1:]),
+        ]:
             bends, total, most = dict[EdgeKey, FloatArray](), 0.0, 0.0
             for row in moved:
                 for key in ((side.piece, side.edge) for side in row):
                     line = found[key].sample()
-                    if not found[key].straight.any() and len(line) > 2:
+                    if not of_curves(found[key].straight) and len(line) > 2:
                         # The length grows by the bumps' work on the turning tangent.
                         tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
                         at = count * arc_lengths(line)[1:-1] / polyline_length(line)
@@ -200,7 +205,8 @@ def equal_sides(
             bezier[:, 3] += bump[1:]
             # The ends are corners, shared bit for bit.
             bezier[0, 0], bezier[-1, 3] = found[key].bezier[0, 0], found[key].bezier[-1, 3]
-            found[key] = replace(found[key], bezier=bezier)
+            straight = found[key].straight & (np.abs(bump[:-1]).max(axis=1) + np.abs(bump[1:]).max(axis=1) == 0.0)
+            found[key] = replace(found[key], bezier=bezier, straight=straight)
     return found
 
 
@@ -217,11 +223,15 @@ def drawn_length(line: FloatArray) -> float:
 
 @functools.lru_cache(maxsize=512)
 def _drawn_length(data: bytes) -> float:
+    import shapely
+
     line = np.frombuffer(data).reshape(-1, 2)
     curve, within = _clean_curve(line, None)
     if within == TOLERANCE and farthest(curve.sample(), line) > within:
         curve = fit_curve(line, within, near=True)
-    return polyline_length(curve.sample())
+    drawn = curve.sample()
+    # A curve that crosses itself is drawn as its chords.
+    return polyline_length(drawn if shapely.LineString(drawn).is_simple else line)
 
 
 def _clean_curve(line: FloatArray, tolerance: float | None) -> tuple[Curve, float]:

@@ -49,6 +49,9 @@ def is_symmetric(piece: DraftedPiece) -> bool:
 
     if piece.piece.on_fold or len(piece.piece.edges) < 2 or piece.cutouts:
         return False
+    if any(name.startswith("pleat fold") for name in piece.internal_lines):
+        # Knife pleats all turn one way.
+        return False
     axis = _axis(piece)
 
     def strays(line: FloatArray, others: FloatArray) -> float:

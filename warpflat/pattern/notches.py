@@ -93,6 +93,8 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
                 table = (shares, reached) if line is first else (reached, shares)
                 length = float(np.interp(float(joint), *table)) * other.length
+                if not other.is_marked:
+                    continue
                 if np.abs(other.joints - length).min() > CLEAR and other.is_drawn(length):
                     single = other.notch(seam.name, length, double=False)
                     if single is not None:
@@ -206,6 +208,16 @@ class SeamLine:
     def is_drawn(self, length: float) -> bool:
         """Return whether the edge at a length [m] is that of the piece itself, not of another copy."""
         return self.side[self.index(length)].is_drawn
+
+    @property
+    def is_marked(self) -> bool:
+        """Whether places along it can be marked for joints of the other side.
+
+        Not along several copies of a piece, which all have the mark of one, nor along pleats, which are not laid yet.
+        """
+        copies = {(side.piece, side.edge) for side in self.side}
+        pleats = any("pleat fold" in name for piece in self.pieces for name in piece.piece.internal_lines)
+        return len(copies) == len(self.side) and not pleats
 
     def notch(self, seam: str, length: float, double: bool) -> Notch | None:
         """Return a notch at a length [m]; the two slits of a double one lie on either side of it.

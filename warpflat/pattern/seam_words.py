@@ -1,13 +1,23 @@
-"""Seams as words at the edges that they join, for files that know edges alone: DXF and SVG."""
+"""Seams in words: as sewers call them, and at the edges that they join, for files that know edges alone (DXF and SVG)."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.pieces import Seam, SeamSide
 
-__all__ = ["seam_words", "seams_of_words"]
+__all__ = ["joint_words", "seam_words", "seams_of_words"]
+
+
+def joint_words(seam: Seam) -> str:
+    """Return what sewers call a seam: "crown to side front", by the pieces of both sides, without their numbers."""
+    first, second = (
+        " + ".join(dict.fromkeys(re.sub(r" \d+$", "", side.piece.replace("_", " ")) for side in row))
+        for row in seam.sides
+    )
+    return f"{first} to {second}" if first != second else f"seam of the {first}"
 
 
 def seam_words(seams: Iterable[Seam]) -> dict[tuple[str, str], list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from string import ascii_uppercase
@@ -10,7 +11,9 @@ from warpflat.core.polyline import polyline_length
 from warpflat.core.text import other_side, without_side
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.measures import length_words
-from warpflat.pattern.pieces import Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.seam_rings import seam_rings
+from warpflat.pattern.seam_words import joint_words
 from warpflat.pattern.words import listed, translate, translate_name
 
 __all__ = [
@@ -35,7 +38,10 @@ _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Sew the godets in, from the tip to the hem", ("godet",)),
     ("Sew the sleeve seams", ("underarm", "overarm")),
     ("Sew the crotch seam", ("crotch",)),
+    ("Sew around, onto what is joined", ()),
+    ("Join the panels of the flounces", ()),
     ("Join at the waist", ("waist", "hip", "abdomen", "underbust")),
+    ("Sew the flounces on", ()),
     ("Set the sleeves in", ("armhole",)),
     ("Attach the collar", ("neck", "collar")),
 )
@@ -55,16 +61,21 @@ _FINISHING: tuple[tuple[str, tuple[set[str], ...]], ...] = (
     ("Sew the collar on", ({"collar", "shell"},)),
 )
 # A seam of these stages is mentioned by others.
+_AROUND, _FLOUNCES, _ON_FLOUNCES = 8, 9, 11
 _ON_FACINGS, _LININGS, _BAND_ENDS, _ON_BANDS, _WAISTBANDS = (len(_STAGES) + k for k in (1, 2, 4, 5, 6))
-#: How a strip is sewn on: one that is folded lengthwise, one with a hem of its own, one that is folded over the raw edge.
+#: How a strip is joined of panels, and how one is sewn on that is folded lengthwise, has a hem of its own, or is folded over the raw edge.
 _FOLDED = "Fold the bands lengthwise, wrong sides together, and sew both their edges on"
-_HEMMED = "Hem the free edges of ruffles, and sew the ruffles on"
+_PANELS = "Join the panels of ruffles and bands at their ends, and press the seams open"
+_HEMMED = "Sew the ruffles on"
 _BOUND = "Sew the bindings on, fold them over the raw edges and sew them down inside"
 #: How a waistband is: one that is folded, with ends or as a ring; and one that is cut in two layers.
 _WITH_ENDS = "Sew the waistband on, fold it right sides together, sew its ends, turn it and sew its inner edge down"
 _RING = "Sew the waistband on, turn it in and sew its inner edge down"
 _LAYERS = "Sew one layer of the waistband on, sew the other to it along the upper edge and open ends, turn it in and sew it down"
 
+
+# What is longer by more than this share is gathered; less is eased in.
+_GATHERED = 0.15
 
 #: A piece and an edge of it, by their names.
 Place = tuple[str, str]
@@ -102,6 +113,9 @@ class SewnSeam:
         length_mm: of both sides.
         ease: by how much the second side is longer than the first, as a share.
         stretched: whether the shorter side is a band, which is stretched to the other.
+        pleated: whether the longer side is laid in pleats.
+        by_pieces: whether it is called by the pieces that it joins.
+        ring: the number of the ring that it is part of, where seams are called by their pieces; None of others.
         stage: its place in `_STAGES` and `_FINISHING`.
         count: how often it is sewn.
         openings: where it can be opened, or is not closed.
@@ -114,6 +128,9 @@ class SewnSeam:
     length_mm: tuple[float, float]
     ease: float
     stretched: bool
+    pleated: bool
+    by_pieces: bool
+    ring: int | None
     stage: int
     count: int
     openings: tuple[SeamOpening, ...]
@@ -122,17 +139,21 @@ class SewnSeam:
     def words(self) -> str:
         """Return its letter, its name, its pieces, and how its longer or shorter side is held."""
         first, second = self.sides
-        if first != second:
+        if self.by_pieces:
+            words = translate("{first} to {second}", first=first, second=second)
+            if first == second:
+                words = translate("seam of the {first}", first=first)
+        elif first != second:
             words = translate("{seam}: {first} to {second}", seam=self.name, first=first, second=second)
         else:
             words = self.name if first in self.name else translate("{seam} of the {first}", seam=self.name, first=first)
-        if abs(self.ease) >= 5e-4:
+        if abs(self.ease) >= 5e-4 and not self.pleated:
             longer, shorter = (second, first) if self.ease > 0 else (first, second)
             share = self.ease if self.ease > 0 else 1.0 / (1.0 + self.ease) - 1.0
             if self.stretched:
                 words += translate(", stretch the {piece}", piece=shorter)
             else:
-                words += translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
+                words += translate(f", {'gather' if share > _GATHERED else 'ease in'} the {{piece}}", piece=longer)
         return f"{self.letter} ({words})"
 
 
@@ -150,7 +171,8 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
     pieces = {piece.name: piece.piece for piece in garment.pieces[size]}
     titles = piece_titles(list(pieces.values()))
     lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
-    groups, names = _mirror_groups(garment.garment.seams, pieces), {seam.name for seam in garment.garment.seams}
+    rings, names = _rings(garment.garment), {seam.name for seam in garment.garment.seams}
+    groups = _mirror_groups(garment.garment.seams, pieces, rings)
     found = list[SewnSeam]()
     for number, group in enumerate(groups):
         seam = group[0]
@@ -171,7 +193,10 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
                 length_mm=lengths.get(seam.name, (0.0, 0.0)),
                 ease=seam.ease,
                 stretched=pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece].role == "strip",
-                stage=_stage(seam, pieces),
+                pleated=any("pleat fold" in name for piece in joined for name in piece.internal_lines),
+                by_pieces=_is_by_pieces(seam),
+                ring=rings.get(seam.name),
+                stage=_stage(seam, pieces, rings),
                 count=max(len(group), 2 if sideless else 1),
                 openings=seam.openings,
                 places=tuple(places),
@@ -186,7 +211,7 @@ def seam_letters(garment: DraftedGarment) -> dict[str, str]:
     """Return the letter of each seam by its name."""
     size = next(iter(garment.pieces))
     pieces = {piece.name: piece.piece for piece in garment.pieces[size]}
-    groups = _mirror_groups(garment.garment.seams, pieces)
+    groups = _mirror_groups(garment.garment.seams, pieces, _rings(garment.garment))
     return {seam.name: _letter(number) for number, group in enumerate(groups) for seam in group}
 
 
@@ -271,17 +296,6 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
                 pieces=straps,
             )
         )
-    pleated = [piece for piece in pieces if any("pleat fold" in name for name in piece.piece.internal_lines)]
-    if pleated:
-        steps.append(
-            SewingStep.at(
-                translate(
-                    "Lay the pleats, each fold to the line beside it, press and baste them: {pieces}.",
-                    pieces=called(pleated),
-                ),
-                pieces=pleated,
-            )
-        )
     buttoned = [piece for piece in pieces if "_placket" in piece.name and "button" in piece.piece.marks]
     if buttoned:
         steps.append(
@@ -338,6 +352,8 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
             if not any("fold line" in strip.internal_lines for strip in strips):
                 return _LAYERS
             return _RING if any(strip.name in rings for strip in strips) else _WITH_ENDS
+        if seam.stage == _BAND_ENDS and seam.count > 1:
+            return _PANELS
         if seam.stage != _ON_BANDS:
             return [*_STAGES, *_FINISHING][seam.stage][0]
         if any(edge.kind == "hem" for strip in strips for edge in strip.edges):
@@ -345,8 +361,24 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         return _FOLDED if any("fold line" in strip.internal_lines for strip in strips) else _BOUND
 
     first_band = next((stage for stage in stages if stage in (_ON_BANDS, _WAISTBANDS)), None)
+    # Ruffles are joined, hemmed and laid in pleats or gathered before they are sewn on.
+    ruffles = [
+        piece for piece in pieces if piece.piece.role == "strip" and any(edge.kind == "hem" for edge in piece.edges)
+    ]
+    pleated = [piece for piece in ruffles if any("pleat fold" in name for name in piece.piece.internal_lines)]
+    longer = {piece for seam in seams if seam.stage == _ON_BANDS and seam.ease > _GATHERED for piece, _ in seam.places}
+    gathered = [piece for piece in ruffles if piece not in pleated and piece.name in longer]
     for stage in stages:
         here = [seam for seam in seams if seam.stage == stage]
+        if stage == _ON_BANDS:
+            hems = [(piece.name, edge.name) for piece in ruffles for edge in piece.edges if edge.kind == "hem"]
+            for phrase, row, places in (
+                ("Hem the free edges of the ruffles: {pieces}.", ruffles, hems),
+                ("Lay the pleats, each fold to the line beside it, press and baste them: {pieces}.", pleated, []),
+                ("Sew two rows of long stitches along the edge, and draw it up: {pieces}.", gathered, []),
+            ):
+                if row:
+                    steps.append(SewingStep.at(translate(phrase, pieces=called(row)), places, row))
         if basted and stage == first_band:
             steps.append(
                 SewingStep.at(
@@ -360,10 +392,10 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         plain = [seam for seam in here if not seam.openings or stage == _LININGS]
         for seam in (seam for seam in here if seam not in plain):
             steps += [SewingStep.at(words, seam.places) for words in _opened_steps(seam, units)]
-        by_phrase: dict[str, list[SewnSeam]] = {}
+        by_phrase: dict[tuple[str, int | None], list[SewnSeam]] = {}
         for seam in plain:
-            by_phrase.setdefault(phrase_of(seam), []).append(seam)
-        for what, alike in by_phrase.items():
+            by_phrase.setdefault((phrase_of(seam), seam.ring), []).append(seam)
+        for (what, _), alike in by_phrase.items():
             words = [seam.words() + (translate(", open beside the zip") if _zips(seam) else "") for seam in alike]
             steps.append(
                 SewingStep.at(
@@ -395,20 +427,24 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
             )
         )
     # Slits and vents are hems of their own, which the steps of their seams have turned in.
-    hems: dict[float, list[Place]] = {}
+    turned_up: dict[float, list[Place]] = {}
     opened, cased = {"slit", "vent"}, {elastic.edge for elastic in garment.garment.elastics}
     pockets = {piece.name for piece in patches}
     for piece in (piece for piece in pieces if piece.piece.role != "pocket" and piece.name not in pockets):
-        for edge in piece.edges:
+        for edge in piece.edges if piece not in ruffles else ():
             name = without_side(edge.name).rstrip(" 0123456789")
             if edge.kind == "hem" and name not in cased and not opened & set(edge.name.split(" ")):
-                hems.setdefault(round(edge.width, 4), []).append((piece.name, edge.name))
-    if hems:
-        words = [f"{length_words(width, units)} ({called(row)})" for width, row in hems.items()]
+                turned_up.setdefault(round(edge.width, 4), []).append((piece.name, edge.name))
+    flounces = [piece for piece in pieces if piece.piece.role == "shell" and is_flounce(piece.piece)]
+    if flounces:
+        phrase = "Let the flounces hang for a day, and even their hems: {pieces}."
+        steps.append(SewingStep.at(translate(phrase, pieces=called(flounces)), pieces=flounces))
+    if turned_up:
+        words = [f"{length_words(width, units)} ({called(row)})" for width, row in turned_up.items()]
         steps.append(
             SewingStep.at(
                 translate("Turn up and sew the hems: {edges}.", edges=", ".join(words)),
-                [place for row in hems.values() for place in row],
+                [place for row in turned_up.values() for place in row],
             )
         )
     for kind in ("vent", "slit"):
@@ -604,7 +640,7 @@ def _opened_steps(seam: SewnSeam, units: str) -> list[str]:
     return steps
 
 
-def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[list[Seam]]:
+def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece], rings: Mapping[str, int]) -> list[list[Seam]]:
     """Return seams that are each other's mirror images together, in the order in which they are sewn: those with openings first."""
     groups: dict[object, list[Seam]] = {}
     copied = {(s.piece, s.edge) for seam in seams for row in seam.sides for s in row if s.copy}
@@ -622,13 +658,40 @@ def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[l
         )
         # A zip in one side alone makes it another seam than the other side.
         groups.setdefault((without_side(seam.name), tuple(sides), seam.openings), []).append(seam)
-    return sorted(groups.values(), key=lambda group: (_stage(group[0], pieces), not group[0].openings))
+    return sorted(
+        groups.values(),
+        key=lambda group: (_stage(group[0], pieces, rings), rings.get(group[0].name, -1), not group[0].openings),
+    )
 
 
-def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
-    """Return when a seam is sewn: by the roles of its pieces and, in the shell, by the words of its name, or with the panels."""
+def _is_by_pieces(seam: Seam) -> bool:
+    """Return whether a seam is called by the pieces that it joins; the last of such seams have numbers."""
+    return re.sub(r" \d+$", "", seam.name) == joint_words(seam)
+
+
+def is_flounce(piece: Piece) -> bool:
+    """Return whether a piece is a panel of a flounce."""
+    return "flounce" in re.split("[ _]", piece.name)
+
+
+def _rings(pattern: Pattern) -> dict[str, int]:
+    """Return the number of its ring for each seam that is part of one, where seams are called by the pieces that they join."""
+    called = {seam.name for seam in pattern.seams if _is_by_pieces(seam)}
+    pieces = {piece.name: piece for piece in pattern.pieces[pattern.sample]}
+    rings = seam_rings(pattern.seams, pieces) if called else {}
+    return {name: ring for name, ring in rings.items() if name in called}
+
+
+def _stage(seam: Seam, pieces: Mapping[str, Piece], rings: Mapping[str, int]) -> int:
+    """Return when a seam is sewn: by the roles of its pieces and, in the shell, by the words of its name, or with the panels.
+
+    A seam that is called by its pieces is sewn with the panels, or around.
+    """
     words = seam.name.lower().replace("_", " ").split(" ")
     roles = {pieces[side.piece].role for row in seam.sides for side in row}
+    flounces = {is_flounce(pieces[side.piece]) for row in seam.sides for side in row if roles == {"shell"}}
+    if True in flounces:
+        return _ON_FLOUNCES if False in flounces else _FLOUNCES
     if "pocket" in roles:
         # What of a pocket lies in another seam is sewn with that; its own seams come first.
         roles = roles - {"pocket"} if words[0] != "pocket" else {"pocket"}
@@ -639,6 +702,8 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
             return len(_STAGES) + number
     if "facing" in words:
         return _ON_FACINGS
+    if _is_by_pieces(seam):
+        return _AROUND if seam.name in rings else 1
     for number, (_, keys) in reversed(list(enumerate(_STAGES))):
         if any(key in words for key in keys) and not (number == 4 and "shoulder" in words):
             return number

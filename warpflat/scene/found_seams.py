@@ -217,7 +217,8 @@ def _named_by_file(found: FoundSeams, seams: FileSeams, read: GarmentFile) -> Fo
             return title
         pair = [known.get(int(match[k]), "piece") for k in (1, 2)]
         if own is None:
-            return f"{pair[0]} to {pair[1]}" if pair[0] != pair[1] else f"seam of {pair[0]}"
+            words = f"{pair[0]} to {pair[1]}" if pair[0] != pair[1] else f"seam of {pair[0]}"
+            return words.replace("_", " ")
         return f"to {pair[1] if pair[0] == own else pair[0]}" if pair[0] != pair[1] else "seam"
 
     pieces: list[Surface] = []

@@ -234,7 +234,9 @@ def _write_pictures(plan: MeshPlan | GarmentPlan, garment: Garment, folder: Path
     if plan.scene.settings.output.picture and (garment.finishing or garment.pockets):
         # What defeats the pattern is told where that is written.
         with suppress(InputError):
-            pattern, _ = pattern_of_garment({"": garment}, name=garment.name, rules=plan.drawing.rules)
+            pattern, _ = pattern_of_garment(
+                {"": garment}, name=garment.name, rules=plan.drawing.rules, cloth_width=plan.drawing.cloth_width
+            )
             drafted = [
                 DraftedOutline(
                     name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
