@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from armhole_curves import depth_inside
+from armhole_curves import corner_degrees, depth_inside, sharpest_turn
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
+from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.rings import find_rings, ring_line
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
@@ -120,3 +121,20 @@ def test_neckline_that_would_fold_the_cloth_is_refused():
     deep = replace(shipped_form("bodice"), neckline=Neckline(side_cm=8.0, front_cm=25.0, front_power=1.0))
     with pytest.raises(InputError, match="the cloth folds below it"):
         mannequin.form(deep)
+
+
+@pytest.mark.parametrize(("side", "depth", "most"), [(1.5, 1.0, 15.0), (3.0, 0.0, 20.0), (2.0, 12.0, 22.0)])
+def test_neckline_behind_is_round_and_square_to_the_shoulder(side: float, depth: float, most: float):
+    """It used to run level to the last centimetre, and to turn there by 50 degrees."""
+    mannequin = Mannequin.from_size("EU 38", resolution_mm=12.0)
+    neckline = {"side_cm": side, "back_cm": depth}
+    made = mannequin.form(form_from_mapping("top", {"like": "bodice", "neckline": neckline}))
+    back = made.pieces["back"]
+    flat = flatten(back.surface, fabric="woven")
+    assert flat.flipped_faces == 0
+    assert sharpest_turn(flat.positions[back.edges["neck"]]) < most
+    corner = corner_degrees(flat.positions, back.edges["neck"], back.edges["shoulder left"])
+    assert 80.0 < corner < 120.0
+    centre = mannequin.layout.back[-1, mannequin.layout.back.shape[1] // 2]
+    base = mannequin.form(replace(shipped_form("bodice"), neckline=None))
+    assert np.linalg.norm(made.vertices[centre] - base.vertices[centre]) == pytest.approx(0.01 * depth, abs=0.004)

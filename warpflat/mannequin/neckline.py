@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
 from warpflat.mannequin.closest import Closest
+from warpflat.mannequin.fit_body import vertex_normals
 from warpflat.mannequin.layout import Layout
 from warpflat.mannequin.sheet import sheet_laplacian
 
@@ -19,8 +21,8 @@ __all__ = ["Neckline", "widen_neck"]
 
 # Upright sections of chest and back begin so far [m] above the lowest point across chest or back.
 _ABOVE = 0.015
-# Power of the superellipse behind: 2 is an ellipse, which would be boxy where it rises little.
-_POWER_BEHIND = 1.6
+# The neckline behind goes off the base of the neck in steps of so much [m].
+_STEP = 0.004
 # How much more upright edges weigh than those across, as the rows below a neckline follow it; the first that folds nothing is taken.
 _ALONG_COLUMNS = (1.0, 4.0, 16.0, 64.0, 256.0)
 # Share of corners that may look aside: those of a scan do so in its hollows. Beside a V or a square any of them shows.
@@ -85,9 +87,9 @@ class Neckline:
 def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> FloatArray:
     """Return a form's vertices (#V by 3 [m]) with the neck's row moved to a wider neckline on the same surface.
 
-    Each quarter of the neckline is that of a superellipse from the centre line to the shoulder seam, in front of one of the power that is
-    asked for, behind of a flatter one: in the plane into which chest or back unroll, their upright sections side by side. What lies
-    between it, the armholes and the bust follows smoothly.
+    In front each half is a quarter of a superellipse from the centre line to the shoulder seam, in the plane into which the chest unrolls,
+    its upright sections side by side. Behind, the neckline lies beside the base of the neck. What lies between
+    it, the armholes and the bust follows smoothly.
 
     Raises:
         InputError: the neckline takes a whole shoulder seam, or is so deep that the cloth folds below it.
@@ -124,10 +126,13 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
             share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
             # There they become a quarter of the superellipse of that power.
             centre, shoulder = out[quarter[0]], out[quarter[-1]]
-            power = neckline.front_power if face == "front" else _POWER_BEHIND
+            if face == "back":
+                out[quarter] = half.beside(vertices[quarter], 0.01 * depth, 0.01 * neckline.side_cm, (centre, shoulder))
+                continue
+            power = neckline.front_power
             level = float(half.vertices[:, 1].min()) + _ABOVE
             turn = 0.5 * np.pi * share[1:-1]
-            if face == "front" and power != Neckline.front_power:
+            if power != Neckline.front_power:
                 # A V and a square are not turned through evenly as they are walked along.
                 fine = np.linspace(0.0, 0.5 * np.pi, 513)
                 wide, high = abs(shoulder[0] - centre[0]), abs(shoulder[1] - centre[1])
@@ -261,6 +266,31 @@ class _Surface:
         """Return the nearest points of the surface (#P by 3 [m])."""
         triangle, weights, _ = self.closest(points)
         return np.asarray((self.vertices[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1))
+
+    def beside(self, line: FloatArray, first: float, last: float, ends: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return a line on the surface beside another one (#P by 3 [m]): square to it, so far [m] from its first and its last point.
+
+        Args:
+            line: on the surface; the new one lies on the side where the surface is.
+            first, last: distances [m]; in between they change as a sine squared.
+            ends: where the new line's ends lie.
+        """
+        count = max(1, math.ceil(max(first, last) / _STEP))
+        share = arc_lengths(line) / arc_lengths(line)[-1]
+        step = (first + (last - first) * np.sin(0.5 * np.pi * share) ** 2) / count
+        inner, normals = self.vertices[self.triangles].mean(axis=(0, 1)), vertex_normals(self.vertices, self.triangles)
+        out = line
+        for _ in range(count):
+            triangle, weights, _ = self.closest(out)
+            normal = (normals[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1)
+            square = np.cross(normal, np.gradient(out, axis=0))
+            square /= np.linalg.norm(square, axis=1, keepdims=True)
+            square *= np.sign((square * (inner - out)).sum())
+            out = self.nearest(out + step[:, None] * square)
+        share = (arc_lengths(out) / arc_lengths(out)[-1])[:, None]
+        out = self.nearest(out + (1.0 - share) * (ends[0] - out[0]) + share * (ends[1] - out[-1]))
+        out[[0, -1]] = ends
+        return out
 
     def upright(self, x: float, level: float) -> FloatArray:
         """Return the section at `x` from the height `level` [m] up, #P by 3 from low to high."""
