@@ -13,8 +13,8 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
 from warpflat.mannequin.closest import Closest
-from warpflat.mannequin.fit_body import vertex_normals
 from warpflat.mannequin.layout import Layout
+from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.sheet import sheet_laplacian
 
 __all__ = ["Neckline", "widen_neck"]
@@ -255,7 +255,7 @@ class _Surface:
     """A quad mesh that points are brought back to; four triangles around the middle of each quad keep mirror images alike."""
 
     def __init__(self, vertices: FloatArray, quads: IntArray) -> None:
-        middles = len(vertices) + np.arange(len(quads))
+        middles, self.quads = len(vertices) + np.arange(len(quads)), quads
         self.vertices = np.vstack([vertices, vertices[quads].mean(axis=1)])
         self.triangles = np.concatenate(
             [np.column_stack([quads[:, [k, (k + 1) % 4]], middles]) for k in range(4)]
@@ -278,7 +278,9 @@ class _Surface:
         count = max(1, math.ceil(max(first, last) / _STEP))
         share = arc_lengths(line) / arc_lengths(line)[-1]
         step = (first + (last - first) * np.sin(0.5 * np.pi * share) ** 2) / count
-        inner, normals = self.vertices[self.triangles].mean(axis=(0, 1)), vertex_normals(self.vertices, self.triangles)
+        inner = self.vertices[self.triangles].mean(axis=(0, 1))
+        normals = vertex_normals(self.vertices[: -len(self.quads)], self.quads)
+        normals = np.vstack([normals, normals[self.quads].mean(axis=1)])
         out = line
         for _ in range(count):
             triangle, weights, _ = self.closest(out)
