@@ -49,7 +49,7 @@ def whole_pieces(
     flagged = {
         side.piece for seam in seams if any(s.mirrored for c in seam.sides for s in c) for c in seam.sides for side in c
     }
-    for name in set(given) - halves - twice - flagged:
+    for name in [each for each in given if each not in halves | twice | flagged]:
         others = set().union(*(pair for pair in pairs if name in pair)) - {name}
         if given[name].quantity % 2 == 0 and others and others <= twice:
             twice.add(name)
