@@ -19,10 +19,10 @@ from warpflat.mannequin.common_body import (
     common_body_of_scan,
     skin_triangles,
 )
-from warpflat.mannequin.fit_body import vertex_normals
 from warpflat.mannequin.scan_pose import ScanOptions
 from warpflat.mannequin.slicer import Slicer
 from warpflat.surface.mesh import Surface
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.triangles import triangulate
 

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.normals import vertex_normals
+from warpflat.surface.normals import vertex_normals
 
 
 def _turning(curve: np.ndarray, step: float) -> np.ndarray:

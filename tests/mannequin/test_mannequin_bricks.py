@@ -10,7 +10,7 @@ import pytest
 from warpflat.core.errors import InputError
 from warpflat.mannequin.layout import QUARTERS, make_layout
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.normals import face_normals
+from warpflat.surface.normals import face_normals
 
 # The fork turns sharply at the crotch, and its quads fan out there.
 _NOT_TRUNK = ("collar", "armhole", "biceps", "elbow", "crotch")

@@ -10,8 +10,8 @@ from warpflat.core.errors import InputError
 from warpflat.mannequin.layout import make_layout
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.measurements import measurements_from_size, measurements_from_values, size_names, size_tables
-from warpflat.mannequin.normals import face_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth, superellipse_exponent
+from warpflat.surface.normals import face_normals
 
 SIZES = [name for name in size_names() if not name.startswith("UK")]
 GIRTHS = ("bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee", "ankle", "neck")

@@ -7,8 +7,8 @@ import warp as wp
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
-from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.kernels.drape_contact import find_planes
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["SKIN", "Body"]
@@ -35,7 +35,7 @@ class Body:
         """Build the search tree of a surface (#V by 3 [m], #F by 4), wound counter-clockwise from outside."""
         self.vertices, self.device = vertices, device
         self.triangles, _ = triangulate(faces)
-        normals = vertex_normals(area_vectors(vertices, self.triangles), self.triangles, len(vertices))
+        normals = vertex_normals(vertices, self.triangles)
         self.shrunk = vertices - _SHRUNK * normals
         self.normals = wp.array(normals.astype(np.float32), dtype=wp.vec3, device=device)
         self.mesh = wp.Mesh(

@@ -17,7 +17,7 @@ from warpflat.draping.body import SKIN
 from warpflat.draping.result import Drape
 from warpflat.export.colours import energy_colours, linear_rgb
 from warpflat.export.figure import write_moving_picture
-from warpflat.export.geometry import area_vectors, corner_mean, vertex_normals
+from warpflat.export.geometry import corner_mean
 from warpflat.export.raster import Lighting, rasterise, shade
 from warpflat.export.usd_prims import (
     begin_stage,
@@ -30,6 +30,7 @@ from warpflat.export.usd_prims import (
     set_points,
     usd_errors,
 )
+from warpflat.surface.normals import area_vectors, mean_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["choose_frames", "write_drape_film", "write_drape_frames"]
@@ -174,7 +175,7 @@ def _view(
     samples = rasterise(grid, triangles, (2 * _HEIGHT, 2 * wide))
     vectors = area_vectors(turned, triangles)
     lighting = Lighting(
-        normals=vertex_normals(vectors, triangles, len(points)), direction=(-0.3, 0.5, 1.0), back=(0.6, 0.6, 0.6)
+        normals=mean_normals(vectors, triangles, len(points)), direction=(-0.3, 0.5, 1.0), back=(0.6, 0.6, 0.6)
     )
     pixels = shade(
         samples, 2, grid, triangles, colours, face=np.arange(len(triangles), dtype=np.int32), lighting=lighting

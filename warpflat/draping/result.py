@@ -20,7 +20,7 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.places import Place, find_places
 from warpflat.draping.relax_drape import DrapedCloth
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["HOLLOW_REACH", "Drape", "hollow_depths"]
@@ -114,7 +114,7 @@ class Drape:
         at = np.flatnonzero(self._off > _NEGLIGIBLE)
         triangles, _ = triangulate(self.cloth.faces)
         designed = self.cloth.designed
-        normals = vertex_normals(area_vectors(designed, triangles), triangles, len(designed))
+        normals = vertex_normals(designed, triangles)
         bridged[at] = np.minimum(self._off[at], hollow_depths(designed, normals, at.astype(np.int32)))
         return bridged
 

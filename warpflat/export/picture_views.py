@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.export.figure import DPI, HALO_LAYER, INK, Pixels
-from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
+from warpflat.export.geometry import outline_edges
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.mesh import Surface
+from warpflat.surface.normals import area_vectors, mean_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = [
@@ -189,7 +190,7 @@ class DrawnView:
         # Of a fine mesh each triangle has a normal, else each vertex.
         facets, normals = self.view.facets, self.view.vectors
         if normals is not None and not self._fine:
-            normals = vertex_normals(normals, facets.triangles, len(self.view.points))
+            normals = mean_normals(normals, facets.triangles, len(self.view.points))
         axes.add_artist(
             Pixels(
                 shade(

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.export.usd_prims import define_mesh, export_stage, set_points, valid_name
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["write_sewn_usd"]
@@ -56,7 +56,7 @@ def write_sewn_usd(
     mesh = define_mesh(stage, "/Root/garment", faces)
     set_points(mesh, points)
     triangles, _ = triangulate(faces)
-    normals = vertex_normals(area_vectors(points, triangles), triangles, len(points)).astype(np.float32)
+    normals = vertex_normals(points, triangles).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     # The pieces in a row.

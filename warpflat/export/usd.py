@@ -23,7 +23,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.output import atomic_path, hidden_file, require_writable
 from warpflat.export.colours import VertexColours, energy_scale
-from warpflat.export.geometry import Polylines, area_vectors, face_areas, polylines_of, vertex_normals
+from warpflat.export.geometry import Polylines, face_areas, polylines_of
 from warpflat.export.usd_prims import (
     FIRST_FRAME,
     MeshSamples,
@@ -46,6 +46,7 @@ from warpflat.export.usd_prims import (
     valid_name,
 )
 from warpflat.surface.mesh import Surface
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["FrameWriter", "film_scale"]
@@ -262,7 +263,7 @@ class FrameWriter:
 
         default = Usd.TimeCode.Default()
         triangles, _ = triangulate(surface.faces)
-        normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
+        normals = vertex_normals(surface.vertices, triangles)
         on_surface = MeshSamples(
             define_energy_mesh(self._stage, part_path(path, "surface"), normals, per_face=False), self._scale
         )

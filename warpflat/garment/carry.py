@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.sparse import factor_symmetric
-from warpflat.mannequin.fit_body import vertex_normals
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.falloff import falloff_weights
 from warpflat.surface.laplacian import stiffness_matrix
 from warpflat.surface.mesh import Surface
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["carry", "carry_points", "skin_frames", "skin_under"]

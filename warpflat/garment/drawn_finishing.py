@@ -15,8 +15,8 @@ import numpy as np
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import without_side
-from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.pattern.worn import ViewedPiece
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _chains(garment: Garment, called: str) -> Iterator[_Chain]:
     for piece in form.pieces.values():
         surface = piece.surface
         triangles, _ = triangulate(surface.faces)
-        normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
+        normals = vertex_normals(surface.vertices, triangles)
         for edge, ids in piece.edges.items():
             if without_side(edge).rstrip(" 0123456789") != called:
                 continue

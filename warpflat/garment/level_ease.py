@@ -12,9 +12,9 @@ from warpflat.garment.carry import skin_under
 from warpflat.mannequin.body_landmarks import model_places
 from warpflat.mannequin.body_model import finer_body
 from warpflat.mannequin.common_body import CommonBody, skin_triangles
-from warpflat.mannequin.fit_body import vertex_normals
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.slicer import Slicer
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["EASE_LEVELS", "level_ease", "widened"]
 

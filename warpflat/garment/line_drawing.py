@@ -13,13 +13,13 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import other_side
-from warpflat.export.geometry import area_vectors, vertex_normals
 from warpflat.garment.button_stand import button_depths
 from warpflat.garment.drawn_finishing import finishing_views
 from warpflat.garment.girths import pattern_girths
 from warpflat.garment.openings import Buttons, place_opening
 from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.surface.connectivity import border_loops
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatAr
     """Return the cosine of the angle by which each vertex of a piece faces the viewer in front (1) or behind (-1)."""
     surface = garment.pieces[name].surface
     triangles, _ = triangulate(surface.faces)
-    normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
+    normals = vertex_normals(surface.vertices, triangles)
     return np.asarray(sign * normals[ids, 2])
 
 

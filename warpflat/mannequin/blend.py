@@ -19,9 +19,9 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
-from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import fill_fork, sheet_laplacian
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "bridge_row", "bridge_rows", "is_tight", "rule_rows"]
 

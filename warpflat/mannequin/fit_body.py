@@ -20,6 +20,7 @@ from warpflat.core.compile import launch_quietly
 from warpflat.kernels.closest import find_closest
 from warpflat.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.mannequin.body_model import BodyModel, Person, rotation
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["FittedBody", "Mesh", "fit_body"]
 
@@ -107,16 +108,6 @@ class _Known:
     model: BodyModel
     weights: FloatArray
     heights: FloatArray
-
-
-def vertex_normals(vertices: FloatArray, triangles: NDArray[np.int64]) -> FloatArray:
-    """Return unit normals at vertices, #V by 3, faces weighted by their areas."""
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    cross = np.cross(b - a, c - a)
-    normals = np.stack(
-        [np.bincount(triangles.ravel(), np.repeat(cross[:, k], 3), minlength=len(vertices)) for k in range(3)], axis=1
-    )
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])
 
 
 def fit_body(

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.mannequin.body_model import BodyModel, Person, rotation
-from warpflat.mannequin.fit_body import FittedBody, Mesh, vertex_normals
+from warpflat.mannequin.fit_body import FittedBody, Mesh
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["fit_inside"]
 

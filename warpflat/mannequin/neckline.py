@@ -14,8 +14,8 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import Layout
-from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.sheet import sheet_laplacian
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["Neckline", "widen_neck"]
 

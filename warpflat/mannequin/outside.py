@@ -7,7 +7,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import Layout
-from warpflat.mannequin.normals import vertex_normals
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["BodySurface", "push_outside"]
 

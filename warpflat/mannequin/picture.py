@@ -16,8 +16,8 @@ from warpflat.export.letters import all_letters
 from warpflat.export.picture_views import SIDES, DrawnView, make_facets, view_from_side
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import LEG_LINES, RING_LEVELS
-from warpflat.mannequin.normals import vertex_normals
 from warpflat.pattern.placement import space_out
+from warpflat.surface.normals import vertex_normals
 
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin

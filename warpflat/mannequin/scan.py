@@ -17,7 +17,6 @@ from warpflat.mannequin.body_landmarks import LEVELS
 from warpflat.mannequin.body_model import finer_body
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS, Layout
-from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.rays import ray_radii
 from warpflat.mannequin.scan_limbs import leg_curves, underarm_point, upper_curves
@@ -27,6 +26,7 @@ from warpflat.mannequin.scan_sections import BodySections
 from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.stand_body import StandingBody, stand_body
 from warpflat.mannequin.table_body import PRINCESS
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["ScanFound", "average_sides", "blueprint_from_scan", "sides_note"]
 

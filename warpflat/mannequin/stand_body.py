@@ -17,7 +17,8 @@ from scipy.sparse import csr_array
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.mannequin.body_landmarks import LEVELS, crotch_vertex, meeting, model_places, near_level, value_at
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation, rotation_vector
-from warpflat.mannequin.fit_body import FittedBody, Mesh, fit_body, vertex_normals
+from warpflat.mannequin.fit_body import FittedBody, Mesh, fit_body
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["StandingBody", "lay_on_scan", "stand_body"]
 

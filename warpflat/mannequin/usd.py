@@ -18,7 +18,7 @@ from warpflat.export.usd_prims import (
     usd_errors,
     valid_name,
 )
-from warpflat.mannequin.normals import vertex_normals
+from warpflat.surface.normals import vertex_normals
 
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin

@@ -344,8 +344,8 @@ class Film:
             with FrameWriter(path, scale=scale) as writer:
                 if self._mannequin is not None:
                     from warpflat.draping.body import Body
-                    from warpflat.mannequin.normals import vertex_normals
                     from warpflat.mannequin.usd import write_mannequin_usd
+                    from warpflat.surface.normals import vertex_normals
 
                     write_mannequin_usd(self._mannequin, self._folder / MANNEQUIN)
                     layout = self._mannequin.layout

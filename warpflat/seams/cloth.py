@@ -20,6 +20,7 @@ from warpflat.surface.connectivity import border_loops, components, join_labels
 from warpflat.surface.cut.split_faces import split_faces_along
 from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
+from warpflat.surface.normals import area_vectors, face_normals
 from warpflat.surface.paths.trace import SurfacePath
 
 __all__ = ["Cloth", "PieceMesh", "edge_components", "section"]
@@ -68,17 +69,12 @@ class Cloth:
     @cached_property
     def face_areas(self) -> FloatArray:
         """#F [m2]."""
-        return 0.5 * np.linalg.norm(self._normals(), axis=1)
+        return np.linalg.norm(area_vectors(self.vertices, self.faces), axis=1)
 
     @property
     def face_normals(self) -> FloatArray:
         """#F by 3, of length 1, or 0 for a face without area."""
-        normal = self._normals()
-        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-
-    def _normals(self) -> FloatArray:
-        a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
-        return np.asarray(np.cross(b - a, c - a))
+        return face_normals(self.vertices, self.faces)
 
     def seam_edges(self) -> Ids:
         """#E by 2, the edges of all seams, the lower vertex first, each once."""

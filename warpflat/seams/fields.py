@@ -12,6 +12,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from warpflat.core.arrays import FloatArray
 from warpflat.core.sparse import factor_symmetric
 from warpflat.surface.closest import nearest_on_triangles
+from warpflat.surface.normals import area_vectors, face_normals, vertex_normals
 
 __all__ = ["MirrorMap", "Operators", "mirror_map"]
 
@@ -59,15 +60,13 @@ class Operators:
     @cached_property
     def mass(self) -> FloatArray:
         """#V, the area of each vertex [m2]."""
-        a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+        area = np.linalg.norm(area_vectors(self.vertices, self.faces), axis=1) / 3.0
         return np.maximum(np.bincount(self.faces.ravel(), np.repeat(area, 3), minlength=len(self.vertices)), 1e-300)
 
     @cached_property
     def vertex_normals(self) -> FloatArray:
         """#V by 3, of length 1."""
-        a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
-        return _unit(self.to_vertices(np.cross(b - a, c - a)))
+        return vertex_normals(self.vertices, self.faces)
 
     def to_vertices(self, of_faces: FloatArray) -> FloatArray:
         """Return the sum over the faces (#F by N) at each vertex (#V by N)."""
@@ -151,7 +150,7 @@ def mirror_map(
 
     corners = vertices[faces]
     image = vertices - 2.0 * ((vertices @ normal) - offset)[:, None] * normal
-    turned = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    turned = face_normals(vertices, faces)
     facing = Operators(vertices=vertices, faces=faces).vertex_normals
     facing = facing - 2.0 * (facing @ normal)[:, None] * normal
     tried = min(_TRIED, len(faces))
@@ -168,7 +167,3 @@ def mirror_map(
     rows = np.repeat(np.arange(len(vertices)), 3)
     matrix = coo_array((shares.ravel(), (rows, faces[chosen].ravel())), shape=(len(vertices), len(vertices))).tocsr()
     return MirrorMap(matrix=csr_array(matrix), distance=best, weight=np.clip(2.0 - 2.0 * best / reach, 0.0, 1.0))
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))

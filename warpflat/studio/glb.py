@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import linear_rgb
-from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.surface.normals import vertex_normals
 
 __all__ = ["before_tone_mapping", "coloured_mesh"]
 
@@ -31,7 +31,9 @@ def coloured_mesh(positions: FloatArray, triangles: IntArray, colours: FloatArra
     """
     arrays = {"POSITION": positions.astype("<f4"), "COLOR_0": before_tone_mapping(colours).astype("<f4")}
     if lit:
-        normals = vertex_normals(area_vectors(positions, triangles), triangles, len(positions))
+        normals = vertex_normals(positions, triangles)
+        # The format wants a length of 1, of vertices without a face, too.
+        normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
         arrays["NORMAL"] = normals.astype("<f4")
     blocks = [np.ascontiguousarray(array).tobytes() for array in arrays.values()]
     blocks.append(np.ascontiguousarray(triangles.astype("<u4")).tobytes())

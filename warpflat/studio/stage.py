@@ -12,13 +12,14 @@ from scipy.spatial.transform import Rotation
 from trimesh import Trimesh
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
+from warpflat.export.geometry import outline_edges
 from warpflat.export.usd_prims import rows_on_table
 from warpflat.studio.frame import PieceFrame
 from warpflat.studio.glb import coloured_mesh
 from warpflat.studio.maps import Scale, face_values, vertex_values
 from warpflat.studio.pick import Hit, pick_flat, pick_on_rays
 from warpflat.surface.mesh import Surface
+from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["Shown", "Stage"]
@@ -343,5 +344,5 @@ def _joined(parts: Iterable[FloatArray]) -> FloatArray:
 
 def _above(vertices: FloatArray, faces: IntArray, height: float) -> FloatArray:
     triangles, _ = triangulate(faces)
-    normals = vertex_normals(area_vectors(vertices, triangles), triangles, len(vertices))
+    normals = vertex_normals(vertices, triangles)
     return np.asarray(vertices + height * normals)

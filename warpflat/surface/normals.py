@@ -1,0 +1,39 @@
+"""Normals of triangles and quads, and of the vertices between them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+
+__all__ = ["area_vectors", "face_normals", "mean_normals", "vertex_normals"]
+
+
+def area_vectors(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
+    """Return the normals of triangles (#F by 3) or quads (#F by 4) over `positions` (#V by 2 or 3), as long as their areas [m2]."""
+    space = positions if positions.shape[1] == 3 else np.column_stack([positions, np.zeros(len(positions))])
+    # The sides of a triangle, or the diagonals of a quad. By columns, twice as fast as np.cross on the rows: it matters at a million faces.
+    ends = ((0, 1), (0, 2)) if faces.shape[1] == 3 else ((0, 2), (1, 3))
+    (ux, uy, uz), (vx, vy, vz) = ((space[faces[:, end]] - space[faces[:, start]]).T for start, end in ends)
+    return 0.5 * np.column_stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
+
+
+def face_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
+    """Return unit normals of triangles or quads, #F by 3; zero for one without area."""
+    return _unit(area_vectors(positions, faces))
+
+
+def vertex_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
+    """Return unit normals of vertices, #V by 3: the mean of the faces around each by area; zero without any, or where they cancel."""
+    return mean_normals(area_vectors(positions, faces), faces, len(positions))
+
+
+def mean_normals(vectors: FloatArray, faces: NDArray[np.integer], count: int) -> FloatArray:
+    """Return the unit normals of `count` vertices, as `vertex_normals` does, by area vectors (#F by 3)."""
+    corners, each = faces.T.ravel(), faces.shape[1]
+    return _unit(np.column_stack([np.bincount(corners, np.tile(axis, each), count) for axis in vectors.T]))
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
