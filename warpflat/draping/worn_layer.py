@@ -1,6 +1,6 @@
 """What of a pattern is draped, in one layer, and where its buttons close it.
 
-Facings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In the drape
+Facings, bindings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In the drape
 nothing keeps layers apart, so that what lies within would hang out. It is left out, and named.
 """
 
@@ -42,7 +42,7 @@ def in_one_layer(
         The pieces and seams that are draped, and notes.
     """
     seams = list(seams)
-    out = {name for name, piece in pieces.items() if piece.role in _WITHIN} | _bags(pieces, seams)
+    out = {name for name, piece in pieces.items() if piece.role in _WITHIN or _is_binding(piece)} | _bags(pieces, seams)
     # The second layer of a collar, sewn to the first one alone, has no place of its own.
     pairs = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
     layers = {name for name in pieces if name.endswith(MIRRORED) and name.removesuffix(MIRRORED) not in lifted}
@@ -63,14 +63,17 @@ def in_one_layer(
             folded |= {name} if cut is not piece else set()
     there = {(name, edge.name) for name, piece in kept.items() for edge in piece.edges}
     there |= {(name, edge.name) for name, piece in kept.items() for hole in piece.holes for edge in hole_edges(hole)}
-    seams = [
-        seam for seam in seams if all((side.piece, side.edge) in there for chain in seam.sides for side in chain)
-    ]
+    seams = [seam for seam in seams if all((side.piece, side.edge) in there for chain in seam.sides for side in chain)]
     # What hung by what is left out alone is sewn to nothing now.
     lost = set(kept) - {side.piece for seam in seams for chain in seam.sides for side in chain}
     kept = {name: piece for name, piece in kept.items() if name not in lost}
     titles = sorted({name.removesuffix(MIRRORED) for name in out | folded | lost})
     return kept, seams, [f"worn in one layer: {', '.join(titles)}"] if titles else []
+
+
+def _is_binding(piece: Piece) -> bool:
+    """Return whether a strip is turned around the edge to which it is sewn: its other edge is folded over as it is cut."""
+    return piece.role == "strip" and any(edge.kind == "cut" and edge.allowance == 0.0 for edge in piece.edges)
 
 
 def _bags(pieces: Mapping[str, Piece], seams: Sequence[Seam]) -> set[str]:
@@ -109,9 +112,13 @@ def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
             if height[k] >= 0.0:
                 points.append(point)
         if len(points) > 1 and height.max() > 0.0:
-            edges.append(edge if len(points) == len(edge.points) else replace(edge, points=np.array(points), vertices=None))
+            edges.append(edge if height.min() >= 0.0 else replace(edge, points=np.array(points), vertices=None))
     # The fold closes the one gap that is left.
-    gaps = [k for k in range(len(edges)) if np.linalg.norm(edges[k].points[-1] - edges[(k + 1) % len(edges)].points[0]) > _ON_LINE]
+    gaps = [
+        k
+        for k in range(len(edges))
+        if np.linalg.norm(edges[k].points[-1] - edges[(k + 1) % len(edges)].points[0]) > _ON_LINE
+    ]
     if len(gaps) != 1:
         return piece
     at = gaps[0]
