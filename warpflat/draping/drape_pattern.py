@@ -21,6 +21,7 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.draping.worn_layer import closures, in_one_layer
 from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
@@ -94,20 +95,8 @@ def drape_pattern(
     chosen = pattern.sample if placement.size is None else placement.size
     pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
     pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
-    # The second layer of a collar, sewn to the first one alone, has no place of its own.
-    pairs = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
-    layers = {name for name in pieces if name.endswith(MIRRORED) and name.removesuffix(MIRRORED) not in placement.lifts}
-    layers = layers if placement.lifts else set()
-    while held_by := {
-        name
-        for name in layers
-        if not set[str]().union(*(pair for pair in pairs if name in pair)) <= layers | {name.removesuffix(MIRRORED)}
-    }:
-        layers -= held_by
-    if layers:
-        pieces = {name: piece for name, piece in pieces.items() if name not in layers}
-        seams = [seam for seam, pair in zip(seams, pairs, strict=True) if not pair & layers]
-        notes.append(f"worn in one layer: {', '.join(sorted(name.removesuffix(MIRRORED) for name in layers))}")
+    pieces, seams, layers = in_one_layer(pieces, seams, placement.lifts)
+    notes += layers
     if not pattern.seams:
         raise InputError(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
@@ -123,7 +112,7 @@ def drape_pattern(
             f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
             f"and {1e3 * _SIZES[1]:.0f} mm long: {UNITS}"
         )
-    meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
+    meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
     start_warp()
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)

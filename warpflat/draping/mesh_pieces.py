@@ -12,6 +12,7 @@ from scipy.spatial import Delaunay, cKDTree
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import points_at_lengths
+from warpflat.draping.worn_layer import Button
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam
 from warpflat.pattern.whole_pieces import hole_edges
@@ -47,7 +48,7 @@ Weld = list[tuple[str, int]]
 
 
 def mesh_pieces(
-    pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: float
+    pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: float, buttons: Sequence[Button] = ()
 ) -> tuple[dict[str, FlatMesh], list[list[Weld]]]:
     """Mesh pieces so that the vertices of their seams meet.
 
@@ -58,15 +59,20 @@ def mesh_pieces(
         pieces: whole ones.
         seams: between them; each edge in one at most.
         spacing: wished edge [m].
+        buttons: where points inside two pieces are joined; there is a vertex at each.
 
     Returns:
-        The meshes by piece, and for each seam the vertices that it joins, from its start to its end.
+        The meshes by piece, and for each seam the vertices that it joins, from its start to its end; the buttons come last, as one more.
 
     Raises:
         InputError: an edge is in two seams, or a piece is too narrow for the spacing.
     """
     loops = {name: [list(piece.edges), *map(hole_edges, piece.holes)] for name, piece in pieces.items()}
     edges = {(name, edge.name): edge for name, rings in loops.items() for ring in rings for edge in ring}
+    fixed = {
+        name: np.array([point for layers in buttons for its, point in layers if its == name]).reshape(-1, 2)
+        for name in pieces
+    }
     owner: dict[tuple[str, str], int] = {}
     for number, seam in enumerate(seams):
         for side in (side for chain in seam.sides for side in chain):
@@ -87,10 +93,12 @@ def mesh_pieces(
         meshes, missing = {}, set()
         for name, piece in pieces.items():
             along = {edge.name: stations[name, edge.name] for ring in loops[name] for edge in ring}
-            meshes[name], lost = _mesh(piece, loops[name], along, spacing)
+            meshes[name], lost = _mesh(piece, loops[name], along, spacing, fixed[name])
             missing |= {owner.get((name, edge), (name, edge)) for edge in lost}
         if not missing:
-            return meshes, [[[(p, int(meshes[p].edges[e][k])) for p, e, k in joint] for joint in row] for row in joints]
+            welds = [[[(p, int(meshes[p].edges[e][k])) for p, e, k in joint] for joint in row] for row in joints]
+            closed = [[(p, int(cKDTree(meshes[p].points).query(at)[1])) for p, at in layers] for layers in buttons]
+            return meshes, [*welds, closed] if closed else welds
         for group in missing:
             finer[group] = 2 * finer.get(group, 1)
     narrow = next(iter(missing))
@@ -145,9 +153,13 @@ def _divide(
 
 
 def _mesh(
-    piece: Piece, loops: Sequence[Sequence[Edge]], stations: Mapping[str, FloatArray], spacing: float
+    piece: Piece,
+    loops: Sequence[Sequence[Edge]],
+    stations: Mapping[str, FloatArray],
+    spacing: float,
+    fixed: FloatArray,
 ) -> tuple[FlatMesh, set[str]]:
-    """Return the mesh of a piece, and the edges of which a segment is missing in it."""
+    """Return the mesh of a piece with vertices at fixed points (#N by 2 [m]), and the edges of which a segment is missing in it."""
     import shapely
 
     points: list[FloatArray] = []
@@ -175,7 +187,9 @@ def _mesh(
     found = found[shapely.contains_xy(polygon, *found.T)]
     off = shapely.distance(shapely.boundary(polygon), shapely.points(found)) if len(found) else np.empty(0)
     inner = np.asarray(found[off > _OFF_OUTLINE * spacing])
-    everything = np.concatenate([border, inner])
+    if len(fixed):
+        inner = inner[cKDTree(fixed).query(inner)[0] > _OFF_OUTLINE * spacing]
+    everything = np.concatenate([border, inner, fixed])
     simplices = Delaunay(everything).simplices
     corner = everything[simplices]
     area = 0.5 * np.linalg.det(corner[:, 1:] - corner[:, :1])

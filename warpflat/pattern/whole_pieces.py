@@ -69,6 +69,7 @@ def whole_pieces(
             piece, name=title, edges=turned, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
             holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
             internal_lines={name: line * across for name, line in piece.internal_lines.items()},
+            marks={name: mark * across for name, mark in piece.marks.items()},
             grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
             placement=None if piece.placement is None else flip @ piece.placement @ flip,
         )  # fmt: skip
@@ -152,6 +153,7 @@ def _unfolded(piece: Piece) -> Piece:
     return replace(
         piece, edges=[*edges, *others], darts=[*piece.darts, *darts], holes=[*piece.holes, *holes],
         internal_lines={**piece.internal_lines, **lines},
+        marks={**piece.marks, **{name + MIRRORED: reflect(mark[None])[0] for name, mark in piece.marks.items()}},
     )  # fmt: skip
 
 

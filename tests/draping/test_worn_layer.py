@@ -1,0 +1,169 @@
+"""Garments are draped in one layer, and closed where their buttons lie."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import body_of_size
+from devices import DEVICE
+
+import warpflat
+from warpflat.core.errors import InputError
+from warpflat.draping.drape_pattern import Placement, drape_pattern
+from warpflat.draping.mesh_pieces import mesh_pieces
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.worn_layer import closures, in_one_layer
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.whole_pieces import whole_pieces
+
+NAMES = ("low", "stand", "high", "side")
+
+
+def rectangle(name: str, width: float, height: float, names: tuple[str, ...] = NAMES, **more: object) -> Piece:
+    """A piece whose named edges run from its lower left corner around it."""
+    ring = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (0.0, 0.0)])
+    edges = [Edge(name=each, points=ring[k : k + 2]) for k, each in enumerate(names)]
+    return Piece(name=name, edges=edges, **more)  # type: ignore[arg-type]
+
+
+def joined(name: str, first: str, second: str, *, mirrored: tuple[bool, bool] = (False, False)) -> Seam:
+    """A seam of two edges "piece.edge", of which the second runs against its edge."""
+    sides = [
+        (SeamSide(piece=p, edge=e, reversed=k == 1, mirrored=m),)
+        for k, ((p, e), m) in enumerate(zip((first.split("."), second.split(".")), mirrored, strict=True))
+    ]
+    return Seam(name=name, sides=(sides[0], sides[1]))
+
+
+def buttoned_tube(half: float, *, buttons: bool) -> Pattern:
+    """A back, and two halves of a front that overlap by 36 mm with their button stands; `half` is half of the way around [m]."""
+    height, stand = 0.25, 0.018
+    marks, lines = {}, {}
+    for number, y in enumerate((0.03, 0.125, 0.22) if buttons else (), start=1):
+        ending = f" {number}" if number > 1 else ""
+        marks[f"button{ending}"] = np.array([0.5 * half, y])
+        lines[f"buttonhole{ending}"] = np.array([[0.5 * half + 0.003, y], [0.5 * half - 0.012, y]])
+    front = rectangle("front", 0.5 * half + stand, height, quantity=2, marks=marks, internal_lines=lines)
+    back = rectangle("back", half, height, ("low", "right", "high", "left"))
+    seams = [
+        joined("side left", "back.left", "front.side", mirrored=(False, True)),
+        joined("side right", "front.side", "back.right"),
+    ]
+    # The sides of the drawn half and of the one that is turned over run in opposite directions.
+    seams[0] = replace(seams[0], sides=(seams[0].sides[0], (replace(seams[0].sides[1][0], reversed=False),)))
+    return Pattern(name="tube", pieces={"": [front, back]}, seams=seams)
+
+
+def test_fronts_are_closed_where_their_buttons_lie():
+    """Buttoned, the tube is held by the hips; open, nothing holds it."""
+    body, fabric = body_of_size(30.0), warpflat.find_fabric("woven")
+    placement = Placement(spacing=0.03)
+    worn, _ = drape_pattern(
+        buttoned_tube(0.475, buttons=True), body, fabric=fabric, placement=placement, options=DrapeOptions(max_steps=400),
+        device=DEVICE,
+    )  # fmt: skip
+    pieces, _, _ = whole_pieces(*(buttoned_tube(0.475, buttons=True).pieces[""], ()), unsewn=True)
+    places = {}
+    for name, rows in worn.cloth.piece_vertices.items():
+        flat, space = worn.cloth.flat[rows], worn.positions[worn.cloth.welded[rows]]
+        for title, mark in pieces[name].marks.items():
+            at = np.linalg.norm(flat - mark, axis=1).argmin()
+            # There is a vertex where a button lies.
+            np.testing.assert_allclose(flat[at], mark, atol=1e-12)
+            places.setdefault(title, []).append(space[at])
+    assert len(places) == 3
+    for title, (one, other) in places.items():
+        np.testing.assert_array_equal(one, other, err_msg=title)
+        assert one[2] > 0.05, title
+    # The stand of each half lies beyond the line where they meet.
+    edges = {name: worn.positions[worn.cloth.lines[f"{name}.stand"]] for name in ("front", "front mirrored")}
+    assert edges["front"][:, 0].mean() * edges["front mirrored"][:, 0].mean() < 0.0
+    middle = {
+        name: worn.positions[worn.cloth.welded[rows], 0].mean() for name, rows in worn.cloth.piece_vertices.items()
+    }
+    for name, points in edges.items():
+        assert np.sign(points[:, 0].mean()) == -np.sign(middle[name]), name
+    assert worn.positions[:, 1].max() > body.levels()["hip"].height
+    with pytest.raises(InputError, match="falls off"):
+        drape_pattern(buttoned_tube(0.475, buttons=False), body, fabric=fabric, placement=placement, device=DEVICE)
+
+
+def test_a_cuff_is_closed_upon_itself():
+    hole = np.array([[0.004, 0.03], [0.019, 0.03]])
+    cuff = rectangle(
+        "cuff",
+        0.25,
+        0.06,
+        marks={"button": np.array([0.24, 0.03])},
+        internal_lines={"buttonhole": hole, "buttonhole end 1": hole},
+    )
+    ((one, at), (other, its)) = closures({"cuff": cuff})[0]
+    assert (one, other) == ("cuff", "cuff")
+    np.testing.assert_allclose([at, its], [[0.24, 0.03], [0.0115, 0.03]])
+    meshes, welds = mesh_pieces({"cuff": cuff}, [], 0.01, closures({"cuff": cuff}))
+    (((_, first), (_, second)),) = welds[-1]
+    np.testing.assert_allclose(meshes["cuff"].points[[first, second]], [at, its])
+    assert len(np.unique(meshes["cuff"].triangles)) == len(meshes["cuff"].points)
+
+
+def test_marks_lie_on_what_is_cut_turned_over():
+    front = rectangle("front", 0.2, 0.1, quantity=2, marks={"button": np.array([0.15, 0.04])})
+    band = rectangle("band", 0.2, 0.1, marks={"button": np.array([0.15, 0.04])})
+    folded = replace(band, edges=[*band.edges[:3], replace(band.edges[3], kind="fold")])
+    pieces, _, _ = whole_pieces([front, folded], [], unsewn=True)
+    np.testing.assert_allclose(pieces["front mirrored"].marks["button"], [-0.15, 0.04])
+    np.testing.assert_allclose(pieces["band"].marks["button"], [0.15, 0.04])
+    np.testing.assert_allclose(pieces["band"].marks["button mirrored"], [-0.15, 0.04])
+
+
+def test_a_zip_is_closed_along_its_whole_edge():
+    """It closes a seam, which is sewn; a slit is an edge of its own."""
+    one, other = rectangle("front", 0.2, 0.3), rectangle("back", 0.2, 0.3, ("low", "right", "high", "left"))
+    seam = replace(joined("side", "front.side", "back.right"), openings=(SeamOpening(kind="zip", length=0.2),))
+    pieces, seams, _ = whole_pieces([one, other], [seam])
+    pieces, seams, _ = in_one_layer(pieces, seams, ())
+    meshes, welds = mesh_pieces(pieces, seams, 0.02)
+    heights = sorted(meshes["front"].points[vertex, 1] for (_, vertex), _ in welds[0])
+    assert heights[0] == 0.0
+    assert heights[-1] == pytest.approx(0.3)
+    assert np.diff(heights).max() < 0.0201
+
+
+def test_what_lies_within_is_left_out():
+    """A grown-on facing is cut off at its fold, and its seam goes; so do a binding and a bag, but not what fills a cut-off corner."""
+    around = {"low": [(0.0, 0.0), (0.25, 0.0)], "facing edge": [(0.25, 0.0), (0.25, 0.3)]}
+    around |= {"facing neck": [(0.25, 0.3), (0.2, 0.32)], "neck": [(0.2, 0.32), (0.1, 0.3)]}
+    around |= {"shoulder": [(0.1, 0.3), (0.0, 0.3)], "side": [(0.0, 0.3), (0.0, 0.0)]}
+    edges = [Edge(name=name, points=np.array(points)) for name, points in around.items()]
+    lines = {"fold line": np.array([[0.2, 0.0], [0.2, 0.32]]), "waist": np.array([[0.0, 0.1], [0.2, 0.1]])}
+    front = Piece(
+        name="front",
+        edges=edges,
+        internal_lines=lines,
+        marks={"button": np.array([0.18, 0.2]), "notch": np.array([0.24, 0.1])},
+    )
+    back = rectangle("back", 0.2, 0.3, ("low", "right", "shoulder", "left"))
+    corner, bag = (rectangle(name, 0.1, 0.3, role="pocket") for name in ("corner", "bag"))
+    facing = rectangle("neck facing", 0.1, 0.05, role="facing")
+    binding = rectangle("binding", 0.2, 0.02, role="strip")
+    turned = replace(binding.edges[2], kind="cut", allowance=0.0)
+    binding = replace(binding, edges=[*binding.edges[:2], turned, binding.edges[3]])
+    chain = tuple(SeamSide(piece=name, edge=edge) for name, edge in (("back", "low"), ("corner", "low")))
+    seams = [
+        joined("side", "front.side", "back.right"), joined("neck facing", "front.neck", "neck facing.low"),
+        joined("grown-on", "front.shoulder", "front.facing neck"), joined("binding", "binding.low", "back.shoulder"),
+        Seam(name="hem", sides=((SeamSide(piece="front", edge="low"),), chain)), joined("bag", "bag.side", "corner.side"),
+    ]  # fmt: skip
+    kept, left, notes = in_one_layer({p.name: p for p in (front, back, corner, bag, facing, binding)}, seams, ())
+    assert set(kept) == {"front", "back", "corner"}
+    assert [seam.name for seam in left] == ["side", "hem"]
+    assert notes == ["worn in one layer: bag, binding, front, neck facing"]
+    assert kept["front"].outline.max(axis=0) == pytest.approx([0.2, 0.32])
+    assert {edge.name: edge.length for edge in kept["front"].edges} == pytest.approx(
+        {"low": 0.2, "fold line": 0.32, "neck": np.hypot(0.1, 0.02), "shoulder": 0.1, "side": 0.3}
+    )
+    assert set(kept["front"].marks) == {"button"}
+    assert set(kept["front"].internal_lines) == {"waist"}

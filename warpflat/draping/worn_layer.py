@@ -1,0 +1,169 @@
+"""What of a pattern is draped, in one layer, and where its buttons close it.
+
+Facings, bindings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In the drape
+nothing keeps layers apart, so that what lies within would hang out. It is left out, and named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import nearest_on_polyline
+from warpflat.pattern.piece_parts import Edge
+from warpflat.pattern.pieces import Piece, Seam
+from warpflat.pattern.whole_pieces import MIRRORED, hole_edges
+
+__all__ = ["Button", "closures", "in_one_layer"]
+
+#: Where a button is closed: piece and point [m] of both layers.
+Button = tuple[tuple[str, FloatArray], tuple[str, FloatArray]]
+
+_FOLD, _BUTTON, _HOLE = "fold line", "button", "buttonhole"
+_WITHIN = ("facing", "interfacing")
+# What strays less far from a line lies on it; a button lies this near to a buttonhole of its own piece if both halves are marked alike [m].
+_ON_LINE, _ON_HOLE = 1e-6, 0.006
+
+
+def in_one_layer(
+    pieces: Mapping[str, Piece], seams: Iterable[Seam], lifted: Collection[str]
+) -> tuple[dict[str, Piece], list[Seam], list[str]]:
+    """Leave out what lies within a garment.
+
+    Args:
+        pieces: whole ones.
+        seams: between them.
+        lifted: pieces that have a designed surface; where there is none, second layers of collars have a place of their own.
+
+    Returns:
+        The pieces and seams that are draped, and notes.
+    """
+    seams = list(seams)
+    out = {name for name, piece in pieces.items() if piece.role in _WITHIN or _is_binding(piece)} | _bags(pieces, seams)
+    # The second layer of a collar, sewn to the first one alone, has no place of its own.
+    pairs = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
+    layers = {name for name in pieces if name.endswith(MIRRORED) and name.removesuffix(MIRRORED) not in lifted}
+    layers = layers - out if lifted else set()
+    while held_by := {
+        name
+        for name in layers
+        if not set[str]().union(*(pair for pair in pairs if name in pair)) <= layers | {name.removesuffix(MIRRORED)}
+    }:
+        layers -= held_by
+    out |= layers
+    seams = [seam for seam, pair in zip(seams, pairs, strict=True) if not pair & out]
+    kept, folded = {name: piece for name, piece in pieces.items() if name not in out}, set[str]()
+    for name, piece in kept.items():
+        sewn = {side.edge for seam in seams for chain in seam.sides for side in chain if side.piece == name}
+        for line in [line for title, line in piece.internal_lines.items() if title.startswith(_FOLD)]:
+            kept[name] = cut = _cut_at(kept[name], line, sewn)
+            folded |= {name} if cut is not piece else set()
+    there = {(name, edge.name) for name, piece in kept.items() for edge in piece.edges}
+    there |= {(name, edge.name) for name, piece in kept.items() for hole in piece.holes for edge in hole_edges(hole)}
+    seams = [seam for seam in seams if all((side.piece, side.edge) in there for chain in seam.sides for side in chain)]
+    # What hung by what is left out alone is sewn to nothing now.
+    lost = set(kept) - {side.piece for seam in seams for chain in seam.sides for side in chain}
+    kept = {name: piece for name, piece in kept.items() if name not in lost}
+    titles = sorted({name.removesuffix(MIRRORED) for name in out | folded | lost})
+    return kept, seams, [f"worn in one layer: {', '.join(titles)}"] if titles else []
+
+
+def _is_binding(piece: Piece) -> bool:
+    """Return whether a strip is turned around the edge to which it is sewn: its other edge is folded over as it is cut."""
+    return piece.role == "strip" and any(edge.kind == "cut" and edge.allowance == 0.0 for edge in piece.edges)
+
+
+def _bags(pieces: Mapping[str, Piece], seams: Sequence[Seam]) -> set[str]:
+    """Return bags of pockets: that which takes part in a seam beside the shell lies behind a cut-off corner of it, and stays."""
+    beside = {side.piece for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
+    return {name for name, piece in pieces.items() if piece.role == "pocket" and name not in beside}
+
+
+def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
+    """Return the part of a piece on that side of a straight line on which more of its outline is sewn."""
+    along = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+    across = np.array([-along[1], along[0]])
+
+    def off(points: FloatArray) -> FloatArray:
+        return np.asarray((points - line[0]) @ across)
+
+    if np.abs(off(line)).max() > _ON_LINE:
+        return piece
+    lengths = [0.0, 0.0]
+    for edge in piece.edges:
+        if edge.name in sewn:
+            middle = 0.5 * (edge.points[1:] + edge.points[:-1])
+            length = np.linalg.norm(np.diff(edge.points, axis=0), axis=1)
+            for k, side in enumerate((1.0, -1.0)):
+                lengths[k] += float(length[side * off(middle) > 0.0].sum())
+    side = 1.0 if lengths[0] >= lengths[1] else -1.0
+    edges = list[Edge]()
+    for edge in piece.edges:
+        height = side * off(edge.points)
+        height[np.abs(height) < _ON_LINE] = 0.0
+        points = list[FloatArray]()
+        for k, point in enumerate(edge.points):
+            if k and height[k - 1] * height[k] < 0.0:
+                share = height[k - 1] / (height[k - 1] - height[k])
+                points.append(edge.points[k - 1] + share * (point - edge.points[k - 1]))
+            if height[k] >= 0.0:
+                points.append(point)
+        if len(points) > 1 and height.max() > 0.0:
+            edges.append(edge if height.min() >= 0.0 else replace(edge, points=np.array(points), vertices=None))
+    # The fold closes the one gap that is left.
+    gaps = [
+        k
+        for k in range(len(edges))
+        if np.linalg.norm(edges[k].points[-1] - edges[(k + 1) % len(edges)].points[0]) > _ON_LINE
+    ]
+    if len(gaps) != 1:
+        return piece
+    at = gaps[0]
+    fold = np.array([edges[at].points[-1], edges[(at + 1) % len(edges)].points[0]])
+    edges.insert(at + 1, Edge(name=_FOLD, points=fold, kind="cut"))
+    inside = {name: line for name, line in piece.internal_lines.items() if (side * off(line) > -_ON_LINE).all()}
+    inside = {name: line for name, line in inside.items() if np.abs(off(line)).max() > _ON_LINE}
+    names = {edge.name for edge in edges}
+    return replace(
+        piece, edges=edges, internal_lines=inside,
+        holes=[hole for hole in piece.holes if (side * off(hole.points) > 0.0).all()],
+        darts=[dart for dart in piece.darts if {dart.left, dart.right} <= names],
+        marks={name: mark for name, mark in piece.marks.items() if side * off(mark[None])[0] > -_ON_LINE},
+    )  # fmt: skip
+
+
+def closures(pieces: Mapping[str, Piece]) -> list[Button]:
+    """Return where buttons close whole pieces of a garment.
+
+    A cuff or a collar's stand has its button at one end and its buttonhole at the other. Both halves of a front are marked alike, with
+    buttons in their buttonholes; one lies over the other, and the buttons of the same number meet.
+    """
+    found, fronts = list[Button](), dict[str, dict[str, FloatArray]]()
+    for name, piece in pieces.items():
+        marks = {title: point for title, point in piece.marks.items() if title.split()[0] == _BUTTON}
+        holes = [
+            line
+            for title, line in piece.internal_lines.items()
+            if title.split()[0] == _HOLE and title.split()[1:2] != ["end"]
+        ]
+        if marks and all(
+            any(np.linalg.norm(nearest_on_polyline(mark, hole) - mark) < _ON_HOLE for hole in holes)
+            for mark in marks.values()
+        ):
+            fronts[name] = marks
+        elif len(marks) == len(holes):
+            found += [
+                ((name, mark), (name, hole.mean(axis=0))) for mark, hole in zip(marks.values(), holes, strict=True)
+            ]
+    while fronts:
+        name, marks = fronts.popitem()
+        twin = name.removesuffix(MIRRORED) if name.endswith(MIRRORED) else name + MIRRORED
+        alike = [each for each, its in fronts.items() if its.keys() == marks.keys()]
+        other = twin if twin in alike else alike[0] if len(alike) == 1 else ""
+        if other:
+            its = fronts.pop(other)
+            found += [((name, marks[title]), (other, its[title])) for title in marks]
+    return found
