@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from body_tapes import armpit_and_crotch
 from landmarks import Landmarks
-from limb_tapes import tape_across
+from limb_tapes import arm_tapes, tape_across
 from scans import needs_bodies, posed_body, posed_scan, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
+from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.scan_pose import across_trunk
 from warpflat.mannequin.slicer import Slicer
@@ -64,6 +66,32 @@ def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
     # Fat moves the crease behind the knee down, and the skin over it less.
     knee = body.measures["knee left"]
     assert abs(knee.height - marks.knee(points, "left")) < 0.004 or knee.guess is not None
+
+
+@needs_bodies
+def test_the_upper_arm_is_measured_from_where_the_arm_joins_the_trunk() -> None:
+    """The scan shows where; the body's nearest vertex lies up to a centimetre off."""
+    bodies, faces = [scan(name)[0] for name in ("female", "male", "male_heavy", "child")], scan("child")[1]
+    for shares, scales in (((0.16, 0.0, 0.0, 0.84), (1.05, 0.97, 1.08)), ((0.0, 0.33, 0.67, 0.0), (1.1, 0.93, 1.0))):
+        points = sum(share * body for share, body in zip(shares, bodies, strict=True)) * scales
+        mesh = trimesh.Trimesh(points, triangles_of(faces), process=False)
+        armpit, tips, marks = armpit_and_crotch(mesh)[0], points[:, 0], Landmarks(faces)
+        body = Mannequin.from_scan(points, faces, resolution_mm=40.0)
+        for side, tip in (("left", np.argmax(tips)), ("right", np.argmin(tips))):
+            height, girth = arm_tapes(mesh, armpit, int(tip), marks.bones(points, side))["biceps"]
+            ours = body.measures[f"biceps {side}"]
+            assert abs(ours.height - height) < 0.004
+            assert abs(ours.girth - girth) < 0.006
+
+
+def test_a_body_with_feet_as_small_as_a_childs_is_not_refused() -> None:
+    model, (finer, triangles) = BodyModel.load(), finer_body()
+    shape = np.random.default_rng(101).normal(size=len(model.shapes))
+    straight = rotation(np.zeros((len(model.joints), 3)))
+    person = Person(shape=shape, bend=straight, turn=np.eye(3), scale=1.58, place=np.zeros(3))
+    body = Mannequin.from_scan(finer @ model.vertices(person), triangles, resolution_mm=40.0)
+    assert "foot left" not in body.measures
+    assert body.measures["ankle left"].girth > 0.15
 
 
 def test_trunk_of_two_equal_parts_has_a_direction() -> None:

@@ -26,8 +26,8 @@ _TRUNK = ("bust", "underbust", "waist", "hip")
 # So far up and down from its landmark the extreme of a level lies, as a share of the stature.
 _REACH = {"waist": 0.036, "hip": 0.030, "calf": 0.016, "ankle": 0.013}
 # Bust points lie a fifth of the bust apart. A fold bends the outline by so much over a way of one stature. It lies so far below the
-# landmark at most, and is nearer to it than this only if it is the landmark, as shares of the stature.
-_BUST_POINT, _FOLD, _FOLD_BELOW, _FOLD_OFF = 0.1, 14.0, 0.05, 0.007
+# landmark at most, and so far above it; nearer than this both tell the same place, as shares of the stature.
+_BUST_POINT, _FOLD, _FOLD_BELOW, _FOLD_ABOVE, _FOLD_OFF = 0.1, 14.0, 0.05, 0.01, 0.007
 # Under a bust that hangs the tape lies where the girth leaps by more than this share from one section to the next.
 _LEAP = 0.06
 # More noise than this [m] moves a landmark by more than ISO 20685 allows.
@@ -43,14 +43,15 @@ _BELOW_ARMPIT = 0.006
 # The fullest upper arm is sought from so far beyond the armpit, the thigh's tape lies so far below the crotch, both as
 # shares of the stature: nearer sections hold a part of the shoulder or of the seat.
 _BEYOND_ARMPIT, _BELOW_CROTCH = 0.02, 0.03
-# Just below an armpit's fold the trunk is no broader than by this share of the stature.
-_BESIDE_FOLD = 0.005
+# So far up and down from the body's vertex an armpit's fold is sought, where the trunk's section grows by more, as shares of the stature.
+_FOLD_OF_ARM, _LEAP_OF_ARM = 0.012, 0.02
 # The palm's tape falls to this share where the fingers part.
 _FINGERS_PART = 0.92
 # A belly of the upper arm is one if it is so full, as a share of the fullest tape.
 _BELLY = 0.98
-# Girths [m] that a tape does not tell apart, and what noise of one metre adds to that; ISO 20685 lets a height differ by so much [m].
-_ALIKE, _NOISE, _ISO_HEIGHT = 0.001, 0.5, 0.004
+# Girths [m] that a tape does not tell apart, and what noise of one metre adds to that; ISO 20685 lets a height and a girth differ by so
+# much [m].
+_ALIKE, _NOISE, _ISO_HEIGHT, _ISO_GIRTH = 0.001, 0.5, 0.004, 0.009
 # A tape is a guess where the body model lies farther off the scan [m] in the mean, or the scan shows less than a share of it.
 _FAR, _SHOWN = 0.015, 0.75
 _HOLED = "it runs over a hole in the scan"
@@ -118,7 +119,8 @@ def find_levels(
 
     found["armpit"] = ScanLevel(height=min(float(place[1]) for place in body.armpits.values()))
     armpit = given.get("armpit", found["armpit"].height)
-    found["waist"] = least("waist", t.y, smooth(t.girth, 1.5), landmark("waist"), "the trunk has no narrowest section")
+    around = smooth(t.girth, 1.5 if noise else 0.75)
+    found["waist"] = least("waist", t.y, around, landmark("waist"), "the trunk has no narrowest section")
     found["hip"] = least("hip", t.y, t.back, landmark("hip"), "the seat does not stand out")
     # Under a full bust the outline over the bust points bends forward in a fold, lower than on the mean body.
     at, bust = min(landmark("underbust"), armpit - 0.02 * size), landmark("bust")
@@ -126,12 +128,16 @@ def find_levels(
     outline = smooth(np.array([np.interp(apart, OUTLINES, row) for row in t.outlines]), 2.0)
     bend = np.gradient(np.gradient(outline, t.y), t.y) * size
     below = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at))
-    fold = int(below[np.argmax(bend[below])])
     leap = np.diff(t.girth[below]) / t.girth[below[:-1]]
+    # The first fold from just above the landmark down: the next one lies between belly and waist.
+    near = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at + _FOLD_ABOVE * size))
+    folds = near[(bend[near] > _FOLD) & (bend[near] >= bend[near - 1]) & (bend[near] > bend[near + 1])]
     if leap.max() > _LEAP:
         at = float(t.y[below[np.argmax(leap)]])
-    elif below[0] < fold < below[-1] and bend[fold] > _FOLD and at - t.y[fold] > _FOLD_OFF * size:
-        at = summit(t.y, bend, fold)
+    elif len(folds):
+        fold = summit(t.y, bend, int(folds[-1]))
+        # Each is a few millimetres off the fold's middle by itself.
+        at = 0.5 * (at + fold) if abs(fold - at) < _FOLD_OFF * size else fold
     found["underbust"] = ScanLevel(height=at, guess=_noisy(noise) if noise > _NOISE_SURE else None)
     low, high = given.get("underbust", at) + 0.01 * size, armpit - _BELOW_ARMPIT * size
     rows = np.flatnonzero((t.y > low) & (t.y < high))
@@ -147,7 +153,12 @@ def find_levels(
         why = f"the chest is as full again at the armpits at {armpit:.3f} m"
         found["bust"] = ScanLevel(height=summit(t.y, t.girth, row), guess=why)
     else:
-        found["bust"] = ScanLevel(height=summit(t.y, t.girth, row))
+        full = (t.girth > t.girth[row] - _ALIKE) & (t.y > low) & (t.y <= armpit)
+        own = _stretch(full, row)
+        twice = full.sum() > own.stop - own.start
+        found["bust"] = ScanLevel(
+            height=summit(t.y, t.girth, row), guess="the chest is as full at another height" if twice else None
+        )
     waist, hip = (given.get(name, found[name].height) for name in ("waist", "hip"))
     between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
     belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
@@ -295,11 +306,11 @@ def body_measures(
                 guess=level.guess or laid.unsure_near(rows, _FAR, _SHOWN),
             )  # fmt: skip
         foot = _foot(scan, size, side) if laid.shows(near_level("foot", side)[0]) else None
-        if foot is None or not _is_possible("foot", foot.girth, size):
+        if foot is not None and not _is_possible("foot", foot.girth, size):
             # On a floor the model's foot tells more.
-            of_model = _foot(body.slicer, size, side) if foot is not None else None
-            foot = None if of_model is None else replace(of_model, guess="it is the body model's: the scan has a floor")
-        if foot is not None:
+            foot = _foot(body.slicer, size, side)
+            foot = None if foot is None else replace(foot, guess="it is the body model's: the scan has a floor")
+        if foot is not None and _is_possible("foot", foot.girth, size):
             found[f"foot {side}"] = foot
     for name, measure in found.items():
         low, high = _POSSIBLE.get(name.split(" ")[0], (0.0, np.inf))
@@ -373,16 +384,33 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
     )
 
 
+def _fold_of_arm(body: BodySections, side: str) -> FloatArray:
+    """Return the place [m] on the trunk's skin at which an arm joins it: below the first level section whose trunk leaps into the arm.
+
+    Where none does near the body's vertex, as under a web, that vertex.
+    """
+    armpit, size = body.armpits[side], body.stature
+    sign = float(np.sign(armpit[0]))
+    before: FloatArray | None = None
+    for y in np.arange(armpit[1] - _FOLD_OF_ARM * size, armpit[1] + _FOLD_OF_ARM * size, 0.001):
+        parts = [p.points for p in body.scan.cut(_UP, float(y))]
+        trunk = [p for p in parts if p[:, 0].min() < 0.0 < p[:, 0].max()]
+        if not trunk:
+            break
+        largest = max(trunk, key=lambda p: float(np.ptp(p[:, 0])))
+        edge = largest[np.argmax(sign * largest[:, 0])]
+        if before is not None and sign * (edge - before)[0] > _LEAP_OF_ARM * size:
+            return before
+        before = edge
+    return armpit
+
+
 def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
     """Return the fullest tape across the upper arm's bone, from beyond the armpit to the elbow.
 
     The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
     """
-    arm, armpit = body.arms[side], body.armpits[side].copy()
-    # Just below the fold the trunk's skin stands out a little farther.
-    skin = np.concatenate([p.points[:, 0] for p in body.halves[side].cut(_UP, float(armpit[1]) - 0.001)])
-    skin = np.abs(skin)[np.abs(skin) < np.abs(armpit[0]) + _BESIDE_FOLD * body.stature]
-    armpit[0] = np.sign(armpit[0]) * max(float(skin.max(initial=0.0)), abs(float(armpit[0])))
+    arm, armpit = body.arms[side], _fold_of_arm(body, side)
     rows = (arm.s > 0.35 * arm.elbow) & (arm.s < arm.elbow - 0.02 * body.stature)
     way = arm.way[rows].mean(axis=0)
     way /= np.linalg.norm(way)
@@ -460,7 +488,7 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
         return None
     across = np.array([axis[2], 0.0, -axis[0]])
     start = float((low @ along).min())
-    best: tuple[float, FloatArray] | None = None
+    tapes: list[tuple[float, float, float]] = []
     holed = False
     for share in np.arange(0.60, 0.82, 0.01):
         parts = [p for p in slicer.cut(axis, start + share * length)
@@ -468,11 +496,20 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
         if parts:
             holed |= any(p.is_holed for p in parts)
             points = np.concatenate([p.points for p in parts])
-            breadth_here = float(np.ptp(points @ across))
-            if best is None or breadth_here > best[0]:
-                best = breadth_here, points
-    if best is None:
+            girth = tape_around(points, axis)[1]
+            tapes.append((float(np.ptp(points @ across)), girth, 0.5 * float(points[:, 1].max())))
+    if not tapes:
         return None
+    broad, girth, height = max(tapes)
+    alike = max(abs(other - girth) for width, other, _ in tapes if width > broad - 0.5 * _ALIKE)
     # The foot stands on the floor, also where a scan has no sole.
-    guess = _HOLED if holed else _noisy(slicer.noise) if slicer.noise > _NOISE_SURE else None
-    return ScanMeasure(height=0.5 * float(best[1][:, 1].max()), girth=tape_around(best[1], axis)[1], guess=guess)
+    guess = (
+        _HOLED
+        if holed
+        else _noisy(slicer.noise)
+        if slicer.noise > _NOISE_SURE
+        else "the foot is as broad elsewhere"
+        if alike > _ISO_GIRTH
+        else None
+    )
+    return ScanMeasure(height=height, girth=girth, guess=guess)
