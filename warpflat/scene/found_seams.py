@@ -39,6 +39,8 @@ __all__ = ["found_seams", "plain_panel", "read_edges", "seams_entry"]
 
 # More than this share of the cloth beyond its limit is no pattern yet.
 _NO_PATTERN = 0.1
+# A ring that lacks more than this share of a full turn does not lie flat: its cloth would be stretched by as much.
+_CONE = 0.05
 # A mesh of fewer faces is too coarse for a garment.
 _FEWEST = 60
 
@@ -341,18 +343,23 @@ def plain_panel(scene: Scene) -> Surface | None:
 
 
 def _is_whole_garment(surface: Surface) -> bool:
-    """Return whether a surface cannot lie flat in one piece: closed, with handles, forked, or a cap."""
+    """Return whether a surface cannot lie flat in one piece: closed, with handles, forked, a cap, or a cone with its tip cut off."""
     from warpflat.seams.cloth import Cloth
     from warpflat.seams.solid import is_panel, wide_borders
     from warpflat.surface.connectivity import border_loops, euler_characteristic
     from warpflat.surface.triangles import triangulate
+    from warpflat.surface.tubes import inner_borders
 
     if len(surface.faces) < _FEWEST:
         return False
     cloth = Cloth(vertices=surface.vertices, faces=triangulate(surface.faces)[0].astype(np.int64))
     wide = wide_borders(cloth)
     handles = (2 - len(border_loops(surface.faces, surface.vertices)) - euler_characteristic(surface.faces)) // 2
-    return len(wide) not in (1, 2) or handles > 0 or (len(wide) == 1 and not is_panel(cloth))
+    if len(wide) == 2:
+        # Between a flat ring and a tube, which is cut open, lies what neither is nor becomes flat, such as a poncho.
+        lack = 1.0 + inner_borders(surface)[0][1] / (2.0 * np.pi)
+        return handles > 0 or _CONE < lack < 0.5
+    return len(wide) != 1 or handles > 0 or not is_panel(cloth)
 
 
 def seams_entry(found: FoundSeams, pieces: Sequence[Flattening]) -> Mapping[str, Any]:

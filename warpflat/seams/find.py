@@ -499,7 +499,7 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     except (InputError, ValueError):
         return None
     reach = float(np.linalg.norm(piece.vertices[line[-1]] - piece.vertices[line[0]])) if len(line) > 1 else 0.0
-    if line[0] == line[-1] or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
+    if len(np.unique(line)) < len(line) or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
         return None
     return np.asarray(line, dtype=np.int32)
 

@@ -28,6 +28,7 @@ from warpflat.seams.fields import Operators
 from warpflat.seams.symmetric import mirrored
 from warpflat.seams.tailor import tidied
 from warpflat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.surface.tubes import inner_borders, tube_borders
 
 __all__ = ["SOLID", "is_open", "is_panel", "part_solids", "wide_borders"]
 
@@ -73,6 +74,17 @@ def is_open(mesh: PieceMesh) -> bool:
     return loops in (1, 2) and euler_characteristic(mesh.faces.astype(np.int32)) == 2 - loops
 
 
+def _is_sewn_inside(cloth: Cloth, mesh: PieceMesh) -> bool:
+    """Return whether a piece is a flat ring with a seam around its hole: a pattern has holes, yet sews nothing into them."""
+    local = Cloth(vertices=mesh.vertices, faces=mesh.faces).as_surface()
+    tubes = {int(loop[0]) for loop in tube_borders(local)}
+    seams = np.unique(cloth.seam_edges())
+    return any(
+        int(loop[0]) not in tubes and bool(np.isin(mesh.vertex_of[loop], seams).all())
+        for loop, _ in inner_borders(local)
+    )
+
+
 def wide_borders(cloth: Cloth) -> list[float]:
     """Return the lengths of the borders of a cloth that are no holes [m]."""
     rings = [cloth.vertices[np.append(loop, loop[0])] for loop in cloth.borders()]
@@ -107,7 +119,7 @@ def part_solids(
         for mesh in meshes:
             area = float(cloth.face_areas[mesh.face_of].sum())
             key = len(mesh.face_of), round(area, 9)
-            topology = not is_open(mesh)
+            topology = not is_open(mesh) or _is_sewn_inside(cloth, mesh)
             if key in done or (not topology and (not shape or len(meshes) >= most)):
                 continue
             value = _strain(mesh, known)

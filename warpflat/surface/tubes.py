@@ -9,7 +9,7 @@ from warpflat.surface.connectivity import border_loops, components
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["tube_borders"]
+__all__ = ["inner_borders", "tube_borders"]
 
 
 def tube_borders(surface: Surface) -> list[IntArray]:
@@ -17,6 +17,11 @@ def tube_borders(surface: Surface) -> list[IntArray]:
 
     A flat ring turns once around at each of its borders, a tube at neither.
     """
+    return [loop for loop, turn in inner_borders(surface) if turn > -np.pi]
+
+
+def inner_borders(surface: Surface) -> list[tuple[IntArray, float]]:
+    """Return all borders but the longest of each connected part, each with the angle by which it turns [rad]: -2 pi in a flat ring."""
     loops = border_loops(surface.faces, surface.vertices)
     if len(loops) < 2:
         return []
@@ -34,7 +39,7 @@ def tube_borders(surface: Surface) -> list[IntArray]:
         sine = np.linalg.norm(np.cross(u, v), axis=1)
         angle += np.bincount(i, np.arctan2(sine, np.einsum("ij,ij->i", u, v)), minlength=len(angle))
     return [
-        loop
+        (loop, float((np.pi - angle[loop]).sum()))
         for number, loop in enumerate(loops)
-        if number not in longest.values() and float((np.pi - angle[loop]).sum()) > -np.pi
+        if number not in longest.values()
     ]
