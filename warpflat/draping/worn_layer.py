@@ -1,7 +1,7 @@
 """What of a pattern is draped, in one layer, and where its buttons close it.
 
-Facings, bindings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In the drape
-nothing keeps layers apart, so that what lies within would hang out. It is left out, and named.
+Facings, bindings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In the
+drape nothing keeps layers apart, so that what lies within would hang out. It is left out, and named.
 """
 
 from __future__ import annotations
