@@ -48,6 +48,7 @@ def draw(path: Path, rows: list[dict[str, Any]]) -> None:
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator
 
     figure, axes = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
     for axis, key, scale, label in (
@@ -61,8 +62,9 @@ def draw(path: Path, rows: list[dict[str, Any]]) -> None:
             axis.loglog(
                 [row["vertices"] for row in of], each, marker="o", label=f"{kind}: total grows as V^{total:.2f}"
             )
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.yaxis.set_major_formatter("{x:g}")
-        axis.yaxis.set_minor_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("")
         axis.set_xlabel("vertices V")
         axis.set_ylabel(label)
         axis.grid(True, which="both", linewidth=0.3)
