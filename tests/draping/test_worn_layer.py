@@ -14,10 +14,11 @@ from warpflat.core.errors import InputError
 from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.options import DrapeOptions
-from warpflat.draping.worn_layer import closures, in_one_layer
+from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.whole_pieces import whole_pieces
+from warpflat.surface.connectivity import border_loops, join_labels
 
 NAMES = ("low", "stand", "high", "side")
 
@@ -167,3 +168,24 @@ def test_what_lies_within_is_left_out():
     )
     assert set(kept["front"].marks) == {"button"}
     assert set(kept["front"].internal_lines) == {"waist"}
+
+
+@pytest.mark.parametrize("run_against", [False, True])
+def test_strips_are_worn_right_side_out(run_against: bool):
+    """A cuff's seam may be named in the direction of both outlines, and then it is turned over: no edge is run through twice."""
+    sleeve = rectangle("sleeve", 0.2, 0.3, ("wrist", "one side", "cap", "other side"))
+    cuff = rectangle("cuff", 0.2, 0.05, ("lower", "right", "upper", "left"), marks={"button": np.array([0.19, 0.02])})
+    band = rectangle("band", 0.2, 0.02, ("lower", "right", "upper", "left"))
+    sides = [(SeamSide(piece="cuff", edge="lower", reversed=run_against),), (SeamSide(piece="sleeve", edge="wrist"),)]
+    seams = [Seam(name="cuff", sides=(sides[0], sides[1])), joined("band", "band.lower", "cuff.upper")]
+    pieces, left = right_side_out({piece.name: piece for piece in (cuff, sleeve, band)}, seams, {"sleeve"})
+    assert np.sign(pieces["cuff"].marks["button"][0]) == (1.0 if run_against else -1.0)
+    meshes, welds = mesh_pieces(pieces, left, 0.02)
+    begins = dict(zip(meshes, np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist(), strict=False))
+    joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    count = sum(len(mesh.points) for mesh in meshes.values())
+    welded = join_labels(count, *np.array(joints).T)
+    faces = np.concatenate([welded[mesh.triangles + begins[name]] for name, mesh in meshes.items()])
+    directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    assert len(np.unique(directed, axis=0)) == len(directed)
+    assert len(border_loops(faces)) == 1

@@ -21,7 +21,7 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.draping.worn_layer import closures, in_one_layer
+from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out
 from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
@@ -96,6 +96,7 @@ def drape_pattern(
     pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
     pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
     pieces, seams, layers = in_one_layer(pieces, seams, placement.lifts)
+    pieces, seams = right_side_out(pieces, seams, placement.lifts)
     notes += layers
     if not pattern.seams:
         raise InputError(
