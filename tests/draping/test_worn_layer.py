@@ -13,6 +13,7 @@ import warpflat
 from warpflat.core.errors import InputError
 from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.mesh_pieces import mesh_pieces
+from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out
 from warpflat.pattern.piece_parts import Edge
@@ -62,11 +63,12 @@ def test_fronts_are_closed_where_their_buttons_lie():
     """Buttoned, the tube is held by the hips; open, nothing holds it."""
     body, fabric = body_of_size(30.0), warpflat.find_fabric("woven")
     placement = Placement(spacing=0.03)
+    pattern = buttoned_tube(0.475, buttons=True)
     worn, _ = drape_pattern(
-        buttoned_tube(0.475, buttons=True), body, fabric=fabric, placement=placement, options=DrapeOptions(max_steps=400),
+        pattern, body, fabric=fabric, placement=placement, options=DrapeOptions(max_steps=400),
         device=DEVICE,
     )  # fmt: skip
-    pieces, _, _ = whole_pieces(*(buttoned_tube(0.475, buttons=True).pieces[""], ()), unsewn=True)
+    pieces, _, _ = whole_pieces(pattern.pieces[""], (), unsewn=True)
     places = {}
     for name, rows in worn.cloth.piece_vertices.items():
         flat, space = worn.cloth.flat[rows], worn.positions[worn.cloth.welded[rows]]
@@ -88,6 +90,14 @@ def test_fronts_are_closed_where_their_buttons_lie():
     for name, points in edges.items():
         assert np.sign(points[:, 0].mean()) == -np.sign(middle[name]), name
     assert worn.positions[:, 1].max() > body.levels()["hip"].height
+    # What was turned over to be worn right side out moves in its pattern the other way.
+    rows = worn.cloth.piece_vertices["back"]
+    turned, moved = worn.cloth.flat.copy(), worn.cloth.flat.copy()
+    turned[rows] *= [-1.0, 1.0]
+    moved[rows] = turned[rows] - [0.01, 0.0]
+    before = replace(worn.cloth, flat=turned, turned=frozenset({"back"}))
+    back = moved_outlines(pattern, "", before, replace(before, flat=moved)).piece("back", "")
+    np.testing.assert_allclose(back.outline - [0.01, 0.0], pattern.piece("back", "").outline, atol=1e-12)
     with pytest.raises(InputError, match="falls off"):
         drape_pattern(buttoned_tube(0.475, buttons=False), body, fabric=fabric, placement=placement, device=DEVICE)
 
@@ -178,8 +188,10 @@ def test_strips_are_worn_right_side_out(run_against: bool):
     band = rectangle("band", 0.2, 0.02, ("lower", "right", "upper", "left"))
     sides = [(SeamSide(piece="cuff", edge="lower", reversed=run_against),), (SeamSide(piece="sleeve", edge="wrist"),)]
     seams = [Seam(name="cuff", sides=(sides[0], sides[1])), joined("band", "band.lower", "cuff.upper")]
-    pieces, left = right_side_out({piece.name: piece for piece in (cuff, sleeve, band)}, seams, {"sleeve"})
+    pieces, left, turned = right_side_out({piece.name: piece for piece in (cuff, sleeve, band)}, seams, {"sleeve"})
     assert np.sign(pieces["cuff"].marks["button"][0]) == (1.0 if run_against else -1.0)
+    # The seam of cuff and band is named rightly, so that the band follows.
+    assert turned == (set() if run_against else {"cuff", "band"})
     meshes, welds = mesh_pieces(pieces, left, 0.02)
     begins = dict(zip(meshes, np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist(), strict=False))
     joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]

@@ -96,7 +96,7 @@ def drape_pattern(
     pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
     pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
     pieces, seams, layers = in_one_layer(pieces, seams, placement.lifts)
-    pieces, seams = right_side_out(pieces, seams, placement.lifts)
+    pieces, seams, turned = right_side_out(pieces, seams, placement.lifts)
     notes += layers
     if not pattern.seams:
         raise InputError(
@@ -174,6 +174,7 @@ def drape_pattern(
         piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
         piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(meshes)},
         lines={**inner, **lines},
+        turned=turned,
     )
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if solid is None else solid

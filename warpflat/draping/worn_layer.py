@@ -137,7 +137,7 @@ def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
 
 def right_side_out(
     pieces: Mapping[str, Piece], seams: Sequence[Seam], lifted: Collection[str]
-) -> tuple[dict[str, Piece], list[Seam]]:
+) -> tuple[dict[str, Piece], list[Seam], frozenset[str]]:
     """Turn drafted pieces over whose outlines run along their seams as those of the pieces do to which they are sewn.
 
     A strip is its own mirror image, and may be named either way; sewn cloth has one right side.
@@ -146,6 +146,9 @@ def right_side_out(
         pieces: in one layer.
         seams: between them.
         lifted: pieces that have a designed surface, which is right side out.
+
+    Returns:
+        The pieces, their seams, and the names of those that were turned.
     """
     turned = {name: False for name in pieces if name in lifted or name.removesuffix(MIRRORED) in lifted}
     links = [(a, b) for seam in seams for a in seam.sides[0] for b in seam.sides[1] if a.piece != b.piece]
@@ -155,7 +158,7 @@ def right_side_out(
         for a, b in (each for link in links for each in (link, link[::-1])):
             if a.piece in turned and b.piece not in turned:
                 turned[b.piece], found = turned[a.piece] ^ (a.reversed == b.reversed), True
-    over = {name for name, is_turned in turned.items() if is_turned}
+    over = frozenset(name for name, is_turned in turned.items() if is_turned)
 
     def sides(chain: Sequence[SeamSide]) -> tuple[SeamSide, ...]:
         return tuple(replace(side, reversed=side.reversed ^ (side.piece in over)) for side in chain)
@@ -163,6 +166,7 @@ def right_side_out(
     return (
         {name: turn_over(piece) if name in over else piece for name, piece in pieces.items()},
         [replace(seam, sides=(sides(seam.sides[0]), sides(seam.sides[1]))) for seam in seams],
+        over,
     )
 
 
