@@ -15,7 +15,8 @@ from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
-from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out
+from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
+from warpflat.draping.wrap_pieces import continue_pieces
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.whole_pieces import whole_pieces
@@ -201,3 +202,21 @@ def test_strips_are_worn_right_side_out(run_against: bool):
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     assert len(np.unique(directed, axis=0)) == len(directed)
     assert len(border_loops(faces)) == 1
+
+
+def test_a_fall_starts_turned_down_over_its_stand():
+    """The stand goes on upwards from an upright shell, and the fall comes down from its upper edge."""
+    shell = rectangle("shell", 0.2, 0.3)
+    stand, fall = (rectangle(name, 0.2, height, role="collar") for name, height in (("stand", 0.03), ("fall", 0.05)))
+    seams = [joined("stand", "stand.low", "shell.high"), joined("fall", "fall.low", "stand.high")]
+    pieces = {piece.name: piece for piece in (shell, stand, fall)}
+    assert turned_down(pieces, seams) == {"fall"}
+    # A collar without a stand goes on.
+    assert turned_down({"shell": shell, "stand": stand}, seams[:1]) == set()
+    meshes, welds = mesh_pieces(pieces, seams, 0.01)
+    flat = meshes["shell"].points
+    placed = {"shell": np.column_stack([flat, np.zeros(len(flat))])}
+    for turned, low, high in (((), 0.33, 0.38), ({"fall"}, 0.28, 0.33)):
+        found = continue_pieces(placed, meshes, welds, turned)
+        assert np.sort(found["stand"][:, 1])[[0, -1]] == pytest.approx([0.3, 0.33], abs=1e-6)
+        assert np.sort(found["fall"][:, 1])[[0, -1]] == pytest.approx([low, high], abs=1e-6)

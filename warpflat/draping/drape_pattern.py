@@ -21,7 +21,7 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out
+from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
@@ -138,7 +138,7 @@ def drape_pattern(
                 notes.append(f"{elsewhere}: the pieces are placed by their seams")
             lifted = False
     drafted = [name for name in meshes if name not in placed]
-    placed = continue_pieces(placed, meshes, welds)
+    placed = continue_pieces(placed, meshes, welds, turned_down(pieces, seams))
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()

@@ -17,7 +17,7 @@ from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.whole_pieces import MIRRORED, hole_edges, turn_over
 
-__all__ = ["Button", "closures", "in_one_layer", "right_side_out"]
+__all__ = ["Button", "closures", "in_one_layer", "right_side_out", "turned_down"]
 
 #: Where a button is closed: piece and point [m] of both layers.
 Button = tuple[tuple[str, FloatArray], tuple[str, FloatArray]]
@@ -168,6 +168,19 @@ def right_side_out(
         [replace(seam, sides=(sides(seam.sides[0]), sides(seam.sides[1]))) for seam in seams],
         over,
     )
+
+
+def turned_down(pieces: Mapping[str, Piece], seams: Sequence[Seam]) -> set[str]:
+    """Return the falls of collars, which are sewn to another piece of the collar alone: their stands."""
+    found = set[str]()
+    for name in (name for name, piece in pieces.items() if piece.role == "collar"):
+        joined = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
+        others = set[str]().union(*(each for each in joined if name in each)) - {name}
+        wider = {each for each in others if any(each in pair and name not in pair for pair in joined)}
+        found |= (
+            {name} if others and others == wider and all(pieces[each].role == "collar" for each in others) else set()
+        )
+    return found
 
 
 def closures(pieces: Mapping[str, Piece]) -> list[Button]:
