@@ -13,11 +13,14 @@ import warpflat
 from warpflat.core.errors import InputError
 from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.mesh_pieces import mesh_pieces
+from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
-from warpflat.draping.worn_layer import closures, in_one_layer
+from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
+from warpflat.draping.wrap_pieces import continue_pieces
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.whole_pieces import whole_pieces
+from warpflat.surface.connectivity import border_loops, join_labels
 
 NAMES = ("low", "stand", "high", "side")
 
@@ -61,11 +64,12 @@ def test_fronts_are_closed_where_their_buttons_lie():
     """Buttoned, the tube is held by the hips; open, nothing holds it."""
     body, fabric = body_of_size(30.0), warpflat.find_fabric("woven")
     placement = Placement(spacing=0.03)
+    pattern = buttoned_tube(0.475, buttons=True)
     worn, _ = drape_pattern(
-        buttoned_tube(0.475, buttons=True), body, fabric=fabric, placement=placement, options=DrapeOptions(max_steps=400),
+        pattern, body, fabric=fabric, placement=placement, options=DrapeOptions(max_steps=400),
         device=DEVICE,
     )  # fmt: skip
-    pieces, _, _ = whole_pieces(*(buttoned_tube(0.475, buttons=True).pieces[""], ()), unsewn=True)
+    pieces, _, _ = whole_pieces(pattern.pieces[""], (), unsewn=True)
     places = {}
     for name, rows in worn.cloth.piece_vertices.items():
         flat, space = worn.cloth.flat[rows], worn.positions[worn.cloth.welded[rows]]
@@ -87,6 +91,14 @@ def test_fronts_are_closed_where_their_buttons_lie():
     for name, points in edges.items():
         assert np.sign(points[:, 0].mean()) == -np.sign(middle[name]), name
     assert worn.positions[:, 1].max() > body.levels()["hip"].height
+    # What was turned over to be worn right side out moves in its pattern the other way.
+    rows = worn.cloth.piece_vertices["back"]
+    turned, moved = worn.cloth.flat.copy(), worn.cloth.flat.copy()
+    turned[rows] *= [-1.0, 1.0]
+    moved[rows] = turned[rows] - [0.01, 0.0]
+    before = replace(worn.cloth, flat=turned, turned=frozenset({"back"}))
+    back = moved_outlines(pattern, "", before, replace(before, flat=moved)).piece("back", "")
+    np.testing.assert_allclose(back.outline - [0.01, 0.0], pattern.piece("back", "").outline, atol=1e-12)
     with pytest.raises(InputError, match="falls off"):
         drape_pattern(buttoned_tube(0.475, buttons=False), body, fabric=fabric, placement=placement, device=DEVICE)
 
@@ -167,3 +179,44 @@ def test_what_lies_within_is_left_out():
     )
     assert set(kept["front"].marks) == {"button"}
     assert set(kept["front"].internal_lines) == {"waist"}
+
+
+@pytest.mark.parametrize("run_against", [False, True])
+def test_strips_are_worn_right_side_out(run_against: bool):
+    """A cuff's seam may be named in the direction of both outlines, and then it is turned over: no edge is run through twice."""
+    sleeve = rectangle("sleeve", 0.2, 0.3, ("wrist", "one side", "cap", "other side"))
+    cuff = rectangle("cuff", 0.2, 0.05, ("lower", "right", "upper", "left"), marks={"button": np.array([0.19, 0.02])})
+    band = rectangle("band", 0.2, 0.02, ("lower", "right", "upper", "left"))
+    sides = [(SeamSide(piece="cuff", edge="lower", reversed=run_against),), (SeamSide(piece="sleeve", edge="wrist"),)]
+    seams = [Seam(name="cuff", sides=(sides[0], sides[1])), joined("band", "band.lower", "cuff.upper")]
+    pieces, left, turned = right_side_out({piece.name: piece for piece in (cuff, sleeve, band)}, seams, {"sleeve"})
+    assert np.sign(pieces["cuff"].marks["button"][0]) == (1.0 if run_against else -1.0)
+    # The seam of cuff and band is named rightly, so that the band follows.
+    assert turned == (set() if run_against else {"cuff", "band"})
+    meshes, welds = mesh_pieces(pieces, left, 0.02)
+    begins = dict(zip(meshes, np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist(), strict=False))
+    joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    count = sum(len(mesh.points) for mesh in meshes.values())
+    welded = join_labels(count, *np.array(joints).T)
+    faces = np.concatenate([welded[mesh.triangles + begins[name]] for name, mesh in meshes.items()])
+    directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    assert len(np.unique(directed, axis=0)) == len(directed)
+    assert len(border_loops(faces)) == 1
+
+
+def test_a_fall_starts_turned_down_over_its_stand():
+    """The stand goes on upwards from an upright shell, and the fall comes down from its upper edge."""
+    shell = rectangle("shell", 0.2, 0.3)
+    stand, fall = (rectangle(name, 0.2, height, role="collar") for name, height in (("stand", 0.03), ("fall", 0.05)))
+    seams = [joined("stand", "stand.low", "shell.high"), joined("fall", "fall.low", "stand.high")]
+    pieces = {piece.name: piece for piece in (shell, stand, fall)}
+    assert turned_down(pieces, seams) == {"fall"}
+    # A collar without a stand goes on.
+    assert turned_down({"shell": shell, "stand": stand}, seams[:1]) == set()
+    meshes, welds = mesh_pieces(pieces, seams, 0.01)
+    flat = meshes["shell"].points
+    placed = {"shell": np.column_stack([flat, np.zeros(len(flat))])}
+    for turned, low, high in (((), 0.33, 0.38), ({"fall"}, 0.28, 0.33)):
+        found = continue_pieces(placed, meshes, welds, turned)
+        assert np.sort(found["stand"][:, 1])[[0, -1]] == pytest.approx([0.3, 0.33], abs=1e-6)
+        assert np.sort(found["fall"][:, 1])[[0, -1]] == pytest.approx([low, high], abs=1e-6)

@@ -21,7 +21,7 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.draping.worn_layer import closures, in_one_layer
+from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.mannequin import Mannequin
@@ -96,6 +96,7 @@ def drape_pattern(
     pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
     pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
     pieces, seams, layers = in_one_layer(pieces, seams, placement.lifts)
+    pieces, seams, turned = right_side_out(pieces, seams, placement.lifts)
     notes += layers
     if not pattern.seams:
         raise InputError(
@@ -137,7 +138,7 @@ def drape_pattern(
                 notes.append(f"{elsewhere}: the pieces are placed by their seams")
             lifted = False
     drafted = [name for name in meshes if name not in placed]
-    placed = continue_pieces(placed, meshes, welds)
+    placed = continue_pieces(placed, meshes, welds, turned_down(pieces, seams))
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
@@ -173,6 +174,7 @@ def drape_pattern(
         piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
         piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(meshes)},
         lines={**inner, **lines},
+        turned=turned,
     )
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if solid is None else solid

@@ -83,7 +83,8 @@ def moved_outlines(pattern: Pattern, size: str, before: SewnCloth, after: SewnCl
 
     def mover(name: str) -> Callable[[FloatArray], FloatArray]:
         rows = before.piece_vertices[name]
-        places, move = before.flat[rows], after.flat[rows] - before.flat[rows]
+        across = [-1.0, 1.0] if name in before.turned else [1.0, 1.0]
+        places, move = before.flat[rows] * across, (after.flat[rows] - before.flat[rows]) * across
         inside, beside = LinearNDInterpolator(places, move), NearestNDInterpolator(places, move)
 
         def moves(points: FloatArray) -> FloatArray:

@@ -38,6 +38,7 @@ class SewnCloth:
         piece_faces: the faces of each piece.
         piece_vertices: the rows of `flat` of each piece.
         lines: feature lines and edges by "piece.line", in the numbering of the sewn mesh.
+        turned: pieces that lie in `flat` turned over, mirrored at x = 0.
     """
 
     fabric: Fabric
@@ -51,6 +52,7 @@ class SewnCloth:
     piece_faces: Mapping[str, slice]
     piece_vertices: Mapping[str, slice]
     lines: Mapping[str, IntArray]
+    turned: frozenset[str] = frozenset()
 
     def cells(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
         """Return the membrane's cells: a triangle, or the four corner triangles of a quad with half their area each.

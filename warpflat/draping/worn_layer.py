@@ -1,7 +1,7 @@
 """What of a pattern is draped, in one layer, and where its buttons close it.
 
-Facings, bindings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In the
-drape nothing keeps layers apart, so that what lies within would hang out. It is left out, and named.
+Facings, bindings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In
+the drape nothing keeps layers apart, so that what lies within would hang out. It is left out, and named.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import nearest_on_polyline
 from warpflat.pattern.piece_parts import Edge
-from warpflat.pattern.pieces import Piece, Seam
-from warpflat.pattern.whole_pieces import MIRRORED, hole_edges
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.whole_pieces import MIRRORED, hole_edges, turn_over
 
-__all__ = ["Button", "closures", "in_one_layer"]
+__all__ = ["Button", "closures", "in_one_layer", "right_side_out", "turned_down"]
 
 #: Where a button is closed: piece and point [m] of both layers.
 Button = tuple[tuple[str, FloatArray], tuple[str, FloatArray]]
@@ -133,6 +133,54 @@ def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
         darts=[dart for dart in piece.darts if {dart.left, dart.right} <= names],
         marks={name: mark for name, mark in piece.marks.items() if side * off(mark[None])[0] > -_ON_LINE},
     )  # fmt: skip
+
+
+def right_side_out(
+    pieces: Mapping[str, Piece], seams: Sequence[Seam], lifted: Collection[str]
+) -> tuple[dict[str, Piece], list[Seam], frozenset[str]]:
+    """Turn drafted pieces over whose outlines run along their seams as those of the pieces do to which they are sewn.
+
+    A strip is its own mirror image, and may be named either way; sewn cloth has one right side.
+
+    Args:
+        pieces: in one layer.
+        seams: between them.
+        lifted: pieces that have a designed surface, which is right side out.
+
+    Returns:
+        The pieces, their seams, and the names of those that were turned.
+    """
+    turned = {name: False for name in pieces if name in lifted or name.removesuffix(MIRRORED) in lifted}
+    links = [(a, b) for seam in seams for a in seam.sides[0] for b in seam.sides[1] if a.piece != b.piece]
+    found = bool(turned)
+    while found:
+        found = False
+        for a, b in (each for link in links for each in (link, link[::-1])):
+            if a.piece in turned and b.piece not in turned:
+                turned[b.piece], found = turned[a.piece] ^ (a.reversed == b.reversed), True
+    over = frozenset(name for name, is_turned in turned.items() if is_turned)
+
+    def sides(chain: Sequence[SeamSide]) -> tuple[SeamSide, ...]:
+        return tuple(replace(side, reversed=side.reversed ^ (side.piece in over)) for side in chain)
+
+    return (
+        {name: turn_over(piece) if name in over else piece for name, piece in pieces.items()},
+        [replace(seam, sides=(sides(seam.sides[0]), sides(seam.sides[1]))) for seam in seams],
+        over,
+    )
+
+
+def turned_down(pieces: Mapping[str, Piece], seams: Sequence[Seam]) -> set[str]:
+    """Return the falls of collars, which are sewn to another piece of the collar alone: their stands."""
+    found = set[str]()
+    for name in (name for name, piece in pieces.items() if piece.role == "collar"):
+        joined = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
+        others = set[str]().union(*(each for each in joined if name in each)) - {name}
+        wider = {each for each in others if any(each in pair and name not in pair for pair in joined)}
+        found |= (
+            {name} if others and others == wider and all(pieces[each].role == "collar" for each in others) else set()
+        )
+    return found
 
 
 def closures(pieces: Mapping[str, Piece]) -> list[Button]:

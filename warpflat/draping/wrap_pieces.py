@@ -10,7 +10,7 @@ without strain, and one sparse factor joins them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -342,7 +342,10 @@ def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[lis
 
 
 def continue_pieces(
-    placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]
+    placed: Mapping[str, FloatArray],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    turned_down: Collection[str] = (),
 ) -> dict[str, FloatArray]:
     """Place bands, collars, pockets and whatever else was drafted flat: as if the cloth that they are sewn to ran on beyond the seam.
 
@@ -352,6 +355,7 @@ def continue_pieces(
         placed: by piece the points (#P by 3 [m]) of those that lie.
         meshes: all pieces.
         welds: for each seam the vertices that it joins.
+        turned_down: pieces that lie back on what they are sewn to, as the fall of a collar on its stand.
 
     Raises:
         InputError: a piece hangs together with none that lies.
@@ -367,8 +371,8 @@ def continue_pieces(
             ):
                 if name in lost and other in found:
                     across = _border_frames(meshes[name], own).transpose(0, 2, 1)
-                    # Into this piece is out of the other one.
-                    flat = _border_frames(meshes[other], its) * [1.0, -1.0] @ across
+                    # Into this piece is out of the other one, or back into it.
+                    flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
                     sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
         lengths = {
             name: sum(

@@ -13,7 +13,7 @@ from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
-__all__ = ["MIRRORED", "hole_edges", "whole_pieces"]
+__all__ = ["MIRRORED", "hole_edges", "turn_over", "whole_pieces"]
 
 #: Ends the name of a piece that is cut turned over, and of an edge beyond the fold.
 MIRRORED = " mirrored"
@@ -59,20 +59,9 @@ def whole_pieces(
             # Where it is worn, no other copy says.
             title = _copy_name(side)
             whole[title] = replace(given[side.piece], name=title, placement=None)
-    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
     over = {_copy_name(side) for side in sides if side.mirrored} | {name for name in twice if name in sewn}
     for piece in [whole[name] for name in whole if name in over]:
-        # Cut turned over.
-        turned = [replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]]
-        title = piece.name + MIRRORED
-        whole[title] = replace(
-            piece, name=title, edges=turned, darts=[_mirrored_dart(dart, "") for dart in piece.darts],
-            holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
-            internal_lines={name: line * across for name, line in piece.internal_lines.items()},
-            marks={name: mark * across for name, mark in piece.marks.items()},
-            grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
-            placement=None if piece.placement is None else flip @ piece.placement @ flip,
-        )  # fmt: skip
+        whole[piece.name + MIRRORED] = replace(turn_over(piece), name=piece.name + MIRRORED)
     found: list[Seam] = []
     taken: set[tuple[str, str]] = set()
     # Seams on the other side of the body.
@@ -100,6 +89,20 @@ def whole_pieces(
     left_out = sorted(set(given) - sewn)
     notes = [f"left out, as no seam joins them: {', '.join(left_out)}"] if left_out else []
     return whole, found, notes
+
+
+def turn_over(piece: Piece) -> Piece:
+    """Return a piece that is cut turned over, mirrored at x = 0."""
+    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
+    return replace(
+        piece, edges=[replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]],
+        darts=[_mirrored_dart(dart, "") for dart in piece.darts],
+        holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
+        internal_lines={name: line * across for name, line in piece.internal_lines.items()},
+        marks={name: mark * across for name, mark in piece.marks.items()},
+        grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
+        placement=None if piece.placement is None else flip @ piece.placement @ flip,
+    )  # fmt: skip
 
 
 def hole_edges(hole: Hole) -> list[Edge]:
