@@ -11,7 +11,11 @@ import trimesh
 
 import warpflat
 from warpflat.garment.to_pattern import pattern_of_garment
+from warpflat.scene.found_seams import plain_panel
+from warpflat.scene.load import load_scene
+from warpflat.seams.cloth import Cloth
 from warpflat.seams.fields import Operators
+from warpflat.seams.solid import part_solids
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
 from warpflat.surface.tubes import tube_borders
@@ -44,6 +48,50 @@ def test_a_ring_is_opened_all_around() -> None:
         loops = len(border_loops(piece.faces))
         assert euler_characteristic(piece.faces) == 2 - loops
         assert loops in (1, 2)
+
+
+def test_a_ring_that_is_sewn_around_its_hole_is_parted() -> None:
+    turn, around = np.arange(40) * 2 * np.pi / 40, np.arange(40)
+    rings = [[r * np.cos(a), 0.0, r * np.sin(a)] for r in np.linspace(0.02, 0.2, 7) for a in turn]
+    after = np.roll(around, -1)
+    faces = [[280, a, b] for a, b in zip(around, after, strict=True)]
+    for k in range(0, 240, 40):
+        for a, b in zip(around + k, after + k, strict=True):
+            faces += [[a, a + 40, b + 40], [a, b + 40, b]]
+    disk = Cloth(vertices=np.array([*rings, [0.0, 0.0, 0.0]]), faces=np.array(faces))
+    alone, _ = part_solids(disk, shape=False)
+    assert len(list(alone.pieces())) == 1
+    sewn = disk.with_seam("round", np.sort(np.stack([around + 80, after + 80], axis=1), axis=1))
+    assert [len(border_loops(mesh.faces.astype(np.int32))) for mesh in sewn.pieces()] == [1, 2]
+    parted, _ = part_solids(sewn, shape=False)
+    assert [len(border_loops(mesh.faces.astype(np.int32))) for mesh in parted.pieces()] == [1, 1, 1]
+
+
+def test_a_strip_that_would_lie_over_itself_is_parted_across() -> None:
+    turn = np.linspace(0.0, 2.6 * np.pi, 120)
+    vertices = [
+        [(0.1 + r) * np.cos(a), 0.004 * a, (0.1 + r) * np.sin(a)] for a in turn for r in np.linspace(0, 0.06, 5)
+    ]
+    faces = [[5 * i + k, 5 * i + 5 + k, 5 * i + 6 + k, 5 * i + 1 + k] for i in range(119) for k in range(4)]
+    strip = warpflat.make_surface(np.array(vertices), faces, name="strip")
+    # Next to nothing of it is strained: that is no reason to cut it.
+    found = warpflat.find_seams(strip, warpflat.SeamOptions(limit=0.9), fabric="woven")
+    assert len(found.pieces) == 2
+    for piece in found.pieces:
+        assert warpflat.flatten(piece, fabric="woven").overlap < 1e-5
+
+
+def test_a_poncho_is_a_garment_and_neither_a_flat_ring_nor_a_tube_is(tmp_path: Path) -> None:
+    turn, around = np.arange(60) * 2 * np.pi / 60, np.arange(60)
+    after = np.roll(around, -1)
+    for slope, whole in ((0.0, False), (0.6, True), (6.0, False)):
+        rings = [[r * np.cos(a), -slope * r, r * np.sin(a)] for r in np.linspace(0.1, 0.5, 8) for a in turn]
+        faces = [[a, a + 60, b + 60, b] for k in range(0, 420, 60) for a, b in zip(around + k, after + k, strict=True)]
+        lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in rings]
+        lines += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
+        (tmp_path / "ring.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        (tmp_path / "ring.toml").write_text('[surface]\nfile = "ring.obj"\nunits = "m"\n', encoding="utf-8")
+        assert (plain_panel(load_scene(tmp_path / "ring.toml")) is None) == whole
 
 
 def test_closed_things_fall_into_equal_pieces_that_lie_flat_within_the_cloths_limit() -> None:

@@ -29,7 +29,7 @@ from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
 from warpflat.seams.solid import SOLID
 from warpflat.seams.symmetric import other_side
-from warpflat.seams.tailor import FACING, LEFT, side_word
+from warpflat.seams.tailor import FACING, LEFT, TAILORED, side_word
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.connectivity import border_loops, euler_characteristic
@@ -176,9 +176,21 @@ def cut_by_energy(
         most += 2
     for _ in range(_MOST_ROUNDS):
         beyond = sum(piece.outside for piece in pieces)
-        if beyond <= options.limit * total:
+        # A strip that winds around until it lies over itself has no pattern before it is parted across.
+        folded = next(
+            (
+                piece
+                for piece in pieces
+                if anatomy.kind not in TAILORED
+                and not piece.mirrored
+                and _key(piece.mesh) not in exhausted
+                and piece.result.overlap > _OVERLAP
+            ),
+            None,
+        )
+        if folded is None and beyond <= options.limit * total:
             break
-        worst = next(
+        worst = folded or next(
             (
                 piece
                 for piece in sorted(pieces, key=lambda one: -one.outside)
@@ -209,13 +221,17 @@ def cut_by_energy(
         number = next(k for k, piece in enumerate(pieces) if piece is worst)
         candidates = [
             candidate
-            for candidate in _candidates(cloth, worst, anatomy, options, may_part=parting and now < most)
+            for candidate in (
+                _across(worst, anatomy)
+                if folded is not None
+                else _candidates(cloth, worst, anatomy, options, may_part=parting and now < most)
+            )
             if not options.forbids(candidate.name)
         ]
 
         def on_trial(
             candidate: _Candidate, worst: _Measured = worst, twin: _Measured | None = twin, number: int = number,
-            cloth: Cloth = cloth, pieces: Sequence[_Measured] = pieces, most: int = most,
+            cloth: Cloth = cloth, pieces: Sequence[_Measured] = pieces, most: int = most, folded: _Measured | None = folded,
         ) -> tuple[Cloth, list[_Measured]] | None:  # fmt: skip
             report_activity(f"seams: trying {candidate.name}")
             made = _cut(cloth, worst.mesh, candidate, _TRIAL)
@@ -231,7 +247,7 @@ def cut_by_energy(
                 made = both or made
             # Where a twin is cut alike, it adds as many.
             more = (int(made.parts.max()) + 1 - len(pieces)) * (1 if twin is None else 2)
-            if more and len(pieces) + more > most:
+            if folded is None and more and len(pieces) + more > most:
                 return None
             try:
                 return made, _measured(made, anatomy, fabric, prepare, pieces, changed={number})
@@ -248,6 +264,9 @@ def cut_by_energy(
             if not _can_be_sewn(made, candidate, worst, new, anatomy.size):
                 continue
             gain = worst.outside - sum(piece.outside for piece in new)
+            if folded is not None:
+                gain = folded.result.overlap - sum(piece.result.overlap for piece in new)
+                least = _OVERLAP
             if gain >= least:
                 good.append((gain, candidate, made, new))
                 if gain >= _ENOUGH * worst.outside and not candidate.parts:
@@ -255,7 +274,11 @@ def cut_by_energy(
         best: tuple[float, _Candidate, Cloth, list[_Measured]] | None = None
         good.sort(key=lambda one: _value(one[0], one[2], len(one[3]) - 1), reverse=True)
         chosen = good[:_SEWN_ON_TRIAL]
-        strained = two_at_a_time(lambda one: _strained_by_sewing(one[2], one[3]), chosen)
+        strained = (
+            two_at_a_time(lambda one: _strained_by_sewing(one[2], one[3]), chosen)
+            if folded is None
+            else [0.0] * len(chosen)
+        )
         for (gain, candidate, made, new), loss in zip(chosen, strained, strict=True):
             value = _value(gain - loss, made, len(new) - 1)
             if gain - loss >= least and (best is None or value > best[0]):
@@ -267,7 +290,7 @@ def cut_by_energy(
             continue
         _, candidate, made, new = best
         both = anatomy.mirror is not None and (twin is not None or _is_lopsided(candidate, anatomy))
-        side = 0 if not both else _side_of(worst.mesh, anatomy) if twin is not None else _across(candidate, anatomy)
+        side = 0 if not both else _side_of(worst.mesh, anatomy) if twin is not None else _beside(candidate, anatomy)
         names = [_free_name(cloth, candidate, side)]
         cloth = _renamed(made, _TRIAL, names[0])
         if both:
@@ -766,16 +789,27 @@ def _candidates(
                 )
 
 
+def _across(piece: _Measured, anatomy: Anatomy) -> Iterator[_Candidate]:
+    """Yield planes that may part a piece: of symmetry, where it lies on both sides, and across each of its axes through the middle."""
+    vertices = piece.surface.vertices
+    across = vertices @ anatomy.normal - anatomy.offset
+    if across.min() < -0.02 * anatomy.size and across.max() > 0.02 * anatomy.size:
+        yield _Candidate(name="seam", normal=anatomy.normal, point=anatomy.offset * anatomy.normal, parts=True)
+    middle = vertices.mean(axis=0)
+    for axis in np.linalg.eigh(np.cov((vertices - middle).T))[1].T[::-1]:
+        yield _Candidate(name="seam", normal=axis, point=middle, parts=True)
+
+
 def _is_lopsided(candidate: _Candidate, anatomy: Anatomy) -> bool:
     """Return whether a line has a mirror image that is another one."""
     if anatomy.mirror is None or (candidate.start is None and candidate.level is None):
         return False
     # A line around the front runs on both sides, wherever its place is.
     around = candidate.level is not None and candidate.level[0] == FACING
-    return around or abs(_across(candidate, anatomy)) > 0.03 * anatomy.size
+    return around or abs(_beside(candidate, anatomy)) > 0.03 * anatomy.size
 
 
-def _across(candidate: _Candidate, anatomy: Anatomy) -> float:
+def _beside(candidate: _Candidate, anatomy: Anatomy) -> float:
     return float(candidate.point @ anatomy.normal) - anatomy.offset
 
 
