@@ -138,7 +138,7 @@ def drape_pattern(
                 notes.append(f"{elsewhere}: the pieces are placed by their seams")
             lifted = False
     drafted = [name for name in meshes if name not in placed]
-    placed = continue_pieces(placed, meshes, welds, turned_down(pieces, seams))
+    placed = continue_pieces(placed, meshes, welds, turned_down(pieces))
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()

@@ -170,17 +170,9 @@ def right_side_out(
     )
 
 
-def turned_down(pieces: Mapping[str, Piece], seams: Sequence[Seam]) -> set[str]:
-    """Return the falls of collars, which are sewn to another piece of the collar alone: their stands."""
-    found = set[str]()
-    for name in (name for name, piece in pieces.items() if piece.role == "collar"):
-        joined = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
-        others = set[str]().union(*(each for each in joined if name in each)) - {name}
-        wider = {each for each in others if any(each in pair and name not in pair for pair in joined)}
-        found |= (
-            {name} if others and others == wider and all(pieces[each].role == "collar" for each in others) else set()
-        )
-    return found
+def turned_down(pieces: Mapping[str, Piece]) -> set[str]:
+    """Return the collars that fall: all but their stands, and those that are stands alone."""
+    return {name for name, piece in pieces.items() if piece.role == "collar" and "stand" not in name}
 
 
 def closures(pieces: Mapping[str, Piece]) -> list[Button]:
