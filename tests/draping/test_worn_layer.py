@@ -121,6 +121,14 @@ def test_a_cuff_is_closed_upon_itself():
     assert len(np.unique(meshes["cuff"].triangles)) == len(meshes["cuff"].points)
 
 
+def test_what_others_mark_beyond_a_piece_closes_nothing():
+    hole = np.array([[0.004, 0.03], [0.019, 0.03]])
+    for button in ([0.30, 0.03], [0.25, 0.03], [0.24, 0.03]):
+        marks = {" ": np.zeros(2), "button": np.array(button)}
+        cuff = rectangle("cuff", 0.25, 0.06, marks=marks, internal_lines={"buttonhole": hole})
+        assert len(closures({"cuff": cuff})) == (button[0] < 0.25), button
+
+
 def test_marks_lie_on_what_is_cut_turned_over():
     front = rectangle("front", 0.2, 0.1, quantity=2, marks={"button": np.array([0.15, 0.04])})
     band = rectangle("band", 0.2, 0.1, marks={"button": np.array([0.15, 0.04])})

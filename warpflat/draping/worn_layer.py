@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from shapely import Polygon, contains_xy
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import nearest_on_polyline
@@ -26,6 +27,8 @@ _FOLD, _BUTTON, _HOLE = "fold line", "button", "buttonhole"
 _WITHIN = ("facing", "interfacing")
 # What strays less far from a line lies on it; a button lies this near to a buttonhole of its own piece if both halves are marked alike [m].
 _ON_LINE, _ON_HOLE = 1e-6, 0.006
+# A button is farther than this from the edge [m].
+_ON_OUTLINE = 0.001
 
 
 def in_one_layer(
@@ -183,11 +186,11 @@ def closures(pieces: Mapping[str, Piece]) -> list[Button]:
     """
     found, fronts = list[Button](), dict[str, dict[str, FloatArray]]()
     for name, piece in pieces.items():
-        marks = {title: point for title, point in piece.marks.items() if title.split()[0] == _BUTTON}
+        marks = {title: point for title, point in piece.marks.items() if title.split()[:1] == [_BUTTON]}
         holes = [
             line
             for title, line in piece.internal_lines.items()
-            if title.split()[0] == _HOLE and title.split()[1:2] != ["end"]
+            if title.split()[:1] == [_HOLE] and title.split()[1:2] != ["end"]
         ]
         if marks and all(
             any(np.linalg.norm(nearest_on_polyline(mark, hole) - mark) < _ON_HOLE for hole in holes)
@@ -206,4 +209,6 @@ def closures(pieces: Mapping[str, Piece]) -> list[Button]:
         if other:
             its = fronts.pop(other)
             found += [((name, marks[title]), (other, its[title])) for title in marks]
-    return found
+    # What others mark beyond an outline, or on it, closes nothing.
+    inside = {name: Polygon(piece.outline).buffer(-_ON_OUTLINE) for name, piece in pieces.items() if piece.marks}
+    return [layers for layers in found if all(contains_xy(inside[name], *point) for name, point in layers)]
