@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import CLOTH
 from test_kernel_unfold import SURFACES, norm
-from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 
-from warpflat.core.launch import launch_each
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import measure_buckling_stiffness, quad_stiffness, springs_along_cells, springs_of
@@ -125,35 +122,3 @@ def test_hold_is_the_lower_quartile_of_what_springs_store_in_shear(name: str):
     wished = 0.75 * np.sort(hold)[len(hold) // 4]
     assert measure_buckling_stiffness(surface, springs, positions, warp) == pytest.approx(wished, rel=1e-12)
     assert np.isfinite(wished) == (name == "triangles")
-
-
-@pytest.mark.parametrize("name", ["triangles", "mixed", "dome"])
-def test_what_springs_store_by_their_directions_is_that_of_numpy(name: str):
-    surface = SURFACES[name]()
-    x, y = surface.vertices[:, :2].T
-    positions = np.column_stack([x + 2.0 * y * y, 0.9 * y])
-    s, count = springs_of(surface, CLOTH, positions), len(positions)
-    d = positions[s.ends[:, 1]] - positions[s.ends[:, 0]]
-    c2 = (d[:, 0] / norm(d)) ** 2
-    fields = np.stack([c2**2, (1.0 - c2) ** 2, c2 * (1.0 - c2)], axis=1)
-    energy = s.stiffness * s.rest_length**2
-
-    around, stored, products = s.around, np.empty((count, 3)), np.empty((count, 3, 3))
-    given = [positions, around.offset, around.neighbor, s.listed_length, s.listed_stiffness]
-    launch_each(sum_strain_fields, count, given, [stored, products])
-    np.testing.assert_allclose(stored.sum(axis=0), 2.0 * fields.T @ energy, rtol=1e-12)
-    np.testing.assert_allclose(products.sum(axis=0), 2.0 * fields.T @ (fields * energy[:, None]), rtol=1e-12)
-    alone = np.empty_like(stored)
-    launch_each(sum_strain_fields, count, given, [alone, np.empty((0, 3, 3))])
-    np.testing.assert_array_equal(alone, stored)
-
-    factor, listed = np.array([1.4, 0.7, -2.0]), s.listed_stiffness.copy()
-    given = [positions, around.offset, around.neighbor, wp.vec3d(*factor), 0.5, 1.2]
-    launch_each(weigh_by_direction, count, given, [listed])
-    weighed = replace(s, listed_stiffness=listed)
-    bounded = np.clip(fields @ factor, 0.5, 1.2)
-    assert len(np.unique(bounded)) > 3
-    assert {0.5, 1.2} <= set(bounded)
-    np.testing.assert_allclose(weighed.stiffness, bounded * s.stiffness, rtol=1e-12)
-    # The same, to the last bit, at both ends.
-    np.testing.assert_array_equal(weighed.listed(weighed.stiffness), listed)

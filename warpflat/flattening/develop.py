@@ -64,7 +64,8 @@ class Development:
 
     Attributes:
         positions: #V by 2 [m], the datum along +y.
-        method: "flat", "profiles", "geodesic", "conformal" or "harmonic"; "given" where it is the user's.
+        method: "flat", "profiles", "geodesic", "conformal" or "harmonic"; "coarse" where it is the layout of a coarser mesh, "given" where
+            it is the user's.
         as_rigid: whether it is what as-rigid iterations have made of that (`warpflat.flattening.start`).
         mended: whether it says little of directions: many faces had to be turned back, or it is no development.
         notes: why a way was not taken, one sentence each.
@@ -81,6 +82,8 @@ class Development:
         """The layout from which the piece is relaxed, as text."""
         if self.method == "given":
             return "the layout given"
+        if self.method == "coarse":
+            return "the layout of a coarser mesh"
         layout = "a conformal map" if self.method == "conformal" else f"the {self.method} development"
         return f"{'as-rigid iterations from ' if self.as_rigid else ''}{layout}"
 

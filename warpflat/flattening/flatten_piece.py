@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from warpflat.core.arrays import IntArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, expect, expect_callback, nearest
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
-from warpflat.flattening.develop import Development
+from warpflat.flattening.develop import Development, flat_layout, turn_upright
 from warpflat.flattening.keep_apart import keep_apart
 from warpflat.flattening.progress import Progress, Stage
 from warpflat.flattening.relax_piece import relax_piece
@@ -30,17 +31,23 @@ from warpflat.model.membrane import Model, check_model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, unused_stretch
+from warpflat.solver.collapse import iterate_coarsenings
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.connectivity import border_of
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.io.read import read_surface
+from warpflat.surface.laplacian import factor_pays
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
+from warpflat.surface.untangle import untangle
 
 __all__ = ["flatten", "nearly_closed_notes"]
 
 # A border that lies flat around an area has a square of at least 4 pi times that; of half as much it is a hemisphere's.
 _LEAST_SHARE = 0.5
+# A larger piece is flattened on a coarser mesh first, which has at most so many vertices.
+_COARSE = 10_000
 
 
 def flatten(
@@ -61,8 +68,8 @@ def flatten(
 
     By default the relaxation begins with the paper's approximate implicit steps, eqs. (4) to (10), which end where by eq. (11) they gain
     little (`RelaxOptions.first_steps_gain`); L-BFGS over one factor takes the rest. The stages "steps" and "relax" tell both. With
-    `RelaxOptions(solver="paper")` the steps go on alone. A piece of more than 100,000 vertices starts from its minimum on a coarser mesh.
-    Where it would lie over itself, contact parts it, without steps. Strain energies are eqs. (1) to (3).
+    `RelaxOptions(solver="paper")` the steps go on alone. A piece of more than 10,000 vertices, or a grid of more than 100,000, starts from
+    its layout on a coarser mesh. Where it would lie over itself, contact parts it, without steps. Strain energies are eqs. (1) to (3).
 
     Args:
         surface: a `Surface`, or the path of a mesh file.
@@ -200,8 +207,10 @@ def develop_piece(
         model=settings.model,
         wear=settings.wear,
     )
-    development = choose_start(surface, line) if start is None else given_start(surface, line, start)
-    development = task.shrink_to_rest(development)
+    development = None if start is not None else _flatten_coarser(surface, line, settings)
+    if development is None:
+        development = choose_start(surface, line) if start is None else given_start(surface, line, start)
+        development = task.shrink_to_rest(development)
     network = task.build_network(development.positions)
     return DevelopedPiece(
         task=task,
@@ -213,6 +222,45 @@ def develop_piece(
     )
 
 
+def _flatten_coarser(surface: Surface, line: IntArray, settings: FlattenSettings) -> Development | None:
+    """Flatten a large piece on a coarser mesh and return that layout, interpolated; None where the piece is small or that fails.
+
+    A grid has a quarter of its vertices there, and starts from a coarser grid itself (nested iteration). Any other mesh goes at once to
+    one that is cheap to factor. Folds, overlaps and contact are settled there, with few vertices.
+
+    Args:
+        surface: the piece.
+        line: its datum.
+        settings: of the piece; the paper's steps alone start from its development.
+    """
+    if settings.options.solver == "paper" or len(surface.vertices) <= _COARSE or flat_layout(surface, line) is not None:
+        return None
+    steps = list(iterate_coarsenings(surface, _COARSE))
+    if rows_and_columns(surface) is not None:
+        steps = [] if factor_pays(surface) else steps[:1]
+    if not steps:
+        return None
+    into = line
+    for step in steps:
+        into = step.into[into]
+    # Adjacent vertices have collapsed into one, or into adjacent ones; where the line comes back to one, it goes on from there.
+    coarse_line: list[int] = []
+    for vertex in into.tolist():
+        if vertex in coarse_line:
+            del coarse_line[coarse_line.index(vertex) :]
+        coarse_line.append(vertex)
+    try:
+        flat = relax_developed(develop_piece(steps[-1].surface, coarse_line, settings, None))
+    except InputError:
+        # What is said of the piece names its own vertices.
+        return None
+    layout = flat.positions
+    for step in reversed(steps):
+        layout = step.prolongation @ layout
+    layout, left = untangle(surface, layout)
+    return None if left else Development(positions=turn_upright(layout, line), method="coarse", mended=True)
+
+
 def relax_developed(piece: DevelopedPiece) -> Flattening:
     """Relax a developed piece: the second half of `flatten`."""
     task, development = piece.task, piece.development
@@ -222,7 +270,6 @@ def relax_developed(piece: DevelopedPiece) -> Flattening:
         development.positions,
         direction_updates=task.max_direction_updates(mended=development.mended),
         needs_isotropic_start=task.needs_isotropic_start(development),
-        from_coarse=development.method != "given",
     )
     developed = Stage(
         name="develop",
@@ -245,7 +292,7 @@ def relax_developed(piece: DevelopedPiece) -> Flattening:
         network=end.network,
         development=development,
         positions=positions,
-        stages=(developed, *([] if end.coarse is None else [end.coarse]), *stages),
+        stages=(developed, *stages),
         history=np.array(task.history),
         notes=(*task.surface.notes, *piece.notes, *development.notes, *task.notes),
         wear=task.wear,

@@ -34,8 +34,8 @@ def keep_apart(
     Args:
         task: of the piece.
         end: the piece relaxed without contact.
-        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective and a conformal layout is
-            not [m].
+        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective [m]; else it starts from a
+            conformal or a harmonic layout.
         cut_sides: the vertices on the sides of its cuts; a cut whose sides lie over each other is left as it is.
 
     Returns:
@@ -53,7 +53,7 @@ def keep_apart(
     if not components_of(surface).any():
         starts.append(lambda: harmonic_layout(surface))
         if factor_pays(surface):
-            starts.insert(0, lambda: open_cracks(surface, conformal_layout(surface)))
+            starts.insert(1, lambda: open_cracks(surface, conformal_layout(surface)))
     for first in starts:
         state = Relaxation(network, task.options, start=first(), alignments=alignments)
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)

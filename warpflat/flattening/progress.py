@@ -15,12 +15,10 @@ from warpflat.solver.steps import Relaxation
 from warpflat.solver.stop import Remainder
 from warpflat.surface.mesh import Surface
 
-__all__ = ["COARSE", "CONTACT", "STEPS", "Progress", "Stage", "relaxation_words"]
+__all__ = ["CONTACT", "STEPS", "Progress", "Stage", "relaxation_words"]
 
 #: Name of the stage in which a piece that would lie over itself is kept from it.
 CONTACT = "contact"
-#: Name of the stage in which a piece too large to factor is relaxed on a coarser mesh first.
-COARSE = "coarse"
 #: Name of the stage of the paper's steps with which a relaxation begins.
 STEPS = "steps"
 
@@ -30,7 +28,7 @@ class Stage:
     """An entry of a piece's history: its energies at the end of a stage, and what the stage took.
 
     Attributes:
-        name: "develop", "coarse", "steps" (the paper's, with which a relaxation begins), "relax", "contact", "cut:NAME" and so on.
+        name: "develop", "steps" (the paper's, with which a relaxation begins), "relax", "contact", "cut:NAME" and so on.
         model_energy_j: what is minimised: springs and guard, or membrane and guard [J].
         guard_energy_j: the part of it that keeps faces unfolded [J].
         strain_energy_j: strain energy of the cloth as worn, eq. (3) of the paper [J].
@@ -71,20 +69,17 @@ def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:
     released: dict[str, float] = {}
     for stages in pieces:
         for before, stage in pairwise(stages):
-            if before["name"] not in ("develop", COARSE, STEPS) or stage["name"] not in (COARSE, STEPS, "relax"):
+            if before["name"] not in ("develop", STEPS) or stage["name"] not in (STEPS, "relax"):
                 break
             # A step is a unit of work, an iteration several.
             unit = "step" if stage["work_units"] <= stage["steps"] else "iteration"
-            unit = COARSE if stage["name"] == COARSE else unit
             counts[unit] = counts.get(unit, 0) + stage["steps"]
             released[unit] = released.get(unit, 0.0) + before["model_energy_j"] - stage["model_energy_j"]
-    words = [f"coarser meshes released {energy_words(released[COARSE])}"] if COARSE in released else []
-    words += [
+    return ", ".join(
         f"{format_count(counts[unit], unit)} released {energy_words(released[unit])}"
         for unit in ("step", "iteration")
         if counts.get(unit)
-    ]
-    return ", ".join(words)
+    )
 
 
 class Progress:

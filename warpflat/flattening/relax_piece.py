@@ -13,16 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.flattening.progress import COARSE, STEPS, Stage
+from warpflat.flattening.progress import STEPS
 from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
 from warpflat.model.network import SpringNetwork
-from warpflat.model.strain import strain_energy
-from warpflat.solver.coarse import coarse_minimum
 from warpflat.solver.grain import grain_alignments
 from warpflat.solver.minimise import relax
 from warpflat.solver.steps import Relaxation
 from warpflat.solver.stop import Outcome
-from warpflat.surface.laplacian import factor_pays
 
 __all__ = ["relax_piece"]
 
@@ -50,7 +47,6 @@ def relax_piece(
     *,
     direction_updates: int,
     needs_isotropic_start: bool = False,
-    from_coarse: bool = False,
 ) -> RelaxedPiece:
     """Relax a piece.
 
@@ -60,15 +56,14 @@ def relax_piece(
         start: #V by 2 [m].
         direction_updates: of the paper's steps alone, how many times directions are updated at most.
         needs_isotropic_start: whether it is first relaxed roughly as an isotropic sheet.
-        from_coarse: whether a piece too large to factor starts from its minimum on a coarser mesh.
     """
     piece = _Piece(task, network, start)
     started, begin = time.perf_counter(), piece.state.check_start().energies
     try:
-        outcome = piece.relax(direction_updates, needs_isotropic_start, from_coarse)
+        outcome = piece.relax(direction_updates, needs_isotropic_start)
     except _Stopped:
         outcome = piece.outcome_of_stop(started)
-    before = sum(each.seconds for each in (piece.coarse, outcome.first_steps) if each is not None)
+    before = 0.0 if outcome.first_steps is None else outcome.first_steps.seconds
     outcome = replace(outcome, seconds=time.perf_counter() - started - before)
     state = piece.state
     task.notes += [note for note in outcome.notes if note not in task.notes]
@@ -78,9 +73,7 @@ def relax_piece(
             f"the grain runs aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
             f'{state.network.fabric.name}; model = "membrane" measures that exactly'
         )
-    return RelaxedPiece(
-        network=state.network, positions=state.positions(), begin=begin, outcome=outcome, coarse=piece.coarse
-    )
+    return RelaxedPiece(network=state.network, positions=state.positions(), begin=begin, outcome=outcome)
 
 
 class _Piece:
@@ -88,7 +81,6 @@ class _Piece:
 
     def __init__(self, task: RelaxationTask, network: SpringNetwork, start: FloatArray) -> None:
         self._task = task
-        self.coarse: Stage | None = None
         self._put(network, start)
 
     def _put(self, network: SpringNetwork, start: FloatArray) -> Relaxation:
@@ -96,7 +88,7 @@ class _Piece:
         self.state = Relaxation(network, self._task.options, start=start, alignments=alignments)
         return self.state
 
-    def relax(self, direction_updates: int, isotropic_start: bool, from_coarse: bool) -> Outcome:
+    def relax(self, direction_updates: int, isotropic_start: bool) -> Outcome:
         task = self._task
         self._report("develop" if task.stage_name == "relax" else task.stage_name)
         if isotropic_start:
@@ -108,22 +100,6 @@ class _Piece:
                 if self._update_directions() <= _SETTLED_SHIFT:
                     break
             return self._relax()
-        if from_coarse and not factor_pays(task.surface):
-            began = time.perf_counter()
-            layout = coarse_minimum(self.state)
-            energies, seconds = self.state.energies(), time.perf_counter() - began
-            self.coarse = Stage(
-                name=COARSE,
-                model_energy_j=energies.potential,
-                guard_energy_j=energies.guard,
-                strain_energy_j=strain_energy(self.state.network, layout),
-                steps=0,
-                work_units=0.0,
-                seconds=seconds,
-                converged=True,
-                residual=None,
-            )
-            self._measure(layout, layout)
         follows = task.follows_layout(self.state.network)
         return self._relax(measure=self._measure if follows else None)
 

@@ -167,11 +167,9 @@ class RelaxedPiece:
         positions: #V by 2, the layout [m].
         begin: energies at the start.
         outcome: how it ended.
-        coarse: the stage on a coarser mesh from which it started; None if there was none.
     """
 
     network: SpringNetwork
     positions: FloatArray
     begin: Energies
     outcome: Outcome
-    coarse: Stage | None = None

@@ -30,7 +30,7 @@ still the matrix of the approximate implicit step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -129,7 +129,6 @@ class SpringNetwork:
         device: str | wp.Device | None = None,
         model: Model = "springs",
         stretch: FloatArray | None = None,
-        buckling_stiffness: float | None = None,
     ) -> SpringNetwork:
         """Make the network of a surface.
 
@@ -141,7 +140,6 @@ class SpringNetwork:
             model: "springs" or "membrane".
             stretch: #F by 2, intended length worn over length flat along warp and weft. Springs and cells are then at
                 rest in a pattern that is smaller by this factor.
-            buckling_stiffness: [N/m]; measured if not given.
 
         Raises:
             InputError: an unknown model.
@@ -157,7 +155,7 @@ class SpringNetwork:
                 fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, intended
             )
             springs, buckling_stiffness = with_stiffness(springs, cells, weights), np.inf
-        elif buckling_stiffness is None:
+        else:
             buckling_stiffness = (
                 isotropic_buckling_stiffness(surface, fabric)
                 if fabric.is_isotropic
@@ -185,7 +183,9 @@ class SpringNetwork:
         springs.rest_length = _on(device, s.listed_length, wp.float64)
         springs.active = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
-        self.replace_stiffness(s.listed_stiffness)
+        # Those of a membrane change with its layout.
+        k_ij = s.listed_stiffness if self.model == "springs" else s.listed_stiffness.copy()
+        self.springs.stiffness = _on(self.device, k_ij, wp.float64)
 
         cells = Cells()
         cells.face = _on(device, c.faces, wp.vec4i)
@@ -217,14 +217,6 @@ class SpringNetwork:
             # Strain beyond an intended stretch is small, and measured with the secant stiffness.
             held = self.held_stiffness.ravel()
             self.cloth = make_cloth(fabric, (warp, weft), device, curves=self.stretch is None, held=held)
-
-    def replace_stiffness(self, listed_stiffness: FloatArray) -> None:
-        """Give the springs other k_ij (2 #S [N/m]), before any launch is recorded over them."""
-        self.spring_arrays = replace(self.spring_arrays, listed_stiffness=listed_stiffness)
-        # Those of a membrane change with its layout.
-        k_ij = listed_stiffness if self.model == "springs" else listed_stiffness.copy()
-        self.springs.stiffness = _on(self.device, k_ij, wp.float64)
-        vars(self).pop("spring_stiffness", None)
 
     def update_stiffness(self, stiffness: FloatArray) -> None:
         """Set the k_ij of a membrane (#S [N/m]) on the device; `spring_arrays` keeps those of the beginning."""

@@ -378,7 +378,7 @@ def energy_table(metrics: Metrics) -> str:
         whole = next((stage["strain_energy_j"] for stage in piece["stages"] if stage["name"] == "relax"), 0.0)
         for stage in piece["stages"]:
             energy = stage["strain_energy_j"]
-            after = stage["name"] not in ("develop", "coarse", "steps", "relax") and whole > 0.0
+            after = stage["name"] not in ("develop", "steps", "relax") and whole > 0.0
             rows.append(
                 (
                     name,
