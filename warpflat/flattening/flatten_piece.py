@@ -46,7 +46,7 @@ __all__ = ["flatten", "nearly_closed_notes"]
 
 # A border that lies flat around an area has a square of at least 4 pi times that; of half as much it is a hemisphere's.
 _LEAST_SHARE = 0.5
-# A larger piece is flattened on a coarser mesh first, which has at most so many vertices.
+# A larger piece is flattened on a coarser mesh first; one of fewer vertices gains nothing by that.
 _COARSE = 10_000
 
 
@@ -223,41 +223,34 @@ def develop_piece(
 
 
 def _flatten_coarser(surface: Surface, line: IntArray, settings: FlattenSettings) -> Development | None:
-    """Flatten a large piece on a coarser mesh and return that layout, interpolated; None where the piece is small or that fails.
+    """Flatten a large piece on a mesh of a quarter of its vertices and return that layout, interpolated; None where the piece is small or
+    that fails.
 
-    A grid has a quarter of its vertices there, and starts from a coarser grid itself (nested iteration). Any other mesh goes at once to
-    one that is cheap to factor. Folds, overlaps and contact are settled there, with few vertices.
+    That mesh starts from a coarser one itself (nested iteration). Folds, overlaps and contact are settled there, with few vertices.
 
     Args:
         surface: the piece.
         line: its datum.
         settings: of the piece; the paper's steps alone start from its development.
     """
-    if settings.options.solver == "paper" or len(surface.vertices) <= _COARSE or flat_layout(surface, line) is not None:
+    is_near = rows_and_columns(surface) is not None and factor_pays(surface)
+    if settings.options.solver == "paper" or is_near or len(surface.vertices) <= _COARSE:
         return None
-    steps = list(iterate_coarsenings(surface, _COARSE))
-    if rows_and_columns(surface) is not None:
-        steps = [] if factor_pays(surface) else steps[:1]
-    if not steps:
+    step = None if flat_layout(surface, line) is not None else next(iterate_coarsenings(surface), None)
+    if step is None:
         return None
-    into = line
-    for step in steps:
-        into = step.into[into]
     # Adjacent vertices have collapsed into one, or into adjacent ones; where the line comes back to one, it goes on from there.
     coarse_line: list[int] = []
-    for vertex in into.tolist():
+    for vertex in step.into[line].tolist():
         if vertex in coarse_line:
             del coarse_line[coarse_line.index(vertex) :]
         coarse_line.append(vertex)
     try:
-        flat = relax_developed(develop_piece(steps[-1].surface, coarse_line, settings, None))
+        flat = relax_developed(develop_piece(step.surface, coarse_line, settings, None))
     except InputError:
         # What is said of the piece names its own vertices.
         return None
-    layout = flat.positions
-    for step in reversed(steps):
-        layout = step.prolongation @ layout
-    layout, left = untangle(surface, layout)
+    layout, left = untangle(surface, step.prolongation @ flat.positions)
     return None if left else Development(positions=turn_upright(layout, line), method="coarse", mended=True)
 
 
