@@ -184,7 +184,7 @@ def closures(pieces: Mapping[str, Piece]) -> list[Button]:
     A cuff or a collar's stand has its button at one end and its buttonhole at the other. Both halves of a front are marked alike, with
     buttons in their buttonholes; one lies over the other, and the buttons of the same number meet.
     """
-    found, fronts = list[Button](), dict[str, dict[str, FloatArray]]()
+    found, fronts = list[Button](), dict[tuple[str, ...], list[str]]()
     for name, piece in pieces.items():
         marks = {title: point for title, point in piece.marks.items() if title.split()[:1] == [_BUTTON]}
         holes = [
@@ -196,19 +196,19 @@ def closures(pieces: Mapping[str, Piece]) -> list[Button]:
             any(np.linalg.norm(nearest_on_polyline(mark, hole) - mark) < _ON_HOLE for hole in holes)
             for mark in marks.values()
         ):
-            fronts[name] = marks
+            fronts.setdefault(tuple(sorted(marks)), []).append(name)
         elif len(marks) == len(holes):
             found += [
                 ((name, mark), (name, hole.mean(axis=0))) for mark, hole in zip(marks.values(), holes, strict=True)
             ]
-    while fronts:
-        name, marks = fronts.popitem()
-        twin = name.removesuffix(MIRRORED) if name.endswith(MIRRORED) else name + MIRRORED
-        alike = [each for each, its in fronts.items() if its.keys() == marks.keys()]
-        other = twin if twin in alike else alike[0] if len(alike) == 1 else ""
-        if other:
-            its = fronts.pop(other)
-            found += [((name, marks[title]), (other, its[title])) for title in marks]
+    for titles, alike in fronts.items():
+        twins = [(name, name + MIRRORED) for name in alike if name + MIRRORED in alike]
+        left = [name for name in alike if not any(name in pair for pair in twins)]
+        found += [
+            ((one, pieces[one].marks[title]), (other, pieces[other].marks[title]))
+            for one, other in ([*twins, (left[0], left[1])] if len(left) == 2 else twins)
+            for title in titles
+        ]
     # What others mark beyond an outline, or on it, closes nothing.
     inside = {name: Polygon(piece.outline).buffer(-_ON_OUTLINE) for name, piece in pieces.items() if piece.marks}
     return [layers for layers in found if all(contains_xy(inside[name], *point) for name, point in layers)]
