@@ -17,10 +17,10 @@ from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.draping.wrap_pieces import continue_pieces
+from warpflat.draping.wrap_pieces import continue_pieces, hood_beside_head
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
-from warpflat.pattern.whole_pieces import whole_pieces
+from warpflat.pattern.whole_pieces import turn_over, whole_pieces
 from warpflat.surface.connectivity import border_loops, join_labels
 
 NAMES = ("low", "stand", "high", "side")
@@ -281,6 +281,39 @@ def test_a_fall_starts_turned_down_over_its_stand():
         found = continue_pieces(placed, meshes, welds, turned)
         assert np.sort(found["collar_stand"][:, 1])[[0, -1]] == pytest.approx([0.3, 0.33], abs=1e-6)
         assert np.sort(found["collar"][:, 1])[[0, -1]] == pytest.approx([low, high], abs=1e-6)
+
+
+def test_the_halves_of_a_hood_start_beside_the_head():
+    """Both face forwards as they are drawn, also the half that is turned over; a strip over the crown goes on from them."""
+    neckline = np.array([[0.0, 1.4, -0.06], [0.05, 1.39, -0.02], [0.06, 1.37, 0.04]])
+    back = rectangle("back", 0.2, 0.3)
+    half = rectangle("hood", 0.2, 0.3, role="hood")
+    halves = {"hood": half, "hood mirrored": turn_over(half), "strip": rectangle("strip", 0.1, 0.3, role="hood")}
+    meshes, _ = mesh_pieces({"back": back, **halves}, [], 0.05)
+    rows = {name: meshes[name].edges["low"] for name in halves}
+    rows["hood mirrored"] = rows["hood mirrored"][::-1]
+    places = np.column_stack(
+        [np.interp(np.linspace(0.0, 2.0, len(rows["hood"])), range(3), column) for column in neckline.T]
+    )
+    low = meshes["back"].edges["low"]
+    around = np.zeros((len(meshes["back"].points), 3))
+    around[low] = places
+    across = np.array([-1.0, 1.0, 1.0])
+    welds = [[[("hood", int(a)), ("back", int(b))] for a, b in zip(rows["hood"], low, strict=True)]]
+    found = hood_beside_head({"back": around}, meshes, welds, set(halves), 0.09)
+    assert set(found) == {"hood"}
+    others = [[[("hood mirrored", int(a)), ("back", int(b))] for a, b in zip(rows["hood mirrored"], low, strict=True)]]
+    found |= hood_beside_head({"back": around * across}, meshes, others, set(halves), 0.09)
+    for name, side in (("hood", 1.0), ("hood mirrored", -1.0)):
+        np.testing.assert_allclose(found[name][:, 0], 0.09 * side)
+        np.testing.assert_allclose(np.ptp(found[name][:, 1:], axis=0), [0.3, 0.2])
+        assert found[name][rows[name], 1].max() < 1.4
+        assert found[name][rows[name][-1], 2] - found[name][rows[name][0], 2] == pytest.approx(0.2)
+    strip = [
+        [("strip", int(k)), ("back", int(b))] for k, b in zip(rows["strip"], low[: len(rows["strip"])], strict=False)
+    ]
+    middle = around - [0.5 * (places[: len(strip), 0].min() + places[: len(strip), 0].max()), 0.0, 0.0]
+    assert not hood_beside_head({"back": middle}, meshes, [strip], set(halves), 0.09)
 
 
 def test_a_drape_begins_in_one_layer_right_side_out_with_its_collar_turned_down():
