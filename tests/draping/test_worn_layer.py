@@ -16,8 +16,10 @@ from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
+from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.draping.wrap_pieces import continue_pieces, hood_beside_head
+from warpflat.mannequin.head import head_of
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.whole_pieces import turn_over, whole_pieces
@@ -132,6 +134,32 @@ def test_what_others_mark_beyond_a_piece_closes_nothing():
         assert len(closures({"cuff": cuff})) == (button[0] < 0.25), button
 
 
+def wrapped(name: str = "front") -> Piece:
+    """Half of a front that runs 8 cm beyond its centre line, with a tie at its upper corner."""
+    centre = np.array([[0.2, 0.0], [0.2, 0.5]])
+    return rectangle(
+        name, 0.28, 0.5, quantity=2, marks={"tie": np.array([0.28, 0.5])}, internal_lines={"centre front": centre}
+    )
+
+
+def test_a_wrap_is_held_where_its_ties_begin():
+    """Each half's corner lies on the other one, as far from the centre line."""
+    one, other = wrapped(), replace(turn_over(wrapped()), name="front mirrored")
+    found = closures({"front": one, "front mirrored": other})
+    assert [tuple(name for name, _ in layers) for layers in found] == [
+        ("front", "front mirrored"),
+        ("front mirrored", "front"),
+    ]
+    for ((name, at), (_, its)), side in zip(found, (1.0, -1.0), strict=True):
+        np.testing.assert_allclose(at, [0.27 * side, 0.49], atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(its, [-0.13 * side, 0.49], atol=1e-9, err_msg=name)
+    # Without the other half, a centre line or a place within, nothing is tied.
+    bare, thin = replace(other, internal_lines={}), rectangle("front", 0.28, 0.01, marks={"tie": np.zeros(2)})
+    thin = replace(thin, internal_lines=one.internal_lines)
+    for pieces in ((one,), (one, bare), (thin, replace(turn_over(thin), name="front mirrored"))):
+        assert not closures({piece.name: piece for piece in pieces})
+
+
 def test_marks_lie_on_what_is_cut_turned_over():
     front = rectangle("front", 0.2, 0.1, quantity=2, marks={"button": np.array([0.15, 0.04])})
     band = rectangle("band", 0.2, 0.1, marks={"button": np.array([0.15, 0.04])})
@@ -215,6 +243,65 @@ def test_what_lies_within_is_left_out():
     assert set(kept["front"].internal_lines) == {"waist"}
     assert [hole.name for hole in kept["front"].holes] == ["eye"]
     assert [dart.name for dart in kept["front"].darts] == ["kept"]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_fills_a_cut_off_corner_ends_at_the_pockets_opening(turned: bool):
+    """Of the half of a bag that goes on behind the corner, the corner alone is worn, and it closes the opening."""
+    front_ring = {"low": [(0.0, 0.0), (0.3, 0.0)], "outseam": [(0.3, 0.0), (0.3, 0.3)]}
+    front_ring |= {
+        "opening": [(0.3, 0.3), (0.27, 0.36), (0.2, 0.4)],
+        "waist": [(0.2, 0.4), (0.0, 0.4)],
+        "crotch": [(0.0, 0.4), (0.0, 0.0)],
+    }
+    corner_ring = {
+        "under": [(0.1, 0.4), (0.1, 0.2)],
+        "rim": [(0.1, 0.2), (0.3, 0.2)],
+        "outseam under": [(0.3, 0.2), (0.3, 0.3)],
+    }
+    corner_ring |= {
+        "outseam": [(0.3, 0.3), (0.3, 0.4)],
+        "waist": [(0.3, 0.4), (0.2, 0.4)],
+        "waist under": [(0.2, 0.4), (0.1, 0.4)],
+    }
+    front, corner = (
+        Piece(name=name, role=role, edges=[Edge(name=each, points=np.array(points)) for each, points in ring.items()])
+        for name, role, ring in (("front", "shell", front_ring), ("corner", "pocket", corner_ring))
+    )
+    bag, back = (
+        rectangle("bag", 0.2, 0.1, role="pocket"),
+        rectangle("back", 0.2, 0.4, ("low", "right", "waist", "left")),
+    )
+    band = rectangle("band", 0.5, 0.03)
+    pieces = {piece.name: piece for piece in (front, corner, bag, back, band)}
+    if turned:
+        pieces = {name: replace(turn_over(piece), name=name) for name, piece in pieces.items()}
+    rows = [
+        tuple(SeamSide(piece=name, edge=edge, reversed=True) for name, edge in row)
+        for row in ((("corner", "outseam"), ("front", "outseam")), (("corner", "waist"), ("front", "waist")))
+    ]
+    if turned:
+        rows = [tuple(replace(side, reversed=False) for side in row) for row in rows]
+    seams = [
+        Seam(name="outseam", sides=((SeamSide(piece="back", edge="left"),), rows[0])),
+        Seam(name="waist", sides=((SeamSide(piece="band", edge="low"),), rows[1])),
+        joined("opening", "front.opening", "bag.low"), joined("rim", "corner.rim", "bag.high"),
+    ]  # fmt: skip
+    kept, left, notes = in_one_layer(pieces, seams, ())
+    assert set(kept) == {"front", "corner", "back", "band"}
+    assert notes == ["worn in one layer: bag"]
+    assert [seam.name for seam in left] == ["outseam", "waist", "opening"]
+    assert {edge.name: edge.length for edge in kept["corner"].edges} == pytest.approx(
+        {"outseam": 0.1, "waist": 0.1, "opening": np.hypot(0.03, 0.06) + np.hypot(0.07, 0.04)}
+    )
+    one, other = (side[0] for side in left[-1].sides)
+    lines = [kept[side.piece].edge(side.edge).points[:: -1 if side.reversed else 1] for side in (one, other)]
+    np.testing.assert_allclose(lines[0], lines[1], atol=1e-12)
+    # Nothing is cut that fits no opening.
+    shorter = {**front_ring, "outseam": [(0.3, 0.0), (0.3, 0.34)], "opening": [(0.3, 0.34), (0.2, 0.4)]}
+    front = Piece(name="front", edges=[Edge(name=name, points=np.array(points)) for name, points in shorter.items()])
+    kept, _, _ = in_one_layer(pieces | {"front": turn_over(front) if turned else front}, seams, ())
+    assert len(kept["corner"].edges) == 6
 
 
 def test_a_second_layer_is_left_out_where_it_would_have_no_place_of_its_own():
@@ -355,3 +442,40 @@ def test_a_drape_begins_in_one_layer_right_side_out_with_its_collar_turned_down(
     assert begins["collar_stand"].max() > 0.02
     assert begins["collar"].min() < -0.01
     assert begins["cuff"].min() < -0.34
+
+
+def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
+    body = body_of_size(30.0)
+    hip, neck = body.levels()["hip"], body.levels()["neck"].height
+    radius = (hip.girth + 0.1) / (2.0 * np.pi)
+    shell = rectangle("shell", 2.0 * np.pi * radius, 0.3)
+    hood = rectangle("hood", np.pi * radius, 0.3, ("neck", "front edge", "upper", "crown"), quantity=2, role="hood")
+    chain = (SeamSide(piece="hood", edge="neck", mirrored=True, reversed=True), SeamSide(piece="hood", edge="neck"))
+    seams = [
+        Seam(name="hood", sides=((SeamSide(piece="shell", edge="high", reversed=True),), chain)),
+        joined("side", "shell.stand", "shell.side"),
+    ]
+    pattern = Pattern(name="x", pieces={"": [shell, hood]}, seams=seams)
+    begins = list[dict[str, FloatArray]]()
+
+    def kept(cloth: SewnCloth, start: FloatArray, *_: object, **__: object) -> FloatArray:
+        begins.append({name: start[cloth.welded[rows]] for name, rows in cloth.piece_vertices.items()})
+        return start
+
+    def around(points: FloatArray) -> FloatArray:
+        angle, height = points[:, 0] / radius - np.pi, points[:, 1] + neck - 0.4
+        return np.column_stack([-radius * np.sin(angle), height, -radius * np.cos(angle)])
+
+    monkeypatch.setattr("warpflat.draping.drape_pattern.draw_together", kept)
+    for role in ("hood", "collar"):
+        pattern = replace(pattern, pieces={"": [shell, replace(hood, role=role)]})
+        worn, _ = drape_pattern(
+            pattern, body, fabric=warpflat.find_fabric("woven"),
+            placement=Placement(lifts={"shell": around}, spacing=0.04, hold=["shell.high"]),
+            options=DrapeOptions(max_steps=1), device=DEVICE,
+        )  # fmt: skip
+        assert (worn.body.vertices[:, 1].max() > body.lengths["stature"] - 0.001) == (role == "hood")
+    far = np.abs(head_of(body)[0][:, 0]).max() + 0.01
+    for name, side in (("hood", -1.0), ("hood mirrored", 1.0)):
+        assert np.median(begins[0][name][:, 0]) == pytest.approx(side * far), name
+        assert np.abs(begins[1][name][:, 0]).max() > 1.2 * far

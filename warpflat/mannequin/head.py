@@ -41,8 +41,8 @@ def head_of(mannequin: Mannequin) -> tuple[FloatArray, IntArray] | None:
     behind = mean[np.abs(scale * mean[:, 1] + lift - nape[1]) < 0.01 * scale, 2].min()
     vertices = head + np.array([0.0, lift, nape[2] - scale * behind])
     hull = ConvexHull(vertices)
-    used, faces = np.unique(hull.simplices, return_inverse=True)
-    faces = faces.reshape(-1, 3).astype(np.int32)
+    used, rows = np.unique(hull.simplices, return_inverse=True)
+    faces: IntArray = rows.reshape(-1, 3).astype(np.int32)
     corner = vertices[used][faces]
     inwards = (
         np.einsum("ta,ta->t", np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), hull.equations[:, :3])
