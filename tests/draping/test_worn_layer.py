@@ -16,12 +16,13 @@ from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.moved_pattern import moved_outlines
 from warpflat.draping.options import DrapeOptions
+from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.draping.wrap_pieces import continue_pieces, hood_beside_head
 from warpflat.mannequin.head import head_of
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Elastic, Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.whole_pieces import turn_over, whole_pieces
 from warpflat.surface.connectivity import border_loops, join_labels
 
@@ -442,6 +443,37 @@ def test_a_drape_begins_in_one_layer_right_side_out_with_its_collar_turned_down(
     assert begins["collar_stand"].max() > 0.02
     assert begins["collar"].min() < -0.01
     assert begins["cuff"].min() < -0.34
+
+
+def test_an_elastic_draws_its_edge_to_the_body_at_its_height_and_holds_it():
+    """A tube that is far too wide hangs from it; without it, the tube falls."""
+    body, girth = body_of_size(30.0), 1.5
+    hip = body.levels()["hip"].height
+    tube = rectangle("tube", girth, 0.15, ("low", "right", "waist", "left"))
+    elastic = Elastic(edge="waist", width=0.03, lengths={"": 0.7})
+    pattern = Pattern(
+        name="x", pieces={"": [tube]}, seams=[joined("side", "tube.left", "tube.right")], elastics=[elastic]
+    )
+
+    def around(points: FloatArray) -> FloatArray:
+        radius = girth / (2.0 * np.pi)
+        return np.column_stack(
+            [radius * np.sin(points[:, 0] / radius), hip + points[:, 1], radius * np.cos(points[:, 0] / radius)]
+        )
+
+    def worn(pattern: Pattern) -> tuple[Drape, list[str]]:
+        return drape_pattern(
+            pattern, body, fabric=warpflat.find_fabric("woven"), placement=Placement(lifts={"tube": around}, spacing=0.04),
+            options=DrapeOptions(max_steps=2000), device=DEVICE,
+        )  # fmt: skip
+
+    drape, notes = worn(pattern)
+    waist = drape.positions[drape.cloth.lines["tube.waist"]]
+    assert notes[-1] == "held by an elastic: waist"
+    assert np.abs(drape.body.gaps(waist)).max() < 0.002
+    assert np.ptp(waist[:, 1]) < 0.01
+    with pytest.raises(InputError, match="falls off"):
+        worn(replace(pattern, elastics=()))
 
 
 def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
