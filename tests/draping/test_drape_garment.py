@@ -18,7 +18,7 @@ from warpflat.core.errors import InputError
 from warpflat.draping.frames import choose_frames, write_drape_frames
 from warpflat.draping.places import find_places
 from warpflat.draping.result import HOLLOW_REACH, hollow_depths
-from warpflat.draping.sewn_cloth import sew_cloth
+from warpflat.draping.sewn_cloth import SewnCloth, sew_cloth
 from warpflat.surface.connectivity import border_loops
 
 
@@ -55,6 +55,30 @@ def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
             cloth, worn.areas, misfit=lift, meant_to_touch=near, bridged=none, lift=lift, gap=lift, strains={}
         )
         assert words in place.words
+
+
+@pytest.mark.parametrize(
+    ("faces", "words"),
+    [
+        ([[0, 1, 2], [0, 1, 3]], "gapes"),
+        ([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], "stands off"),
+    ],
+    ids=["sewn twisted", "closed"],
+)
+def test_cloth_without_loops_around_it_has_places_too(faces: list[list[int]], words: str):
+    """A seam that joins right sides to wrong ones leaves borders that do not follow each other; a ball has none."""
+    faces4, ones = np.column_stack([np.array(faces, dtype=np.int32), np.full(len(faces), -1, np.int32)]), np.ones(4)
+    cloth = SewnCloth(
+        fabric=warpflat.find_fabric("woven"), designed=0.1 * np.eye(4, 3), faces=faces4, flat_faces=faces4,
+        flat=0.1 * np.eye(4, 2), welded=np.arange(4), warp=np.zeros((len(faces), 2)), weft=np.zeros((len(faces), 2)),
+        piece_faces={"front": slice(0, len(faces))}, piece_vertices={"front": slice(0, 4)},
+        lines={"front.hem": np.array([0, 1])},
+    )  # fmt: skip
+    (place,) = find_places(
+        cloth, 0.01 * ones, misfit=0.02 * ones, meant_to_touch=ones > 0.0, bridged=0.0 * ones, lift=0.02 * ones,
+        gap=0.02 * ones, strains={},
+    )  # fmt: skip
+    assert words in place.words
 
 
 def test_a_bodice_without_darts_gapes_at_the_armholes(worn: warpflat.Drape):

@@ -2,7 +2,8 @@
 
 The kinds: "dxf" and "svg" (their edges are listed), "sewing" (a TOML file of seams beside a DXF), "garmentcode" (JSON of another
 program), "rul" (grade rules, which are no pattern), and the members of a run's folder, "frames", "lift", "runmetrics" and
-"runpattern", each read by the commands that read it.
+"runpattern", each read by the commands that read it. "worn" is a pattern with all by which a drape chooses what is worn in one layer:
+buttons, folds, facings, strips, collars and pockets.
 """
 
 from __future__ import annotations
@@ -11,12 +12,19 @@ import functools
 import json
 import math
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from random import Random
+from typing import Any
+
+import numpy as np
 
 from warpflat.cli.main import main
+from warpflat.export.pattern_json import pattern_json
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.piece_parts import Edge, Hole
+from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
 from .promise import Case
 
@@ -24,6 +32,7 @@ __all__ = ["FOREIGN_ENDINGS", "FOREIGN_SHARES", "foreign_bounds", "foreign_case"
 
 FOREIGN_SHARES = {
     "dxf": 10, "svg": 10, "sewing": 3, "garmentcode": 3, "rul": 1, "frames": 3, "lift": 4, "runmetrics": 4, "runpattern": 3,
+    "worn": 2,
 }  # fmt: skip
 FOREIGN_ENDINGS = {
     ".dxf": "dxf",
@@ -35,6 +44,7 @@ FOREIGN_ENDINGS = {
     ".lift.obj": "lift",
     ".runmetrics.json": "runmetrics",
     ".runpattern.json": "runpattern",
+    ".worn.json": "worn",
 }
 _MEMBERS = {
     "frames": "frames.usdc",
@@ -194,11 +204,106 @@ def run_folder() -> dict[str, bytes]:
         return {file.name: file.read_bytes() for file in (Path(folder) / "out").iterdir()}
 
 
+@functools.cache
+def _worn() -> bytes:
+    """A tube with a button stand and a facing grown on, a collar and its stand, a pocket, a binding and a facing."""
+    height, half = 0.09, 0.475
+
+    def piece(name: str, ring: Sequence[tuple[float, float]], names: Sequence[str], **more: Any) -> Piece:
+        closed = np.array([*ring, ring[0]])
+        edges = [Edge(name=each, points=closed[k : k + 2]) for k, each in enumerate(names)]
+        return Piece(name=name, edges=edges, **more)
+
+    def strip(name: str, long: float, high: float, **more: Any) -> Piece:
+        return piece(name, [(0, 0), (long, 0), (long, high), (0, high)], ("low", "right", "high", "left"), **more)
+
+    def seam(name: str, *rows: str) -> Seam:
+        """Edges as "piece.edge", those that run against the first side's with a "-", those of a turned piece with a "~"."""
+        sides = [
+            tuple(
+                SeamSide(piece=p.strip("-~"), edge=e, reversed="-" in p, mirrored="~" in p)
+                for p, e in (one.split(".") for one in row.split(" + "))
+            )
+            for row in rows
+        ]
+        return Seam(name=name, sides=(sides[0], sides[1]))
+
+    quarter, fold, facing = 0.5 * half, 0.5 * half + 0.018, 0.5 * half + 0.05
+    marks = {"button": np.array([quarter, 0.03]), "button 2": np.array([quarter, 0.07]), "notch": np.array([0.1, 0.05])}
+    lines = {
+        f"buttonhole{ending}": np.array([[quarter + 0.003, y], [quarter - 0.012, y]])
+        for ending, y in (("", 0.03), (" 2", 0.07))
+    }
+    lines |= {"fold line": np.array([[fold, 0.0], [fold, height]]), "waist": np.array([[0.0, 0.04], [fold, 0.04]])}
+    ring = [(0.0, 0.0), (fold, 0.0), (facing, 0.0), (facing, height), (fold, height), (0.0, height)]
+    names = ("low", "facing low", "stand", "facing high", "high", "side")
+    hole = Hole(name="eye", points=np.array([[0.1, 0.02], [0.105, 0.045], [0.1, 0.07], [0.095, 0.045]]), kind="dart")
+    binding = strip("binding", half, 0.02, role="strip")
+    low, right, high, left = binding.edges
+    binding = replace(binding, edges=[low, right, replace(high, kind="cut", allowance=0.0), left])
+    pieces = [
+        piece("front", ring, names, quantity=2, marks=marks, internal_lines=lines),
+        strip("back", half, height, holes=[hole]),
+        strip("collar_stand", 2 * fold + half, 0.03, role="collar", marks={"button": np.array([0.01, 0.015])},
+              internal_lines={"buttonhole": np.array([[2 * fold + half - 0.015, 0.015], [2 * fold + half - 0.005, 0.015]])}),
+        strip("collar", 2 * fold + half, 0.05, role="collar", quantity=2),
+        binding, strip("bag", 0.1, 0.05, role="pocket"),
+        strip("neck facing", half, 0.04, role="facing"),
+    ]  # fmt: skip
+    seams = [
+        seam("side left", "back.left", "~front.side"), seam("side right", "-front.side", "back.right"),
+        seam("stand", "collar_stand.low", "~front.high + -back.high + -front.high"),
+        seam("collar", "collar.low", "-collar_stand.high"), seam("collar edge", "collar.high", "~collar.high"),
+        seam("binding", "binding.low", "-back.low"), seam("bag", "bag.left", "-bag.right"),
+    ]  # fmt: skip
+    pattern = Pattern(name="worn", pieces={"": pieces}, seams=seams)
+    return json.dumps(pattern_json(draft_garment(pattern))).encode()
+
+
+def _moved_marks(random: Random, pattern: Any) -> Any:
+    """What a drape reads of the pieces, moved, renamed, swapped or of another kind, each still a value that its key may have."""
+    for _ in range(random.choice((1, 1, 2, 4))):
+        piece = random.choice(list(pattern["sizes"][""].values()))
+        lines, drills = piece["internal_lines"], piece["drill_holes"]
+        title = random.choice(
+            ("button", "buttonhole", "button 2", "button mirrored", "fold line", "buttonhole end 1", " ", "waist")
+        )
+        place = [random.choice((0.0, 0.03, 1e-7, random.uniform(-0.3, 0.5))) for _ in range(2)]
+        what = random.randrange(8)
+        if what == 0 and drills:
+            random.choice(drills)["at"] = place
+        elif what == 1 and drills:
+            old = random.choice(drills)
+            piece["marks"] = [title if mark == old["name"] else mark for mark in piece["marks"]]
+            old["name"] = title
+        elif what == 2:
+            drills.append({"name": title, "at": place})
+            piece["marks"].append(title)
+        elif what == 3 and lines:
+            random.choice(random.choice(list(lines.values())))[:] = place
+        elif what == 4:
+            lines[title] = [place, [random.uniform(-0.3, 0.5), random.choice((place[1], 0.02))]] * random.choice(
+                (1, 1, 3)
+            )
+        elif what == 5 and lines:
+            lines[title] = lines.pop(random.choice(list(lines)))
+        elif what == 6:
+            piece["role"] = random.choice(("shell", "facing", "interfacing", "strip", "collar", "pocket", "cuff"))
+            piece["quantity"] = random.choice((1, 2, 3, 4))
+            piece["paired"] = random.choice((True, False))
+        else:
+            edge = random.choice(piece["edges"])
+            edge["allowance"], edge["kind"] = random.choice((0.0, 0.01)), random.choice(("seam", "cut", "hem", "fold"))
+    return pattern
+
+
 def _seeds(kind: str) -> tuple[bytes, ...]:
     if kind in _MEMBERS:
         return (run_folder()[_MEMBERS[kind]],)
     if kind in ("dxf", "svg"):
         return run_folder()[f"bodice.{kind}"], *((_dxf(), _dxf()) if kind == "dxf" else (_SVG, _FREESEWING))
+    if kind == "worn":
+        return (_worn(),)
     return {"sewing": (_SEWING.encode(),), "garmentcode": (json.dumps(_GARMENTCODE).encode(),), "rul": (_RUL,)}[kind]
 
 
@@ -209,7 +314,9 @@ def foreign_case(kind: str, random: Random) -> Case:
     seed = random.choice(_seeds(kind))
     if kind == "sewing":
         content = damaged_toml(random, seed.decode())
-    elif kind in ("garmentcode", "runmetrics", "runpattern"):
+    elif kind == "worn" and random.randrange(4):
+        content = json.dumps(_moved_marks(random, json.loads(seed))).encode()
+    elif kind in ("garmentcode", "runmetrics", "runpattern", "worn"):
         content = damaged_json(random, json.loads(seed))
     else:
         content = damaged_bytes(random, seed)
@@ -236,6 +343,9 @@ def foreign_cases_of_file(kind: str, content: bytes, *, name: str = "odd", refus
         return [case(("drape", "p.dxf", "--seams", file, "--edges"), {"p.dxf": _dxf(), file: content}, file)]
     if kind == "rul":
         return [case(("drape", file), {file: content}, file)]
+    if kind == "worn":
+        drape = ("drape", file, "--body", "EU 38", "--out", "worn", "--quiet")
+        return [case(drape, {file: content}, file)]
     listed = case(("drape", file, "--edges"), {file: content}, file)
     if kind == "garmentcode":
         formats = ("--format", "svg", "--format", "dxf", "--format", "json")

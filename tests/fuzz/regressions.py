@@ -11,6 +11,7 @@ NAME.sewn.obj                                                        taken as a 
 NAME.dxf, .svg, .garmentcode.json                                    its edges listed by `drape --edges`; .rul too
 NAME.sewing.toml                                                     beside a DXF
 NAME.frames.usdc, .lift.obj, .runmetrics.json, .runpattern.json      in the folder of a run: reviewed, exported, draped
+NAME.worn.json                                                       a pattern, draped on a body
 NAME.arguments.json                                                  a list of strings: the command line
 NAME.studio.json                                                     done to the studio, as studio_messages says
 NAME.folder.json                                                     files, links and command line (see `folders.py`)

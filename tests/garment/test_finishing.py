@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from bodies import body_of_size
 
@@ -17,6 +18,7 @@ from warpflat.mannequin.forms import shipped_form
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.fitting import drawn_length
 from warpflat.pattern.pieces import Pattern
+from warpflat.pattern.sewing_order import notions
 
 ZIP = Opening(kind="zip", line="centre back", length=0.4)
 FACING = Finishing(kind="facing", edge="neck", width=0.055)
@@ -104,6 +106,10 @@ def test_waistband_ends_at_the_zip(parted: Garment):
     assert band.edge("upper").length == pytest.approx(length + 0.025)
     assert "waistband ends" not in {seam.name for seam in pattern.seams}
     assert all(report.matches for report in draft_garment(pattern).seams)
+    # What runs past one end has the button, and the buttonhole lies as far from the other one: closed, both ends meet at the zip.
+    np.testing.assert_allclose(band.marks["button"], [length + 0.0125, 0.015])
+    np.testing.assert_allclose(band.internal_lines["buttonhole"].mean(axis=0), [0.0125, 0.015])
+    assert "1 hook and bar" not in notions(draft_garment(pattern), "")
 
 
 def test_armholes_get_a_binding_each(parted: Garment):

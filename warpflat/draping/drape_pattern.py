@@ -13,6 +13,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
 from warpflat.core.short_repr import short_repr
+from warpflat.core.text import without_side
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
 from warpflat.draping.lift import Lift, whole_lifts
@@ -22,8 +23,9 @@ from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, wrap_pieces
+from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, hood_beside_head, wrap_pieces
 from warpflat.fabric.fabric import Fabric
+from warpflat.mannequin.head import head_of
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.pieces import Pattern, Piece
 from warpflat.pattern.whole_pieces import MIRRORED, whole_pieces
@@ -38,6 +40,10 @@ _SIZES = (0.05, 10.0)
 _WITHIN, _DEEP = 0.05, 0.01
 # Nor where its top, from this share of its vertices on, lies so far [m] off, or less than this share of it looks as the skin does.
 _TOP, _OFF, _ALIKE = 0.9, 0.05, 0.75
+# So often is what an elastic draws in moved towards the body, level.
+_LEVELLED = 20
+# The halves of a hood start this far beside the head [m].
+_BESIDE_HEAD = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +125,11 @@ def drape_pattern(
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
     surface = None if body is None else body.surface()
     solid = None if surface is None else Body(surface.vertices, surface.faces, device=where)
+    hood = {name for name, piece in pieces.items() if piece.role == "hood"}
+    head = head_of(body) if body is not None and hood else None
+    if surface is not None and head is not None:
+        faces = np.column_stack([head[1] + len(surface.vertices), np.full(len(head[1]), -1)])
+        solid = Body(np.concatenate([surface.vertices, head[0]]), np.concatenate([surface.faces, faces]), device=where)
     # On another body than that of its designed surface a garment starts as one that has none, if it can.
     placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
     lifted = len(placed) == len(meshes) or bool(placed and body is not None)
@@ -138,6 +149,10 @@ def drape_pattern(
                 notes.append(f"{elsewhere}: the pieces are placed by their seams")
             lifted = False
     drafted = [name for name in meshes if name not in placed]
+    if head is not None:
+        # A hood is worn up.
+        halves = hood_beside_head(placed, meshes, welds, hood, float(np.abs(head[0][:, 0]).max()) + _BESIDE_HEAD)
+        placed = {name: points for name, points in placed.items() if name not in hood} | halves
     placed = continue_pieces(placed, meshes, welds, turned_down(pieces))
     # The meshes are joined along their seams; vertices that become one start in the middle of their places.
     counts = [len(mesh.points) for mesh in meshes.values()]
@@ -183,7 +198,18 @@ def drape_pattern(
         for name in set(meshes) - set(drafted) if lifted else ():
             stays[welded[cloth.piece_vertices[name]]] = True
         cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid, fixed=stays))
-    held, frames = held_vertices(cloth, placement.hold), list[NDArray[np.float32]]()
+    # An elastic draws the edge along its casing to the body, and holds it there.
+    threaded = {elastic.edge for elastic in pattern.elastics}
+    edge_of = {line: line.partition(".")[2].removesuffix(MIRRORED).rstrip(" 0123456789") for line in lines}
+    gripped = [line for line, edge in edge_of.items() if threaded & {edge, without_side(edge)}]
+    if gripped:
+        notes.append(f"held by an elastic: {', '.join(sorted(threaded))}")
+        drawn, rows = cloth.designed.copy(), np.unique(np.concatenate([lines[line] for line in gripped]))
+        # At its height: by alternating projections on the body and on the level of each vertex.
+        for _ in range(_LEVELLED):
+            drawn[rows] = np.where([True, False, True], solid.nearest(drawn[rows])[0], drawn[rows])
+        cloth = replace(cloth, designed=drawn)
+    held, frames = held_vertices(cloth, [*placement.hold, *gripped]), list[NDArray[np.float32]]()
     worn = relax_drape(
         cloth, solid, options=options, held=held, callback=callback,
         observer=lambda places: frames.append(places.astype(np.float32)),

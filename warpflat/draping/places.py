@@ -10,7 +10,8 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.surface.connectivity import border_loops, join_labels
+from warpflat.surface.connectivity import join_labels
+from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["Place", "find_places"]
@@ -75,7 +76,7 @@ def find_places(
     found = []
     # Cloth gapes at an edge of the garment. Inside, as in a flute of a skirt, it stands off.
     edge = np.zeros(len(gap), dtype=bool)
-    edge[np.concatenate(border_loops(cloth.faces))] = True
+    edge[border_edges(cloth.faces)] = True
     parts = {
         "misfit": np.where(meant_to_touch, misfit, 0.0),
         "hang": np.where(meant_to_touch, 0.0, misfit),

@@ -1,4 +1,4 @@
-"""What of a pattern is draped, in one layer, and where its buttons close it.
+"""What of a pattern is draped, in one layer, and where its buttons and ties close it.
 
 Facings, bindings, second layers of collars, what of a folded strip lies behind its fold, and bags of pockets lie within the garment. In
 the drape nothing keeps layers apart, so that what lies within would hang out. It is left out, and named.
@@ -10,7 +10,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from shapely import Polygon, contains_xy
+from shapely import Point, Polygon, contains_xy
+from shapely.ops import nearest_points
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import nearest_on_polyline
@@ -20,15 +21,17 @@ from warpflat.pattern.whole_pieces import MIRRORED, hole_edges, turn_over
 
 __all__ = ["Button", "closures", "in_one_layer", "right_side_out", "turned_down"]
 
-#: Where a button is closed: piece and point [m] of both layers.
+#: Where a button or a tie closes a garment: piece and point [m] of both layers.
 Button = tuple[tuple[str, FloatArray], tuple[str, FloatArray]]
 
-_FOLD, _BUTTON, _HOLE = "fold line", "button", "buttonhole"
+_FOLD, _BUTTON, _HOLE, _TIE, _CENTRE = "fold line", "button", "buttonhole", "tie", "centre"
 _WITHIN = ("facing", "interfacing")
 # What strays less far from a line lies on it; a button lies this near to a buttonhole of its own piece if both halves are marked alike [m].
 _ON_LINE, _ON_HOLE = 1e-6, 0.006
-# A button is farther than this from the edge [m].
-_ON_OUTLINE = 0.001
+# A button is farther than this from the edge [m], and the middle of a tie lies so far within the corner at which it is sewn on.
+_ON_OUTLINE, _IN_CORNER = 0.001, 0.01
+# Ends of a cut-off corner are as far apart as those of the opening that it fills, but for so much [m].
+_ALIKE = 0.001
 
 
 def in_one_layer(
@@ -57,7 +60,8 @@ def in_one_layer(
     }:
         layers -= held_by
     out |= layers
-    seams = [seam for seam, pair in zip(seams, pairs, strict=True) if not pair & out]
+    pieces, openings = _cut_off_corners(pieces, seams, out)
+    seams = [*(seam for seam, pair in zip(seams, pairs, strict=True) if not pair & out), *openings]
     kept, folded = {name: piece for name, piece in pieces.items() if name not in out}, set[str]()
     for name, piece in kept.items():
         sewn = {side.edge for seam in seams for chain in seam.sides for side in chain if side.piece == name}
@@ -83,6 +87,52 @@ def _bags(pieces: Mapping[str, Piece], seams: Sequence[Seam]) -> set[str]:
     """Return bags of pockets: that which takes part in a seam beside the shell lies behind a cut-off corner of it, and stays."""
     beside = {side.piece for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
     return {name for name, piece in pieces.items() if piece.role == "pocket" and name not in beside}
+
+
+def _cut_off_corners(
+    pieces: Mapping[str, Piece], seams: Sequence[Seam], out: Collection[str]
+) -> tuple[dict[str, Piece], list[Seam]]:
+    """Return the pieces with those behind cut-off corners as the corners alone, and the seams that close the pockets' openings.
+
+    What fills a corner takes part in the shell's seams beside it, and goes on as half of a bag; the other half, which is left out, joins it
+    to the opening.
+    """
+    cut, closed = dict(pieces), list[Seam]()
+    beside = {(side.piece, side.edge) for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
+    # Both sides of a seam, either first.
+    pairs = [
+        (seam.name, one[0], other[0])
+        for seam in seams
+        for one, other in (seam.sides, seam.sides[::-1])
+        if len(one) == len(other) == 1
+    ]
+    for name in [name for name, piece in pieces.items() if piece.role == "pocket" and name not in out]:
+        edges = list(pieces[name].edges)
+        first = next((k for k, edge in enumerate(edges) if (name, edge.name) not in beside), 0)
+        edges = [edge for edge in edges[first:] + edges[:first] if (name, edge.name) in beside]
+        bags = {other.piece for _, own, other in pairs if own.piece == name} & set(out)
+        found = [(title, shell) for title, bag, shell in pairs if bag.piece in bags and shell.piece not in (name, *out)]
+        ends = [points for edge in edges for points in (edge.points[0], edge.points[-1])]
+        if len(found) != 1 or any(
+            np.linalg.norm(a - b) > _ON_LINE for a, b in zip(ends[1:-1:2], ends[2::2], strict=True)
+        ):
+            continue
+        ((title, shell),) = found
+        opening = pieces[shell.piece].edge(shell.edge).points[::-1]
+        across, along = ((row[-1] - row[0]) @ [1.0, 1j] for row in (np.array([ends[-1], ends[0]]), opening))
+        if not abs(abs(across) - abs(along)) < _ALIKE < abs(across):
+            continue
+        # Turned so that its ends are those of the corner.
+        turned = (opening - opening[0]) @ [1.0, 1j] * across / along
+        rim = ends[-1] + np.column_stack([turned.real, turned.imag])
+        rim[-1] = ends[0]
+        if Polygon(np.concatenate([*(edge.points for edge in edges), rim])).is_valid:
+            corner = [*edges, Edge(name=shell.edge, points=rim)]
+            cut[name] = replace(pieces[name], edges=corner, internal_lines={}, marks={}, holes=[], darts=[])
+            closed.append(
+                Seam(name=title, sides=((shell,), (replace(shell, piece=name, reversed=not shell.reversed),)))
+            )
+    return cut, closed
 
 
 def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
@@ -179,12 +229,12 @@ def turned_down(pieces: Mapping[str, Piece]) -> set[str]:
 
 
 def closures(pieces: Mapping[str, Piece]) -> list[Button]:
-    """Return where buttons close whole pieces of a garment.
+    """Return where buttons and ties close whole pieces of a garment.
 
-    A cuff or a collar's stand has its button at one end and its buttonhole at the other. Both halves of a front are marked alike, with
-    buttons in their buttonholes; one lies over the other, and the buttons of the same number meet.
+    A waistband, a cuff or a collar's stand has its button at one end and its buttonhole at the other. Both halves of a front are
+    marked alike, with buttons in their buttonholes; one lies over the other, and the buttons of the same number meet.
     """
-    found, fronts = list[Button](), dict[str, dict[str, FloatArray]]()
+    found, fronts = list[Button](), dict[tuple[str, ...], list[str]]()
     for name, piece in pieces.items():
         marks = {title: point for title, point in piece.marks.items() if title.split()[:1] == [_BUTTON]}
         holes = [
@@ -196,19 +246,32 @@ def closures(pieces: Mapping[str, Piece]) -> list[Button]:
             any(np.linalg.norm(nearest_on_polyline(mark, hole) - mark) < _ON_HOLE for hole in holes)
             for mark in marks.values()
         ):
-            fronts[name] = marks
+            fronts.setdefault(tuple(sorted(marks)), []).append(name)
         elif len(marks) == len(holes):
             found += [
                 ((name, mark), (name, hole.mean(axis=0))) for mark, hole in zip(marks.values(), holes, strict=True)
             ]
-    while fronts:
-        name, marks = fronts.popitem()
-        twin = name.removesuffix(MIRRORED) if name.endswith(MIRRORED) else name + MIRRORED
-        alike = [each for each, its in fronts.items() if its.keys() == marks.keys()]
-        other = twin if twin in alike else alike[0] if len(alike) == 1 else ""
-        if other:
-            its = fronts.pop(other)
-            found += [((name, marks[title]), (other, its[title])) for title in marks]
+    for titles, alike in fronts.items():
+        twins = [(name, name + MIRRORED) for name in alike if name + MIRRORED in alike]
+        left = [name for name in alike if not any(name in pair for pair in twins)]
+        found += [
+            ((one, pieces[one].marks[title]), (other, pieces[other].marks[title]))
+            for one, other in ([*twins, (left[0], left[1])] if len(left) == 2 else twins)
+            for title in titles
+        ]
+    # The ties of a wrap hold the edge of each half where it lies on the other one, across the centre line.
+    for name, piece in pieces.items():
+        halves = [piece, pieces.get(name + MIRRORED, piece)]
+        at = list[tuple[FloatArray, FloatArray]]()
+        for half in halves:
+            lines = [line for title, line in half.internal_lines.items() if title.split()[:1] == [_CENTRE]]
+            inside = Polygon(half.outline).buffer(-_IN_CORNER)
+            if _TIE in half.marks and len(lines) == 1 and not inside.is_empty:
+                end = np.concatenate(nearest_points(inside, Point(half.marks[_TIE]))[0].coords)
+                at.append((end, 2.0 * nearest_on_polyline(end, lines[0]) - end))
+        if halves[1] is not piece and len(at) == 2:
+            names = [half.name for half in halves]
+            found += [((names[k], at[k][0]), (names[1 - k], at[1 - k][1])) for k in (0, 1)]
     # What others mark beyond an outline, or on it, closes nothing.
     inside = {name: Polygon(piece.outline).buffer(-_ON_OUTLINE) for name, piece in pieces.items() if piece.marks}
     return [layers for layers in found if all(contains_xy(inside[name], *point) for name, point in layers)]

@@ -26,7 +26,7 @@ from warpflat.draping.mesh_pieces import FlatMesh, Weld
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["UNITS", "continue_pieces", "draw_together", "wrap_pieces"]
+__all__ = ["UNITS", "continue_pieces", "draw_together", "hood_beside_head", "wrap_pieces"]
 
 #: Where a file's units stand.
 UNITS = (
@@ -390,6 +390,49 @@ def continue_pieces(
         weight /= weight.sum(axis=1, keepdims=True)
         off = flat[:, None] - flat[own[near]]
         found[name] = np.einsum("pk,pka->pa", weight, place[near] + np.einsum("pkab,pkb->pka", way[near], off))
+    return found
+
+
+def hood_beside_head(
+    placed: Mapping[str, FloatArray],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    hood: Collection[str],
+    beside: float,
+) -> dict[str, FloatArray]:
+    """Place the halves of a hood flat beside a head, upright as they are drawn, with the middles of their seams at the neckline's.
+
+    Args:
+        placed: by piece the points (#P by 3 [m]) of those that lie.
+        meshes: all pieces.
+        welds: for each seam the vertices that it joins.
+        hood: the pieces of the hood; what is sewn to both sides of the neckline, such as a strip over the crown, is no half.
+        beside: how far from the middle the halves lie [m].
+
+    Returns:
+        By half its points, #P by 3 [m].
+    """
+    rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
+    for join in _joins(welds, list(meshes)):
+        for (name, other), (own, its) in (
+            (join.pieces, join.vertices),
+            (join.pieces[::-1], join.vertices[::-1]),
+        ):
+            if name in hood and other in placed and other not in hood:
+                rows[name].append((own, placed[other][its]))
+    found = {}
+    for name, seams in rows.items():
+        if not seams:
+            continue
+        own, neckline = (np.concatenate(column) for column in zip(*seams, strict=True))
+        side = float(np.sign(neckline[:, 0]).mean())
+        if abs(side) > 0.5:
+            off = meshes[name].points - meshes[name].points[own].mean(axis=0)
+            seen = neckline - neckline.mean(axis=0)
+            # Drawn upright, it faces one way or the other.
+            forwards = np.sign(off[own, 0] @ seen[:, 2])
+            x, y = np.sign(side) * beside, neckline[:, 1].mean() + off[:, 1]
+            found[name] = np.column_stack([np.full(len(y), x), y, neckline[:, 2].mean() + forwards * off[:, 0]])
     return found
 
 

@@ -198,7 +198,7 @@ def _beside(piece: Piece, name: str, what: str) -> tuple[list[Edge], Edge, Edge,
 
 
 def buttonhole(centre: FloatArray, along: FloatArray, diameter: float = 0.012) -> dict[str, FloatArray]:
-    """Return the lines of a buttonhole on a cuff or a collar (2 by 2 [m] each), for a small button.
+    """Return the lines of a buttonhole on a cuff, a collar or a waistband (2 by 2 [m] each), for a small button.
 
     Args:
         centre: its middle [m].

@@ -44,7 +44,7 @@ _COVERS = 0.004
 _ROUND = 0.6
 # How much farther apart the points of a fall are than its sewn edge, on each side [m].
 _LEAN = 0.010
-# Height and width of a hood as shares of the head's girth, and how far its neck rises towards the front [rad].
+# Length of a hood's front edge and its width as shares of the head's girth, and how far its neck rises towards the front [rad].
 _HOOD_HIGH, _HOOD_WIDE, _HOOD_TURN = 0.62, 0.44, 0.25
 # Hem of a hood's front edge, through which a cord may run [m].
 _HOOD_HEM = 0.030
@@ -236,10 +236,10 @@ def with_hood(
     halves, crowns = dict[str, list[Edge]](), dict[str, list[Edge]]()
     for size in pattern.pieces:
         neck = 0.5 * (chain_length(pattern, chain, size) - strip)
-        high, wide = _HOOD_HIGH * heads[size] - 0.5 * strip, _HOOD_WIDE * heads[size] - 0.5 * strip
         lower = swept(Strip(length=2.0 * neck, height=0.1, turn=_HOOD_TURN))[0]
         lower = lower[len(lower) // 2 :] - lower[len(lower) // 2]
-        front = float(lower[-1, 0])
+        front, rise = lower[-1].tolist()
+        high, wide = rise + _HOOD_HIGH * heads[size] - 0.5 * strip, _HOOD_WIDE * heads[size] - 0.5 * strip
         if wide < 0.5 * front:
             raise InputError(f"a hood for a head of {1e3 * heads[size]:.0f} mm does not reach around this neckline")
         top, behind = np.array([front, high]), np.array([front - wide, 0.55 * high])

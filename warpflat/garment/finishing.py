@@ -379,7 +379,7 @@ def _strip(
                 x += number * stretch
                 lines[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
     marks = {}
-    if wish.kind == "cuff" and wish.overlap:
+    if wish.overlap:
         # It buttons upon itself, in the middle of its outer half.
         marks["button"] = np.array([length + 0.5 * wish.overlap, 0.5 * wish.width])
         lines |= buttonhole(np.array([0.5 * wish.overlap, 0.5 * wish.width]), np.array([1.0, 0.0]))

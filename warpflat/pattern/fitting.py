@@ -164,7 +164,7 @@ def equal_sides(
         # How the difference grows with each bump: one on every curve of the second side, and where these bend too little, as a nearly
         # straight one or an S, on all curves, and with more bumps, each in a direction of its own.
         # Curves that are straight in parts stay so, unless no others bend enough.
-        trials = [(seam.sides[1:], 1), (seam.sides, 1), (seam.sides, 2), (seam.sides, 4)]
+        trials = [(seam.sides[1:], 1), *((seam.sides, count) for count in (1, 2, 4, 8))]
         for (moved, count), of_curves in [
             *((each, np.any) for each in trials),
             *((each, np.all) for each in trials[1:]),

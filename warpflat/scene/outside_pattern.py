@@ -74,6 +74,7 @@ class OutsideJob:
     """A pattern from outside, read and ready to be draped.
 
     Attributes:
+        path: of its file or folder, as it was given.
         name: of its files.
         pattern: pieces and seams.
         sewing: how they are sewn and worn.
@@ -82,6 +83,7 @@ class OutsideJob:
         sources: files that were read.
     """
 
+    path: Path
     name: str
     pattern: Pattern
     sewing: SewingTable
@@ -140,7 +142,9 @@ class OutsideJob:
             worn = _worn_scan(body, table, lifts, pattern) if lifts and run_body is None else None
             mannequin, lifts = worn or (_body(body, table, run_body, path, designed=bool(lifts)), lifts)
         name = make_file_name((path if path.is_dir() else path.with_suffix("")).resolve().name)
-        return cls(name=name, pattern=pattern, sewing=table, body=mannequin, lifts=lifts, sources=tuple(sources))
+        return cls(
+            path=path, name=name, pattern=pattern, sewing=table, body=mannequin, lifts=lifts, sources=tuple(sources)
+        )
 
 
 def is_pattern_file(path: Path) -> bool:
@@ -343,7 +347,7 @@ def drape_outside(
     with output_folder(out, names, sources=job.sources, guard=True) as folder:
         require_own_metrics(folder)
         report_activity("draping")
-        with errors_named(job.name):
+        with errors_named(str(job.path)):
             lifts = job.lifts if size in (None, pattern.sample) else {}
             placement = Placement(
                 top=job.sewing.top, lifts=lifts, size=size, spacing=1e-3 * job.sewing.spacing_mm, hold=table.hold
@@ -356,7 +360,7 @@ def drape_outside(
             more = [*more, "the pattern was not corrected, as the drape is not at rest; raise max_steps in [drape]"]
         elif correct:
             report_activity("correcting the pattern")
-            with errors_named(job.name):
+            with errors_named(str(job.path)):
                 found = relieve_pattern(draped, hold=table.hold)
             entry["correction"] = {
                 "reason": found.reason,
