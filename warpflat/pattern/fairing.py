@@ -183,7 +183,8 @@ def fairest_line(
         points, straight, met, mirrored: as in :func:`fair_line`.
         bound: [m].
         one_way: whether a line that bends to one side only is preferred, with the longest wave within the bound.
-        gentle: whether a corner is drawn as a curve, too, as far as the bound allows, if that takes no inflection more.
+        gentle: whether a corner is drawn as a curve, too, as far as the bound allows, if that takes no inflection more and hardly turns
+            the line's ends, where it meets others.
     """
     best: FairLine | None = None
     least = np.inf
@@ -193,7 +194,13 @@ def fairest_line(
         cost = tried.shift + WORTH * tried.inflections
         if best is None or (tried.inflections < best.inflections and cost < least):
             best, least = tried, cost
-        elif gentle and best.turn > GENTLE and tried.turn < best.turn and tried.inflections <= best.inflections:
+        elif (
+            gentle
+            and best.turn > GENTLE
+            and tried.turn < best.turn
+            and tried.inflections <= best.inflections
+            and _end_turn(points, tried.points) <= GENTLE
+        ):
             best = tried
         if best.inflections == 0 and not (gentle and best.turn > GENTLE):
             break
@@ -205,6 +212,17 @@ def fairest_line(
             break
         best = bent
     return best
+
+
+def _end_turn(first: FloatArray, second: FloatArray) -> float:
+    """Return by how much the last centimetre at either end of a line (#P by 2 [m]) differs in direction from another one's [rad]."""
+    angles = []
+    for line in (first, second):
+        length = arc_lengths(line)[-1]
+        ends = points_at_lengths(line, [0.0, 0.01, length - 0.01, length])
+        angles.append(np.arctan2(*(ends[[1, 3]] - ends[[0, 2]]).T))
+    turned = angles[1] - angles[0]
+    return float(np.abs((turned + np.pi) % (2.0 * np.pi) - np.pi).max())
 
 
 def _fair(placed: FloatArray, points: FloatArray, smooth: FloatArray) -> FairLine:
