@@ -9,7 +9,7 @@ import pytest
 from bodies import body_of_size
 
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import turning_angles
+from warpflat.core.polyline import arc_lengths, turning_angles
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
@@ -138,8 +138,10 @@ def test_seams_come_out_with_their_ease_and_the_shorter_side_keeps_its_length(
         assert abs(seam.difference) < 5e-4, seam.name
     first, second = measured["front armhole left"].lengths
     assert second / first == pytest.approx(1.04, abs=1e-3)
-    assert first == pytest.approx(plain["front armhole left"].lengths[0], rel=0.01)
-    assert second == pytest.approx(1.04 * plain["front armhole left"].lengths[1], rel=0.01)
+    # The cap lies flat longer than over the round shoulder. That is part of its ease, and the armhole gives less than without any.
+    on_body = plain["front armhole left"].length_3d
+    assert on_body < first < plain["front armhole left"].lengths[0] - 0.003
+    assert first == pytest.approx(on_body, rel=0.03)
     front, back = measured["shoulder right"].lengths
     assert front / back == pytest.approx(1.03, abs=1e-3)
     assert back == pytest.approx(plain["shoulder right"].lengths[1], rel=0.01)
@@ -176,6 +178,14 @@ def test_a_woven_cap_is_eased_in_above_its_notches_and_a_knit_one_is_not(mannequ
     assert made.sewn is not None
     assert made.sewn.converged
     assert max(abs(seam.difference) for seam in made.seams) < 2e-4
+    # Stretched at the shoulder point by a cap that wants more than its ease, the armhole would hook the shoulder seam up.
+    seam = next(seam for seam in form.seams if seam.name == "front armhole left")
+    row, piece = seam.runs[0].vertices[0], form.pieces[seam.pieces[0]]
+    worn, flat = (
+        np.diff(arc_lengths(at[row])) for at in (piece.surface.vertices, made.pieces[seam.pieces[0]].positions)
+    )
+    upper = np.argsort(piece.surface.vertices[row[:-1], 1] + piece.surface.vertices[row[1:], 1])[-3:]
+    assert abs(flat[upper].sum() / worn[upper].sum() - 1.0) < 0.02
     pattern, _ = pattern_of_garment({"EU 38": made}, name="shirt")
     drafted = draft_garment(pattern)
     armhole, cap = next(report for report in drafted.seams if report.name == "armhole left").length_mm

@@ -84,6 +84,18 @@ def test_a_skirt_side_bends_one_way_within_the_bound():
     assert np.abs(turning_angles(drawn.points[straight])).max() < 1e-6
 
 
+def test_a_gentle_line_turns_a_corner_in_a_curve_within_the_bound():
+    # A hip corner: 18 degrees within 3 cm, as over the hip of a pear.
+    side = np.column_stack([-0.315 * np.maximum(ALONG - 0.15, 0.0), ALONG])
+    side[:, 0] = np.interp(ALONG, ALONG[::4], side[::4, 0])
+    plain, gentle = fairest_line(side, 0.003), fairest_line(side, 0.003, gentle=True)
+    assert plain is not None
+    assert gentle is not None
+    assert gentle.turn < 0.6 * plain.turn
+    assert gentle.shift <= 0.003
+    assert gentle.inflections == 0
+
+
 def test_the_waist_of_a_dress_is_no_wobble():
     # In at the waist by 12 mm: a line that bends one way would lie 2.3 mm off.
     side = np.column_stack([-0.006 * np.cos(2 * np.pi * ALONG / 0.3) + 3e-4 * np.sin(2 * np.pi * ALONG / 0.03), ALONG])

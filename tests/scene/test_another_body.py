@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -199,3 +200,25 @@ def test_a_garment_ends_as_its_wearer_sits_where_the_pose_is_kept(command: Comma
     assert sits.kept()[1]
     body = Mesh(sits.skin, triangles)
     assert np.median(np.linalg.norm(body.closest(sits.vertices)[2] - sits.vertices, axis=1)) < 0.06
+    # A seam that is level on the standing skirt goes with its cloth: as long there as the threads that it crosses, and level no more.
+    middle = 0.5 * float(job.layers[0][0][:, 1].min() + job.layers[0][0][:, 1].max())
+    cuts = [{"name": "half", "plane": {"point": [0.0, middle, 0.0], "normal": [0.0, 1.0, 0.0]}}]
+    (there,), (same,) = (
+        job.carry_cuts(on, cuts) for on in (sits, replace(sits, vertices=job.read.raw.vertices * job.read.scale))
+    )
+    assert there["name"] == "half"
+    assert there["closed"]
+    assert np.ptp(np.array(same["line"])[:, 1]) < 1e-9
+    cloth = Mesh(sits.vertices, job.layers[0][1])
+    line = np.array(there["line"])
+    assert np.linalg.norm(cloth.closest(line)[2] - line, axis=1).max() < 1e-4
+    assert np.ptp(line[:, 1]) > 0.02
+    (drawn,) = job.carry_cuts(sits, [{"points": same["line"][:2]}])
+    np.testing.assert_allclose(drawn["points"], there["line"][:2], atol=1e-9)
+    with pytest.raises(InputError, match="the plane misses the garment"):
+        job.carry_cuts(sits, [{"plane": {"point": [0.0, 9.0, 0.0], "normal": [0.0, 1.0, 0.0]}}])
+    ended = command(
+        "fit", "skirt.obj", "--units", "m", *ON, "--to", "EU 42", "--cut-seam", "marked", "--out", "none", *BARE
+    )
+    assert ended.code == 2
+    assert "what is carried is drawn by points:" in ended.err

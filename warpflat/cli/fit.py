@@ -12,7 +12,7 @@ from warpflat.cli.options import DONE, EXIT_CODES, RUN_FILES, ComputingCommand, 
 from warpflat.cli.run import report_run, start_warp_silently
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
-from warpflat.core.text import plain_letters
+from warpflat.core.text import plain_letters, quote_value
 
 __all__ = ["fit"]
 
@@ -56,6 +56,14 @@ _FILES = """\b
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.  [default: all]")
 @click.option("--front", metavar="AXIS", help="Where its front faces: +z, -z, +x, -x.  [default: found]")
 @click.option("--seams", metavar="HOW", help="As for warpflat flatten.")
+@click.option(
+    "--cut-seam",
+    "cut_seams",
+    multiple=True,
+    metavar="[NAME=]WAY",
+    help="A seam that you draw on the garment as its file has it, with points:, line: or plane: as for warpflat flatten; it is carried "
+    "with the cloth.",
+)
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
 @click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
 @click.option("--bands", metavar="HOW", help="As for warpflat flatten.")
@@ -86,8 +94,10 @@ def fit(
       warpflat fit leggings.ply --units m --to scan.obj --fabric jersey
       warpflat fit out/dress/worn.usdc --from "EU 38" --to "EU 36" --to "EU 42" --out study
       warpflat fit trousers.usdc --from "EU 38" --to rider.obj --keep-pose
+      warpflat fit trousers.usdc --from "EU 38" --to rider.obj --keep-pose --cut-seam "knee=plane:0,0.47,0 0,1,0"
       warpflat fit skirt.usd --to "EU 40" --ease waist=20mm --ease hip=5cm
     """
+    from warpflat.cli.flatten import drawn_seam
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.scene.fit import (
         FitJob,
@@ -115,6 +125,12 @@ def fit(
     for option, key in (("seams", "find"), ("front", "front")):
         if options[option] is not None:
             tables.setdefault("find_seams", {})[key] = options[option]
+    tables["seams_cut"] = [drawn_seam(text) for text in options["cut_seams"]]
+    for text, cut in zip(options["cut_seams"], tables["seams_cut"], strict=True):
+        if not cut.keys() & {"points", "plane"} and not isinstance(cut.get("line"), list):
+            raise InputError(
+                f"--cut-seam {quote_value(text)}: what is carried is drawn by points:, line:X,Y,Z ... or plane:"
+            )
     check_tables(tables, garment)
     require_own_study(folder)
     start_warp_silently()

@@ -14,7 +14,7 @@ from warpflat.cli.run import run_and_report
 from warpflat.core.errors import InputError
 from warpflat.core.text import plain_letters, quote_value
 
-__all__ = ["flatten"]
+__all__ = ["drawn_seam", "flatten"]
 
 _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|marked)\s*(?::(?P<body>.*))?", re.DOTALL)
 
@@ -194,7 +194,7 @@ def flatten(
     for option in ("no", "keep"):
         if options[option]:
             tables.setdefault("find_seams", {})[option] = list(options[option])
-    tables["seams_cut"] = [_drawn_seam(text) for text in options["cut_seams"]]
+    tables["seams_cut"] = [drawn_seam(text) for text in options["cut_seams"]]
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
     for key in ("name", "fabric", "start", "model", "bands", "bands_shorter"):
@@ -250,7 +250,7 @@ def flatten(
         raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", message)) from None
 
 
-def _drawn_seam(text: str) -> dict[str, Any]:
+def drawn_seam(text: str) -> dict[str, Any]:
     """Return the table of a scene's `[[seams_cut]]` that an option `--cut-seam` stands for.
 
     Raises:

@@ -34,6 +34,10 @@ STRAIGHT_EDGES = ("shoulder", "side", "centre front", "centre back")
 SHAPED_EDGES = ("armhole", "underarm")
 #: An edge is drawn in two where it turns by more than this [rad] at one vertex.
 CORNER = np.radians(30.0)
+#: Edges that turn gently: a hip curve has no corner.
+GENTLE_EDGES = ("side", "outseam")
+#: The hip curve runs into the straight side seam so far below the hip's level [m].
+HIP_CURVE = 0.03
 #: A wave by which it is measured how far an edge lies from straight [m].
 RULER = 0.05
 
@@ -149,8 +153,8 @@ def plan_curves(
             free = (name, edge) not in sewn
             if free and part.split(" ")[0] in HEMMED_LEVELS:
                 book, wanted = "all", np.ones(len(grid), dtype=bool)
-            elif part.startswith("side") and heights.min() < hip - 0.05:
-                book, wanted = "below hip", heights < hip + 1e-3
+            elif part.startswith("side") and heights.min() < hip - HIP_CURVE:
+                book, wanted = "below hip", heights < hip - HIP_CURVE
             elif part.startswith(STRAIGHT_EDGES):
                 book, wanted = "all", np.ones(len(grid), dtype=bool)
             else:
@@ -160,7 +164,10 @@ def plan_curves(
             kept = wanted if straight else None
             one_way = book == "below hip" and bool(np.isin(grid, layout.rings[: layout.level_row["waist"] + 1]).all())
             met = np.isin(vertices, levels)
-            drawn = fairest_line(points, bound, straight=kept, met=met, mirrored=mirrored, one_way=one_way)
+            gentle = part.startswith(GENTLE_EDGES)
+            drawn = fairest_line(
+                points, bound, straight=kept, met=met, mirrored=mirrored, one_way=one_way, gentle=gentle
+            )
             if drawn is None:
                 continue
             line = DrawnLine(piece=name, line=edge, vertices=vertices, shape=drawn.points)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.polyline import polyline_length
 from warpflat.fabric.fabric import grain_axes
 from warpflat.flattening.progress import STEPS, Stage
 from warpflat.flattening.result import Flattening
@@ -161,8 +162,11 @@ def measure_fullness(piece: Flattening, edges: Sequence[FullEdge], plain: Sequen
             logs = [(edge.vertices, np.full(len(edge.vertices), np.log(edge.factor))) for edge in along]
             log_full[:, axis] += falloff_weights(faces, logs, stops, len(positions))
     # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap do, all of what is eased in,
-    # and the excess on slanting sides.
-    wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
+    # and the excess on slanting sides. A cap that lies flat is longer than over the round shoulder: that much of its ease it has.
+    body, wanted = piece.network.surface.vertices, [(ids, 1.0) for ids in plain]
+    for edge in edges:
+        longer = polyline_length(positions[edge.vertices]) / polyline_length(body[edge.vertices])
+        wanted.append((edge.vertices, edge.factor if edge.gathered else max(1.0, edge.factor / max(1.0, longer))))
     full, lacks = np.exp(log_full), []
     for ids, factor in wanted:
         step = np.diff(positions[ids], axis=0)

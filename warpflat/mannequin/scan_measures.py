@@ -49,9 +49,8 @@ _FOLD_OF_ARM, _LEAP_OF_ARM = 0.012, 0.02
 _FINGERS_PART = 0.92
 # A belly of the upper arm is one if it is so full, as a share of the fullest tape.
 _BELLY = 0.98
-# Girths [m] that a tape does not tell apart, and what noise of one metre adds to that; ISO 20685 lets a height and a girth differ by so
-# much [m].
-_ALIKE, _NOISE, _ISO_HEIGHT, _ISO_GIRTH = 0.001, 0.5, 0.004, 0.009
+# Girths [m] that a tape does not tell apart, and what noise of one metre adds to that; ISO 20685 lets a height differ by so much [m].
+_ALIKE, _NOISE, _ISO_HEIGHT = 0.001, 0.5, 0.004
 # A tape is a guess where the body model lies farther off the scan [m] in the mean, or the scan shows less than a share of it.
 _FAR, _SHOWN = 0.015, 0.75
 _HOLED = "it runs over a hole in the scan"
@@ -347,13 +346,13 @@ def guess_note(measures: Mapping[str, ScanMeasure], levels: Mapping[str, ScanLev
 
 
 def missing_note(measures: Mapping[str, ScanMeasure]) -> list[str]:
-    """Return one note that names head, hands and feet that the scan does not show; none if all are there."""
+    """Return one note that names head, hands and feet without a tape, as they are missing or of no possible size; none if all are there."""
     ends = ["head", *(f"{end} {side}" for end in ("hand", "foot") for side in ("left", "right"))]
     missing = [end for end in ends if end not in measures]
     if not missing:
         return []
     floor = "; heights count from its lowest point" if {"foot left", "foot right"} <= set(missing) else ""
-    return [f"the scan shows no {' and no '.join(missing)}{floor}"]
+    return [f"{' and '.join(missing)} could not be measured on the scan{floor}"]
 
 
 def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
@@ -500,16 +499,7 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
             tapes.append((float(np.ptp(points @ across)), girth, 0.5 * float(points[:, 1].max())))
     if not tapes:
         return None
-    broad, girth, height = max(tapes)
-    alike = max(abs(other - girth) for width, other, _ in tapes if width > broad - 0.5 * _ALIKE)
+    _, girth, height = max(tapes)
     # The foot stands on the floor, also where a scan has no sole.
-    guess = (
-        _HOLED
-        if holed
-        else _noisy(slicer.noise)
-        if slicer.noise > _NOISE_SURE
-        else "the foot is as broad elsewhere"
-        if alike > _ISO_GIRTH
-        else None
-    )
+    guess = _HOLED if holed else _noisy(slicer.noise) if slicer.noise > _NOISE_SURE else None
     return ScanMeasure(height=height, girth=girth, guess=guess)

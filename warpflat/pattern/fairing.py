@@ -20,6 +20,8 @@ LEAST_BEND = np.radians(1.0)
 FIRST_WAVE, GROWTH, WAVES = 0.03, 1.3, 20
 #: How much more a point that the line must meet counts than another place.
 _MET = 1e6
+#: A gentle line turns by at most this [rad] within this length [m], if the bound allows it.
+GENTLE, WITHIN = np.radians(8.0), 0.03
 #: An inflection is drawn away if the line need not move farther than this for it [m]. The waist of a side seam is one to keep.
 WORTH = 0.0006
 
@@ -32,11 +34,13 @@ class FairLine:
         points: #P by 2 [m], where the given points come to lie.
         shift: the largest distance of a given point from the line [m].
         inflections: of the line.
+        turn: the sharpest turn within :data:`WITHIN` [rad].
     """
 
     points: FloatArray
     shift: float
     inflections: int
+    turn: float
 
 
 def count_inflections(points: FloatArray) -> int:
@@ -122,7 +126,7 @@ def _fair_lines(
         smooth = (basis @ solved)[first : first + len(places)]
         # Points keep their shares of the length.
         placed = points_at_lengths(smooth, np.interp(arc, places, arc_lengths(smooth)))
-        yield FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
+        yield _fair(placed, points, smooth)
 
 
 def bend_one_way(
@@ -160,7 +164,7 @@ def bend_one_way(
     shares, _ = nnls(rows, wanted, maxiter=100 * len(x))
     smooth = even[0] + x[:, None] * along + side * (basis @ shares)[:, None] * across
     placed = points_at_lengths(smooth, np.interp(arc_lengths(points), places, arc_lengths(smooth)))
-    return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
+    return _fair(placed, points, smooth)
 
 
 def fairest_line(
@@ -171,6 +175,7 @@ def fairest_line(
     met: BoolArray | None = None,
     mirrored: tuple[bool, bool] = (False, False),
     one_way: bool = False,
+    gentle: bool = False,
 ) -> FairLine | None:
     """Return the line within a bound that has few inflections for little shift; None if no line is within it.
 
@@ -178,6 +183,8 @@ def fairest_line(
         points, straight, met, mirrored: as in :func:`fair_line`.
         bound: [m].
         one_way: whether a line that bends to one side only is preferred, with the longest wave within the bound.
+        gentle: whether a corner is drawn as a curve, too, as far as the bound allows, if that takes no inflection more and hardly turns
+            the line's ends, where it meets others.
     """
     best: FairLine | None = None
     least = np.inf
@@ -187,7 +194,15 @@ def fairest_line(
         cost = tried.shift + WORTH * tried.inflections
         if best is None or (tried.inflections < best.inflections and cost < least):
             best, least = tried, cost
-        if best.inflections == 0:
+        elif (
+            gentle
+            and best.turn > GENTLE
+            and tried.turn < best.turn
+            and tried.inflections <= best.inflections
+            and _end_turn(points, tried.points) <= GENTLE
+        ):
+            best = tried
+        if best.inflections == 0 and not (gentle and best.turn > GENTLE):
             break
     if not one_way or (best is not None and best.inflections == 0):
         return best
@@ -197,6 +212,27 @@ def fairest_line(
             break
         best = bent
     return best
+
+
+def _end_turn(first: FloatArray, second: FloatArray) -> float:
+    """Return by how much the last centimetre at either end of a line (#P by 2 [m]) differs in direction from another one's [rad]."""
+    angles = []
+    for line in (first, second):
+        length = arc_lengths(line)[-1]
+        ends = points_at_lengths(line, [0.0, 0.01, length - 0.01, length])
+        angles.append(np.arctan2(*(ends[[1, 3]] - ends[[0, 2]]).T))
+    turned = angles[1] - angles[0]
+    return float(np.abs((turned + np.pi) % (2.0 * np.pi) - np.pi).max())
+
+
+def _fair(placed: FloatArray, points: FloatArray, smooth: FloatArray) -> FairLine:
+    """Return a faired line (#S by 2 [m]) of some points, which come to lie at `placed`, with its measures."""
+    places, even = _evenly(smooth)
+    steps = np.diff(even, axis=0)
+    angles = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    apart = min(max(1, round(WITHIN / places[1])), len(angles) - 1)
+    turn = float(np.abs(angles[apart:] - angles[:-apart]).max())
+    return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth), turn=turn)
 
 
 def _straight_places(points: FloatArray, places: FloatArray, straight: BoolArray | None) -> BoolArray:

@@ -46,6 +46,8 @@ _BESIDE = 0.2
 _KEPT = 0.01
 # Cloth that lies so deep in the body [m] is within it; more than this share of it is told.
 _WITHIN, _TOLD = 0.002, 0.01
+# A curve in which a plane meets the cloth is a wrinkle below this share of the longest one.
+_WRINKLE = 0.05
 _LENGTH = re.compile(r"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>[-+0-9.eE]+)\s*(?P<unit>mm|cm|m|in)\s*")
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 # Ease is from and to these [m].
@@ -274,6 +276,64 @@ class FitJob:
             skin=(wearer.vertices - self.shift) @ back, before=before, after=after, wished=ease, notes=tuple(notes),
         )  # fmt: skip
 
+    def carry_cuts(self, carried: Carried, cuts: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Return seams that are drawn on the garment as its file has it, as tables of `[[seams_cut]]` on the carried garment.
+
+        A plane's curves, which are plane on the standing garment only, become lines of the places of the cloth that they cross.
+
+        Raises:
+            InputError: a plane misses the garment.
+        """
+        from scipy.spatial import cKDTree
+
+        from warpflat.mannequin.closest import Closest
+        from warpflat.surface.paths.section import plane_sections
+        from warpflat.surface.triangles import triangulate
+
+        layers = self.read.layers
+        now = [
+            carried.vertices[cKDTree(self.read.raw.vertices * self.read.scale).query(layer.vertices)[1]]
+            for layer in layers
+        ]
+        starts = np.cumsum([0, *(len(layer.vertices) for layer in layers)])
+        triangles = np.concatenate(
+            [triangulate(layer.faces)[0] + start for layer, start in zip(layers, starts, strict=False)]
+        ).astype(np.int64)
+        closest = Closest(np.concatenate([layer.vertices for layer in layers]), triangles)
+        everywhere = np.concatenate(now)
+
+        def moved(places: Sequence[Any]) -> list[Any]:
+            """Return places of the file, points [m] or vertices, on the carried cloth."""
+            points = np.array([place for place in places if not isinstance(place, int)], dtype=float).reshape(-1, 3)
+            triangle, weights, _ = closest(points)
+            there = iter(np.einsum("pk,pka->pa", weights, everywhere[triangles[triangle]]).tolist())
+            return [place if isinstance(place, int) else next(there) for place in places]
+
+        found: list[dict[str, Any]] = []
+        for number, cut in enumerate(cuts):
+            plane = cut.get("plane")
+            if plane is None:
+                found.append({key: moved(value) if key in ("points", "line") else value for key, value in cut.items()})
+                continue
+            point = np.asarray(plane["point"], dtype=float)
+            paths = [
+                (layer, path)
+                for layer, surface in enumerate(layers)
+                for path in plane_sections(surface, point, plane["normal"], towards=plane.get("towards"))
+            ]
+            if not paths:
+                raise InputError(f"command line: seams_cut[{number}]: the plane misses the garment")
+            longest = max(path.length for _, path in paths)
+            for layer, path in paths:
+                if path.length < _WRINKLE * longest:
+                    continue
+                places = [path.place(each) for each in range(len(path.points))]
+                line = [
+                    sum(weight * now[layer][vertex] for vertex, weight in place.items()).tolist() for place in places
+                ]
+                found.append({**{k: v for k, v in cut.items() if k == "name"}, "line": line, "closed": path.closed})
+        return found
+
 
 # A garment that is turned around must fit by so much better.
 _BACKWARDS = 1.15
@@ -319,6 +379,7 @@ def check_tables(tables: Mapping[str, Any], garment: Path) -> None:
             lambda found: "--front" if found[1] == "front" else "--seams",
             str(error),
         )
+        message = re.sub(r"^command line: seams_cut\[\d+\]", "--cut-seam", message)
         raise InputError(re.sub(r"^command line: (\w+)", r"--\1", message)) from None
 
 
@@ -355,6 +416,8 @@ def fit_to(
         copy = Path(folder) / f"{name}.obj"
         copy.write_text(meshes[f"{name}.fitted.obj"], encoding="utf-8")
         own = {**tables, "surface": {"file": str(copy), "units": "m"}}
+        if tables.get("seams_cut"):
+            own["seams_cut"] = job.carry_cuts(carried, tables["seams_cut"])
         try:
             scene: Scene = make_scene(own, name=name, folder=Path(), where="command line")
             with output_folder(out, [*files_of_run(scene), *meshes], sources=job.sources, guard=True) as to:
@@ -364,7 +427,8 @@ def fit_to(
                         path.write_text(text, encoding="utf-8")
                     record_file(to, scene.name, file)
         except InputError as error:
-            raise InputError(str(error).replace(str(copy), f"{job.path} on {carried.body}")) from None
+            words = str(error).replace(str(copy), f"{job.path} on {carried.body}")
+            raise InputError(re.sub(r"^command line: seams_cut\[\d+\]", "--cut-seam", words)) from None
     return replace(result, files=(*result.files, *meshes))
 
 
