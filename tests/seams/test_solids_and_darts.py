@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,14 @@ import seam_solids as solids
 import trimesh
 
 import warpflat
+from warpflat.fabric.library import as_fabric
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.scene.found_seams import plain_panel, seams_entry
 from warpflat.scene.load import load_scene
-from warpflat.seams.cloth import Cloth
+from warpflat.seams.cloth import Cloth, PieceMesh
+from warpflat.seams.energy import laid_flat
 from warpflat.seams.fields import Operators
-from warpflat.seams.find import FoundSeams
+from warpflat.seams.find import FoundSeams, cloth_of
 from warpflat.seams.solid import part_solids
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
@@ -156,21 +159,45 @@ def test_a_bag_becomes_panels_that_lie_flat() -> None:
         assert flat.fit.outside < 0.04
 
 
-def test_a_piece_that_is_narrower_than_its_seams_is_no_pattern_yet() -> None:
-    step, rows = 0.002, []
+def bone(columns: int) -> Surface:
+    """Two panels of 6 cm, and 2 cm of a strip of so many times 2 mm between them."""
+    faces = []
     for j in range(60):
-        # Two panels of 6 cm, 2 cm of a strip between them.
-        wide = 30 if j < 25 or j >= 35 else 4
-        rows.append({i for i in range(30) if abs(i - 14.5) < 0.5 * wide})
-    faces = [[61 * i + j, 61 * i + 61 + j, 61 * i + 62 + j, 61 * i + j + 1] for j, row in enumerate(rows) for i in row]
+        wide = 30 if j < 25 or j >= 35 else columns
+        faces += [
+            [61 * i + j, 61 * i + 61 + j, 61 * i + 62 + j, 61 * i + j + 1]
+            for i in range(30)
+            if abs(i - 14.5) < 0.5 * wide
+        ]
     used, place = np.unique(faces, return_inverse=True)
-    vertices = np.array([[step * (v // 61), step * (v % 61), 0.0] for v in used])
-    flat = warpflat.flatten(warpflat.make_surface(vertices, place.reshape(-1, 4), name="bone"), fabric="woven")
+    vertices = np.array([[0.002 * (v // 61), 0.002 * (v % 61), 0.0] for v in used])
+    return warpflat.make_surface(vertices, place.reshape(-1, 4), name="bone")
+
+
+def test_a_piece_that_is_narrower_than_its_seams_is_no_pattern_yet() -> None:
+    flat = warpflat.flatten(bone(4), fabric="woven")
     found = FoundSeams(pieces=(flat.surface,), seams=(), what="other", up="+y", front="+z")
     refused = str(seams_entry(found, [flat], 0.02)["no_pattern"])
     assert refused.startswith("no pattern yet: bone is somewhere narrower than 10 mm")
     # The strip is 8 mm wide.
     assert "no_pattern" not in seams_entry(found, [flat], 0.01)
+
+
+@pytest.mark.parametrize("columns", [2, 4])
+def test_a_neck_that_is_too_narrow_to_be_sewn_is_cut_through(columns: int) -> None:
+    cloth = cloth_of(bone(columns))
+    fabric = as_fabric("woven")
+    parted, _ = part_solids(
+        cloth, shape=True, measure=lambda trial, mesh, width: laid_flat(as_surface(trial, mesh), fabric, width)
+    )
+    areas = [float(parted.face_areas[mesh.face_of].sum()) for mesh in parted.pieces()]
+    assert len(areas) == (2 if columns == 2 else 1)
+    if columns == 2:
+        assert parted.seam_length("seam 1") == pytest.approx(0.004, rel=0.1)
+
+
+def as_surface(cloth: Cloth, mesh: PieceMesh) -> Surface:
+    return replace(cloth, vertices=mesh.vertices, faces=mesh.faces, values={}, labels={}, seams={}).as_surface()
 
 
 def dented(depth: float = 0.08) -> Surface:

@@ -39,8 +39,8 @@ __all__ = ["found_seams", "plain_panel", "read_edges", "seams_entry"]
 
 # More than this share of the cloth beyond its limit is no pattern yet.
 _NO_PATTERN = 0.1
-# A pattern is nowhere narrower than this share of its seams' allowance; a part of less than the second share of it is a tip.
-_WIDTH, _TIP = 0.5, 0.02
+# A pattern is nowhere narrower than this share of its seams' allowance.
+_WIDTH = 0.5
 # A ring that lacks more than this share of a full turn does not lie flat: its cloth would be stretched by as much.
 _CONE = 0.05
 # A mesh of fewer faces is too coarse for a garment.
@@ -372,6 +372,8 @@ def seams_entry(found: FoundSeams, pieces: Sequence[Flattening], allowance: floa
         pieces: flat.
         allowance: of seams [m].
     """
+    from warpflat.seams.solid import parts_within
+
     area = np.array([float(piece.fit.area.sum()) for piece in pieces])
     outside = np.array([piece.fit.outside for piece in pieces])
     share = float((outside * area).sum() / area.sum())
@@ -387,22 +389,12 @@ def seams_entry(found: FoundSeams, pieces: Sequence[Flattening], allowance: floa
             f"no pattern yet: {100 * share:.0f} % of the cloth is beyond its limit, most of it in {worst}; take a fabric that gives more, "
             "smooth wrinkles (--smooth 5), or cut the mesh further"
         )
-    elif narrow := [piece.surface.name for piece in pieces if not _can_be_turned(piece, _WIDTH * allowance)]:
+    elif narrow := [
+        one.surface.name for one in pieces if parts_within(one.faces, one.positions, _WIDTH * allowance) != 1
+    ]:
         entry["no_pattern"] = (
             f"no pattern yet: {', '.join(narrow)} {'is' if len(narrow) == 1 else 'are'} somewhere narrower than "
             f"{1e3 * _WIDTH * allowance:g} mm, so that nothing is left within the seams; leave seams out (--no), or draw "
             "others (--cut-seam)"
         )
     return entry
-
-
-def _can_be_turned(piece: Flattening, width: float) -> bool:
-    """Return whether a pattern, with half a width taken off all around, is still there, and one part but for its tips."""
-    import shapely
-
-    from warpflat.surface.connectivity import border_loops
-
-    rings = [shapely.Polygon(piece.positions[loop]).buffer(0.0) for loop in border_loops(piece.faces, piece.positions)]
-    whole = rings[0].difference(shapely.union_all(rings[1:]))
-    parts = shapely.get_parts(whole.buffer(-0.5 * width))
-    return int((shapely.area(parts) > _TIP * whole.area).sum()) == 1

@@ -5,6 +5,10 @@ of that curvature G, of area A and length L is strained by about G A / (12 L^2) 
 squared. So a narrow gore of a ball lies flat where a cap of the same area does not. Every cut is the one after which the least is
 left, over the area.
 
+Where the cloth is known, a part is laid flat before it is cut: what lies flat within its limit is cut no further, whatever the estimate
+says, and what is strained at a saddle is. A cut that leaves a narrow part costs more; a neck that is left, too narrow to be sewn, is cut
+through. To choose the cut, too, by what lies beyond the limit after it was worse (a plush of 18 % stayed at 18 %): it takes chips.
+
 What is its own mirror image is cut alike on both sides: in its plane of symmetry, or along lines that mirror each other. So a toy falls
 into halves and gussets. Parting it at the narrow rings of its limbs first, where an eigenfunction of the Laplacian has a short level line
 (Cheeger), took 18 pieces to end at 22 % beyond the limit; halves and gussets are 16 and end at 5 %.
@@ -18,10 +22,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.seams.anatomy import HOLE, Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.fields import Operators
@@ -30,12 +34,20 @@ from warpflat.seams.tailor import tidied
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.tubes import inner_borders, tube_borders
 
-__all__ = ["NARROW", "SOLID", "is_open", "is_panel", "part_solids", "wide_borders"]
+__all__ = [
+    "NARROW",
+    "SEWABLE",
+    "SOLID",
+    "LaidFlat",
+    "Measure",
+    "is_open",
+    "is_panel",
+    "part_solids",
+    "parts_within",
+    "wide_borders",
+]
 
 Ids = NDArray[np.int64]
-#: Of a piece of a cloth, laid flat: the share beyond its limit, how much of it lies over itself [m2], its least width [m].
-Measure = Callable[[Cloth, PieceMesh, float], tuple[float, float, float]]
-
 #: Seams of closed things are called by this word and a number.
 SOLID = "seam"
 
@@ -46,6 +58,10 @@ _BEYOND, _OVERLAP = 0.02, 1e-5
 # A part is narrow that is somewhere less wide than the first share of the size of the whole: nobody cuts a neck of cloth, or a tip, that
 # narrow. A cut that leaves one counts as the second strain more, where its width is nothing.
 NARROW, _THIN = 0.05, 0.05
+#: Nobody sews a neck of cloth narrower than this, half a usual allowance [m]; a part of less than such a share is a tip.
+SEWABLE, _TIP = 5e-3, 0.02
+# Each part more than two that a cut leaves counts as this strain.
+_MORE = 0.01
 # Normals are smoothed over this share of a part's size: wrinkles and facets are no shape.
 _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain.
@@ -66,6 +82,27 @@ _MOST = 16
 _LEAST = 0.02
 # Mirror images agree within this share of the size; a field is its own mirror image from this cosine on.
 _SAME, _ITSELF = 1e-4, 0.99
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LaidFlat:
+    """What becomes of a piece that is laid flat.
+
+    Attributes:
+        outside: the share beyond its limit.
+        overlap: how much of it lies over itself [m2].
+        width: where it is narrowest, no more than what nobody calls narrow [m].
+        neck: the ends of its narrowest place in space (2 by 3), where it is too narrow there to be sewn, and wider on both sides.
+    """
+
+    outside: float
+    overlap: float
+    width: float
+    neck: FloatArray | None = None
+
+
+#: Lays a piece of a cloth flat; the third argument is the width from which on nothing is narrow [m].
+Measure = Callable[[Cloth, PieceMesh, float], LaidFlat]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,12 +163,12 @@ def part_solids(
         shape: whether pieces are cut for their shape, too, until each can lie flat.
         mirror: of a cloth that is its own mirror image, vertex by vertex: both sides are cut alike.
         most: pieces at most; 16 if not given.
-        measure: says what of a disk is strained, and lies over itself, when it is laid flat; both by estimate if not given.
+        measure: lays a disk flat; without it all goes by estimate.
     """
     total = float(cloth.face_areas.sum())
     number = 1
     most = _MOST if most is None else most
-    done, known = set[tuple[int, float]](), dict[int, float]()
+    done, known = set[tuple[int, tuple[int, float]]](), dict[int, float]()
     laid = None if measure is None else _remembering(measure, NARROW * np.sqrt(total))
     for _ in range(4 * most):
         meshes = list(cloth.pieces())
@@ -139,24 +176,29 @@ def part_solids(
         for mesh in meshes:
             area = float(cloth.face_areas[mesh.face_of].sum())
             key = _key(mesh, area)
-            topology = not is_open(mesh) or _is_sewn_inside(cloth, mesh)
-            if key in done or (not topology and len(meshes) >= most):
+            large, flat = shape and area > _LEAST * total, None
+            # What has no pattern, or one that nobody can sew, comes first and last; how many pieces there are is no matter.
+            if not is_open(mesh) or _is_sewn_inside(cloth, mesh):
+                rank, value = 2, _strain(mesh, known) * area
+            elif laid is not None and _is_disk(mesh):
+                flat = laid(cloth, mesh)
+                rank, value = (2, flat.overlap) if flat.overlap > _OVERLAP else (1, (flat.outside - _BEYOND) * area)
+            else:
+                rank, value = 1, (_strain(mesh, known) - _FLAT) * area
+            if rank == 1 and (not large or len(meshes) >= most or value <= 0.0 or (1, key) in done):
+                rank = 0
+            if rank == 0 and (not large or flat is None or flat.neck is None):
                 continue
-            if topology:
-                waiting.append((True, _strain(mesh, known) * area, key, mesh))
-            elif area > _LEAST * total and laid is not None and _is_disk(mesh):
-                beyond, over, _ = laid(cloth, mesh)
-                if over > _OVERLAP or (shape and beyond > _BEYOND):
-                    waiting.append((over > _OVERLAP, max(over, beyond * area), key, mesh))
-            elif area > _LEAST * total and shape and _strain(mesh, known) > _FLAT:
-                waiting.append((False, _strain(mesh, known) * area, key, mesh))
+            if (rank, key) not in done:
+                waiting.append((rank, value, key, mesh))
         if not waiting:
             break
-        _, _, key, mesh = max(waiting, key=lambda one: one[:2])
-        way = _best_way(mesh, total, known, mirror, laid)
+        rank, _, key, mesh = max(waiting, key=lambda one: one[:2])
+        neck = laid(cloth, mesh).neck if laid is not None and rank == 0 else None
+        way = _best_way(mesh, total, known, mirror, laid, neck)
         made = None if way is None else _cut(cloth, mesh, way, f"{SOLID} {number}", mirror)
         if made is None:
-            done.add(key)
+            done.add((rank, key))
         else:
             cloth, number = made, number + 1
     left = sum(not is_open(mesh) for mesh in cloth.pieces())
@@ -294,11 +336,11 @@ def _key(mesh: PieceMesh, area: float) -> tuple[int, float]:
     return len(mesh.face_of), round(area, 9)
 
 
-def _remembering(measure: Measure, width: float) -> Callable[[Cloth, PieceMesh], tuple[float, float, float]]:
+def _remembering(measure: Measure, width: float) -> Callable[[Cloth, PieceMesh], LaidFlat]:
     """Return a measure that lays pieces that are alike flat once."""
-    known: dict[tuple[int, float], tuple[float, float, float]] = {}
+    known: dict[tuple[int, float], LaidFlat] = {}
 
-    def laid(cloth: Cloth, mesh: PieceMesh) -> tuple[float, float, float]:
+    def laid(cloth: Cloth, mesh: PieceMesh) -> LaidFlat:
         key = _key(mesh, float(cloth.face_areas[mesh.face_of].sum()))
         if key not in known:
             known[key] = measure(cloth, mesh, width)
@@ -312,14 +354,18 @@ def _best_way(
     total: float,
     known: dict[int, float],
     mirror: Anatomy | None,
-    laid: Callable[[Cloth, PieceMesh], tuple[float, float, float]] | None,
+    laid: Callable[[Cloth, PieceMesh], LaidFlat] | None,
+    neck: FloatArray | None,
 ) -> FloatArray | None:
     """Return the field (#V) along whose zero line a part is cut so that the least is left to do; None if no cut parts it well."""
     image = None if mirror is None else _image(mesh, mesh, mirror)
     found = list[tuple[float, Cloth, FloatArray]]()
-    for way in _ways(mesh, None if image is None else mirror):
+    for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
         if image is not None and not _mirrors_itself(way.field, image):
-            continue
+            if neck is None:
+                continue
+            # At both of its necks.
+            way = replace(way, field=np.maximum(way.field, way.field[image]))
         local = Cloth(vertices=mesh.vertices, faces=mesh.faces, values={"way": way.field})
         everywhere = np.ones(len(local.faces), dtype=bool)
         made, positive = tidied(local, "way", everywhere, keep=0.05).split("way", everywhere)
@@ -332,7 +378,7 @@ def _best_way(
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
         cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part.faces) for part in parts)
-        cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
+        cost += _MORE * (len(parts) - 2) + _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
         found.append((cost, made, way.field))
     best: tuple[float, FloatArray] | None = None
@@ -340,11 +386,40 @@ def _best_way(
         if best is not None and best[0] <= cost:
             break
         if laid is not None:
-            widths = [laid(made, part)[2] for part in made.pieces() if _is_disk(part)]
+            widths = [laid(made, part).width for part in made.pieces() if _is_disk(part)]
             cost += _THIN * max(1.0 - min(widths, default=np.inf) / (NARROW * np.sqrt(total)), 0.0)
         if best is None or cost < best[0]:
             best = cost, field
     return None if best is None else best[1]
+
+
+def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
+    """Return the way of cutting a part at its neck and nowhere else, in the plane through its ends that is at right angles to the cloth."""
+    middle, points = neck.mean(axis=0), mesh.vertices
+    triangles = points[mesh.faces]
+    near = np.linalg.norm(triangles.mean(axis=1) - middle, axis=1) < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = np.cross(neck[1] - neck[0], normals[near].sum(axis=0) if near.any() else normals.sum(axis=0))
+    field = (points - middle) @ along / max(float(np.linalg.norm(along)), 1e-300)
+    # Of what lies beyond the plane, only the part at the neck.
+    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    passed = (field[a] > 0.0) & (field[b] > 0.0)
+    graph = coo_array((np.ones(int(passed.sum())), (a[passed], b[passed])), shape=(len(points),) * 2)
+    _, label = connected_components(graph, directed=False)
+    ahead = np.flatnonzero(field > 0.0)
+    if len(ahead):
+        own = label == label[ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]]
+        field = np.where(own, field, -np.abs(field))
+    return _Way(field=field, name="neck", round=False)
+
+
+def parts_within(faces: IntArray, flat: FloatArray, width: float) -> int:
+    """Return in how many parts a pattern falls, but for its tips, with half a width [m] taken off all around; 0 where nothing is left."""
+    import shapely
+
+    rings = [shapely.Polygon(flat[loop]).buffer(0.0) for loop in border_loops(faces, flat)]
+    whole = rings[0].difference(shapely.union_all(rings[1:]))
+    return int((shapely.area(shapely.get_parts(whole.buffer(-0.5 * width))) > _TIP * whole.area).sum())
 
 
 def _topology(faces: Ids) -> float:
