@@ -60,8 +60,6 @@ _BEYOND, _OVERLAP = 0.02, 1e-5
 NARROW, _THIN = 0.05, 0.05
 #: Nobody sews a neck of cloth narrower than this, half a usual allowance [m]; a part of less than such a share is a tip.
 SEWABLE, _TIP = 5e-3, 0.02
-# Each part more than two that a cut leaves counts as this strain.
-_MORE = 0.01
 # Normals are smoothed over this share of a part's size: wrinkles and facets are no shape.
 _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain.
@@ -378,7 +376,7 @@ def _best_way(
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
         cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part.faces) for part in parts)
-        cost += _MORE * (len(parts) - 2) + _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
+        cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
         found.append((cost, made, way.field))
     best: tuple[float, FloatArray] | None = None
