@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,14 @@ import seam_solids as solids
 import trimesh
 
 import warpflat
+from warpflat.fabric.library import as_fabric
 from warpflat.garment.to_pattern import pattern_of_garment
-from warpflat.scene.found_seams import plain_panel
+from warpflat.scene.found_seams import plain_panel, seams_entry
 from warpflat.scene.load import load_scene
-from warpflat.seams.cloth import Cloth
+from warpflat.seams.cloth import Cloth, PieceMesh
+from warpflat.seams.energy import laid_flat
 from warpflat.seams.fields import Operators
+from warpflat.seams.find import FoundSeams, cloth_of
 from warpflat.seams.solid import part_solids
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
@@ -127,6 +131,25 @@ def test_a_toy_is_cut_alike_on_both_sides() -> None:
         assert areas[int(np.argmin(away))] == pytest.approx(area, rel=1e-4)
 
 
+def test_a_boot_that_leans_is_halved_in_its_own_plane_up_to_its_border() -> None:
+    parts = [
+        solids.rod([0, 0.035, -0.1], [0, 0.03, 0.1], 0.038),
+        solids.rod([0, 0.04, -0.09], [0, 0.14, -0.09], 0.043),
+    ]
+    plain = solids.skin(
+        solids.joined(parts, 0.01), [-0.1, -0.05, -0.2], [0.1, 0.22, 0.2], 0.014, [([0, 0.13, -0.09], [0, 1, 0])]
+    )
+    lean = np.array([[np.cos(0.004), -np.sin(0.004), 0.0], [np.sin(0.004), np.cos(0.004), 0.0], [0.0, 0.0, 1.0]])
+    found = warpflat.find_seams(
+        warpflat.make_surface(plain.vertices @ lean.T, plain.faces, closed=True, name="boot"), fabric="woven"
+    )
+    left, right = ([p for p in found.pieces if side * p.vertices[:, 0].mean() > 0.0] for side in (1, -1))
+    assert sorted(len(p.faces) for p in left) == sorted(len(p.faces) for p in right)
+    # Each half ends in the plane: no edge of the seam is missing where it meets the border.
+    assert min(p.vertices[:, 0].min() for p in left) > -3e-3
+    assert min(seam.length for seam in found.seams) > 0.01
+
+
 def test_a_bag_becomes_panels_that_lie_flat() -> None:
     box = trimesh.creation.box((0.3, 0.35, 0.12)).subdivide().subdivide().subdivide()
     found = warpflat.find_seams(surface_of(box, box.triangles_center[:, 1] < 0.174))
@@ -134,6 +157,47 @@ def test_a_bag_becomes_panels_that_lie_flat() -> None:
     for piece in found.pieces:
         flat = warpflat.flatten(warpflat.open_tube(piece) if tube_borders(piece) else piece, fabric="woven")
         assert flat.fit.outside < 0.04
+
+
+def bone(columns: int) -> Surface:
+    """Two panels of 6 cm, and 2 cm of a strip of so many times 2 mm between them."""
+    faces = []
+    for j in range(60):
+        wide = 30 if j < 25 or j >= 35 else columns
+        faces += [
+            [61 * i + j, 61 * i + 61 + j, 61 * i + 62 + j, 61 * i + j + 1]
+            for i in range(30)
+            if abs(i - 14.5) < 0.5 * wide
+        ]
+    used, place = np.unique(faces, return_inverse=True)
+    vertices = np.array([[0.002 * (v // 61), 0.002 * (v % 61), 0.0] for v in used])
+    return warpflat.make_surface(vertices, place.reshape(-1, 4), name="bone")
+
+
+def test_a_piece_that_is_narrower_than_its_seams_is_no_pattern_yet() -> None:
+    flat = warpflat.flatten(bone(4), fabric="woven")
+    found = FoundSeams(pieces=(flat.surface,), seams=(), what="other", up="+y", front="+z")
+    refused = str(seams_entry(found, [flat], 0.02)["no_pattern"])
+    assert refused.startswith("no pattern yet: bone is somewhere narrower than 10 mm")
+    # The strip is 8 mm wide.
+    assert "no_pattern" not in seams_entry(found, [flat], 0.01)
+
+
+@pytest.mark.parametrize("columns", [2, 4])
+def test_a_neck_that_is_too_narrow_to_be_sewn_is_cut_through(columns: int) -> None:
+    cloth = cloth_of(bone(columns))
+    fabric = as_fabric("woven")
+    parted, _ = part_solids(
+        cloth, shape=True, measure=lambda trial, mesh, width: laid_flat(as_surface(trial, mesh), fabric, width)
+    )
+    areas = [float(parted.face_areas[mesh.face_of].sum()) for mesh in parted.pieces()]
+    assert len(areas) == (2 if columns == 2 else 1)
+    if columns == 2:
+        assert parted.seam_length("seam 1") == pytest.approx(0.004, rel=0.1)
+
+
+def as_surface(cloth: Cloth, mesh: PieceMesh) -> Surface:
+    return replace(cloth, vertices=mesh.vertices, faces=mesh.faces, values={}, labels={}, seams={}).as_surface()
 
 
 def dented(depth: float = 0.08) -> Surface:

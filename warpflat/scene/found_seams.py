@@ -39,6 +39,8 @@ __all__ = ["found_seams", "plain_panel", "read_edges", "seams_entry"]
 
 # More than this share of the cloth beyond its limit is no pattern yet.
 _NO_PATTERN = 0.1
+# A pattern is nowhere narrower than this share of its seams' allowance.
+_WIDTH = 0.5
 # A ring that lacks more than this share of a full turn does not lie flat: its cloth would be stretched by as much.
 _CONE = 0.05
 # A mesh of fewer faces is too coarse for a garment.
@@ -362,8 +364,16 @@ def _is_whole_garment(surface: Surface) -> bool:
     return len(wide) != 1 or handles > 0 or not is_panel(cloth)
 
 
-def seams_entry(found: FoundSeams, pieces: Sequence[Flattening]) -> Mapping[str, Any]:
-    """Return the entry `garment` of `metrics.json`: what it is, its seams, and whether this is a pattern yet."""
+def seams_entry(found: FoundSeams, pieces: Sequence[Flattening], allowance: float) -> Mapping[str, Any]:
+    """Return the entry `garment` of `metrics.json`: what it is, its seams, and whether this is a pattern yet.
+
+    Args:
+        found: the seams.
+        pieces: flat.
+        allowance: of seams [m].
+    """
+    from warpflat.seams.solid import parts_within
+
     area = np.array([float(piece.fit.area.sum()) for piece in pieces])
     outside = np.array([piece.fit.outside for piece in pieces])
     share = float((outside * area).sum() / area.sum())
@@ -378,5 +388,13 @@ def seams_entry(found: FoundSeams, pieces: Sequence[Flattening]) -> Mapping[str,
         entry["no_pattern"] = (
             f"no pattern yet: {100 * share:.0f} % of the cloth is beyond its limit, most of it in {worst}; take a fabric that gives more, "
             "smooth wrinkles (--smooth 5), or cut the mesh further"
+        )
+    elif narrow := [
+        one.surface.name for one in pieces if parts_within(one.faces, one.positions, _WIDTH * allowance) != 1
+    ]:
+        entry["no_pattern"] = (
+            f"no pattern yet: {', '.join(narrow)} {'is' if len(narrow) == 1 else 'are'} somewhere narrower than "
+            f"{1e3 * _WIDTH * allowance:g} mm, so that nothing is left within the seams; leave seams out (--no), or draw "
+            "others (--cut-seam)"
         )
     return entry

@@ -275,7 +275,7 @@ def _measure_fit(
     remedies = {name: part.remedies for name, part in advised.parts.items()}
     measured = advised.metrics()
     if isinstance(plan, MeshPlan) and plan.found is not None:
-        measured["garment"] = seams_entry(plan.found, list(advised.pieces.values()))
+        measured["garment"] = seams_entry(plan.found, list(advised.pieces.values()), plan.drawing.rules.seam)
     return measured, advised.notes, remedies, files
 
 

@@ -27,16 +27,16 @@ from warpflat.garment.sew_pieces import sew_pieces
 from warpflat.seams.anatomy import Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
-from warpflat.seams.solid import SOLID
+from warpflat.seams.solid import NARROW, SEWABLE, SOLID, LaidFlat, parts_within
 from warpflat.seams.symmetric import other_side
-from warpflat.seams.tailor import FACING, LEFT, TAILORED, side_word
+from warpflat.seams.tailor import FACING, LEFT, side_word
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.as_rigid import as_rigid_layout
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.injective import is_injective
 from warpflat.surface.mesh import Surface
 
-__all__ = ["Trial", "cut_by_energy"]
+__all__ = ["Trial", "cut_by_energy", "laid_flat"]
 
 Ids = NDArray[np.int64]
 
@@ -60,9 +60,8 @@ _PLACES, _STRETCHES = 3, 2
 _HEARD = 0.08
 # Nor is a dart's mouth wider than this share of its length: such a wedge is no dart.
 _WIDE = 0.6
-# A seam leaves no piece that is narrower somewhere than this share of the garment's size, between stretches of its border that are longer
-# than so many times that: nobody cuts a neck of cloth, or a tip, that narrow.
-_NARROW, _BESIDE_NECK = 0.05, 3.0
+# A piece is narrow between stretches of its border that are longer than so many times its width.
+_BESIDE_NECK = 3.0
 # So many of the best lines are sewn on trial: two sides that differ in length strain each other.
 _SEWN_ON_TRIAL = 3
 # Two ways to the border are different from this angle on [cosine].
@@ -165,7 +164,9 @@ def cut_by_energy(
     total = sum(piece.area for piece in pieces) or 1.0
     cloth, pieces, trials = _priced(cloth, pieces, anatomy, fabric, options, prepare)
     exhausted = set[int]()
-    tried = 0
+    tried = rounds = 0
+    # Who asks for less beyond the limit than is usual takes what brings less.
+    wished = min(options.limit / SeamOptions.limit, 1.0)
     parting = _PARTED_FIRST * total < sum(piece.outside for piece in pieces)
     most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
     if "hood" in cloth.seams and options.most_pieces is None:
@@ -174,29 +175,15 @@ def cut_by_energy(
     if tight or (parting and options.most_pieces is None and anatomy.open_front):
         # What is as tight as a skin has a panel more in each leg, a jacket two in each sleeve.
         most += 2
-    for _ in range(_MOST_ROUNDS):
+    while rounds < _MOST_ROUNDS:
         beyond = sum(piece.outside for piece in pieces)
-        # A strip that winds around until it lies over itself has no pattern before it is parted across.
-        folded = next(
-            (
-                piece
-                for piece in pieces
-                if anatomy.kind not in TAILORED
-                and not piece.mirrored
-                and _key(piece.mesh) not in exhausted
-                and piece.result.overlap > _OVERLAP
-            ),
-            None,
-        )
-        if folded is None and beyond <= options.limit * total:
+        if beyond <= options.limit * total:
             break
-        worst = folded or next(
+        worst = next(
             (
                 piece
                 for piece in sorted(pieces, key=lambda one: -one.outside)
-                if not piece.mirrored
-                and _key(piece.mesh) not in exhausted
-                and piece.outside > options.limit * piece.area
+                if not piece.mirrored and _key(piece.mesh) not in exhausted and piece.outside > wished * _WORTH * total
             ),
             None,
         )
@@ -215,23 +202,17 @@ def cut_by_energy(
         twin, now = _twin(worst, pieces, anatomy), len(pieces)
         good = list[tuple[float, _Candidate, Cloth, list[_Measured]]]()
         cloth = _remembered(cloth, pieces)
-        # Who asks for less beyond the limit than is usual takes what brings less.
-        wished = min(options.limit / SeamOptions.limit, 1.0)
         least = max(wished * _WORTH * total * (1 if twin is None else 0.5), _WORTH_OF_PIECE * worst.outside)
         number = next(k for k, piece in enumerate(pieces) if piece is worst)
         candidates = [
             candidate
-            for candidate in (
-                _across(worst, anatomy)
-                if folded is not None
-                else _candidates(cloth, worst, anatomy, options, may_part=parting and now < most)
-            )
+            for candidate in _candidates(cloth, worst, anatomy, options, may_part=parting and now < most)
             if not options.forbids(candidate.name)
         ]
 
         def on_trial(
             candidate: _Candidate, worst: _Measured = worst, twin: _Measured | None = twin, number: int = number,
-            cloth: Cloth = cloth, pieces: Sequence[_Measured] = pieces, most: int = most, folded: _Measured | None = folded,
+            cloth: Cloth = cloth, pieces: Sequence[_Measured] = pieces, most: int = most,
         ) -> tuple[Cloth, list[_Measured]] | None:  # fmt: skip
             report_activity(f"seams: trying {candidate.name}")
             made = _cut(cloth, worst.mesh, candidate, _TRIAL)
@@ -247,7 +228,7 @@ def cut_by_energy(
                 made = both or made
             # Where a twin is cut alike, it adds as many.
             more = (int(made.parts.max()) + 1 - len(pieces)) * (1 if twin is None else 2)
-            if folded is None and more and len(pieces) + more > most:
+            if more and len(pieces) + more > most:
                 return None
             try:
                 return made, _measured(made, anatomy, fabric, prepare, pieces, changed={number})
@@ -264,9 +245,6 @@ def cut_by_energy(
             if not _can_be_sewn(made, candidate, worst, new, anatomy.size):
                 continue
             gain = worst.outside - sum(piece.outside for piece in new)
-            if folded is not None:
-                gain = folded.result.overlap - sum(piece.result.overlap for piece in new)
-                least = _OVERLAP
             if gain >= least:
                 good.append((gain, candidate, made, new))
                 if gain >= _ENOUGH * worst.outside and not candidate.parts:
@@ -274,11 +252,7 @@ def cut_by_energy(
         best: tuple[float, _Candidate, Cloth, list[_Measured]] | None = None
         good.sort(key=lambda one: _value(one[0], one[2], len(one[3]) - 1), reverse=True)
         chosen = good[:_SEWN_ON_TRIAL]
-        strained = (
-            two_at_a_time(lambda one: _strained_by_sewing(one[2], one[3]), chosen)
-            if folded is None
-            else [0.0] * len(chosen)
-        )
+        strained = two_at_a_time(lambda one: _strained_by_sewing(one[2], one[3]), chosen)
         for (gain, candidate, made, new), loss in zip(chosen, strained, strict=True):
             value = _value(gain - loss, made, len(new) - 1)
             if gain - loss >= least and (best is None or value > best[0]):
@@ -289,6 +263,7 @@ def cut_by_energy(
                 exhausted.add(_key(twin.mesh))
             continue
         _, candidate, made, new = best
+        rounds += 1
         both = anatomy.mirror is not None and (twin is not None or _is_lopsided(candidate, anatomy))
         side = 0 if not both else _side_of(worst.mesh, anatomy) if twin is not None else _beside(candidate, anatomy)
         names = [_free_name(cloth, candidate, side)]
@@ -368,6 +343,7 @@ def _priced(
             now = outside + trial.outside * area
             if (
                 trial.released is None
+                or _least_width(new, anatomy.size) < _least_width(pieces, anatomy.size)
                 or trial.released > len(both) * most
                 or now > max(outside + _NOTHING * area, options.limit * area)
             ):
@@ -579,6 +555,27 @@ def _measured(
     return found
 
 
+def laid_flat(surface: Surface, fabric: Fabric, width: float) -> LaidFlat:
+    """Return what becomes of a piece that is laid flat coarsely.
+
+    Args:
+        surface: of the piece, a disk.
+        fabric: the cloth's.
+        width: see `_narrowest` [m].
+
+    Returns:
+        What it is; all of it is beyond its limit where it cannot be laid flat.
+    """
+    try:
+        datum = "grain" if "grain" in surface.lines else None
+        result = flatten(surface, fabric=fabric, datum=datum, relax=_trial_options(_PRICE_LEFT))
+    except InputError:
+        return LaidFlat(outside=1.0, overlap=0.0, width=width)
+    least, ends = _narrowest(surface, result.positions, max(width, SEWABLE))
+    neck = surface.vertices[ends] if len(ends) and parts_within(surface.faces, result.positions, SEWABLE) > 1 else None
+    return LaidFlat(outside=result.fit.outside, overlap=result.overlap, width=min(least, width), neck=neck)
+
+
 def _can_be_sewn(
     cloth: Cloth, candidate: _Candidate, before: _Measured, after: Sequence[_Measured], size: float
 ) -> bool:
@@ -586,8 +583,7 @@ def _can_be_sewn(
     if sum(piece.result.overlap for piece in after) > before.result.overlap + _OVERLAP:
         return False
     if candidate.parts:
-        least = min(_NARROW * size, _narrowest(before, _NARROW * size))
-        return all(_narrowest(piece, _NARROW * size) >= least for piece in after)
+        return _least_width(after, size) >= _least_width([before], size)
     line = np.unique(cloth.seams[_TRIAL])
     widest = 0.0
     for piece in after:
@@ -627,12 +623,16 @@ def _edges_of(piece: _Measured, seam: Ids) -> Ids:
     return np.asarray(edges[np.isin(own[:, 0] * stride + own[:, 1], seam[:, 0] * stride + seam[:, 1])])
 
 
-def _narrowest(piece: _Measured, width: float) -> float:
-    """Return the least width of a pattern between stretches of its border that are long compared with a width [m]; that width at most."""
+def _narrowest(surface: Surface, flat: FloatArray, width: float) -> tuple[float, Ids]:
+    """Return the least width of a pattern between stretches of its border that are long compared with a width [m]; that width at most.
+
+    Returns:
+        The width, and the two vertices between which it is; none where it is not less.
+    """
     from matplotlib.path import Path as Outline
 
-    flat = piece.result.positions
-    loop = flat[border_loops(piece.surface.faces)[0]]
+    border = border_loops(surface.faces)[0].astype(np.int64)
+    loop = flat[border]
     arc = arc_lengths(np.concatenate([loop, loop[:1]]))
     count = int(np.clip(4.0 * arc[-1] / width, 24, 400))
     at = np.arange(count) * arc[-1] / count
@@ -643,7 +643,18 @@ def _narrowest(piece: _Measured, width: float) -> float:
     one, other = np.nonzero((around > _BESIDE_NECK * width) & (distance < width))
     # Across an open dart or a concave corner there is no cloth.
     inside = Outline(points).contains_points(0.5 * (points[one] + points[other]))
-    return float(distance[one, other][inside].min(initial=width))
+    across = distance[one, other][inside]
+    if len(across) == 0:
+        return width, np.empty(0, dtype=np.int64)
+    least = int(across.argmin())
+    ends = points[[one[inside][least], other[inside][least]]]
+    return float(across[least]), border[np.linalg.norm(loop - ends[:, None], axis=2).argmin(axis=1)]
+
+
+def _least_width(pieces: Sequence[_Measured], size: float) -> float:
+    """Return the least width of some patterns in a garment of a size [m]; what nobody calls narrow at most."""
+    width = NARROW * size
+    return min((_narrowest(one.surface, one.result.positions, width)[0] for one in pieces), default=width)
 
 
 def _key(mesh: PieceMesh) -> int:
@@ -787,17 +798,6 @@ def _candidates(
                     end=rim[k] + reach * size * way,
                     parts=False,
                 )
-
-
-def _across(piece: _Measured, anatomy: Anatomy) -> Iterator[_Candidate]:
-    """Yield planes that may part a piece: of symmetry, where it lies on both sides, and across each of its axes through the middle."""
-    vertices = piece.surface.vertices
-    across = vertices @ anatomy.normal - anatomy.offset
-    if across.min() < -0.02 * anatomy.size and across.max() > 0.02 * anatomy.size:
-        yield _Candidate(name="seam", normal=anatomy.normal, point=anatomy.offset * anatomy.normal, parts=True)
-    middle = vertices.mean(axis=0)
-    for axis in np.linalg.eigh(np.cov((vertices - middle).T))[1].T[::-1]:
-        yield _Candidate(name="seam", normal=axis, point=middle, parts=True)
 
 
 def _is_lopsided(candidate: _Candidate, anatomy: Anatomy) -> bool:

@@ -20,7 +20,7 @@ from warpflat.pattern.pieces import FoundSeam
 from warpflat.seams.anatomy import ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
 from warpflat.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.seams.cloth import Cloth, PieceMesh
-from warpflat.seams.energy import Trial, cut_by_energy
+from warpflat.seams.energy import Trial, cut_by_energy, laid_flat
 from warpflat.seams.fields import Operators
 from warpflat.seams.openings import open_tubes
 from warpflat.seams.options import SeamOptions
@@ -176,6 +176,9 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
             shape=shape,
             mirror=None if both is None else anatomy,
             most=options.most_pieces,
+            measure=None
+            if fabric is None or anatomy.kind in TAILORED
+            else lambda trial, mesh, width: laid_flat(_surface_of(trial, anatomy, mesh, surface), fabric, width),
         )
         notes += more
     cloth = (mirrored(cloth, anatomy) if even else None) or cloth

@@ -5,6 +5,10 @@ of that curvature G, of area A and length L is strained by about G A / (12 L^2) 
 squared. So a narrow gore of a ball lies flat where a cap of the same area does not. Every cut is the one after which the least is
 left, over the area.
 
+Where the cloth is known, a part is laid flat before it is cut: what lies flat within its limit is cut no further, whatever the estimate
+says, and what is strained at a saddle is. A cut that leaves a narrow part costs more; a neck that is left, too narrow to be sewn, is cut
+through. To choose the cut, too, by what lies beyond the limit after it was worse (a plush of 18 % stayed at 18 %): it takes chips.
+
 What is its own mirror image is cut alike on both sides: in its plane of symmetry, or along lines that mirror each other. So a toy falls
 into halves and gussets. Parting it at the narrow rings of its limbs first, where an eigenfunction of the Laplacian has a short level line
 (Cheeger), took 18 pieces to end at 22 % beyond the limit; halves and gussets are 16 and end at 5 %.
@@ -12,16 +16,16 @@ into halves and gussets. Parting it at the narrow rings of its limbs first, wher
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.seams.anatomy import HOLE, Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.fields import Operators
@@ -30,15 +34,32 @@ from warpflat.seams.tailor import tidied
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.tubes import inner_borders, tube_borders
 
-__all__ = ["SOLID", "is_open", "is_panel", "part_solids", "wide_borders"]
+__all__ = [
+    "NARROW",
+    "SEWABLE",
+    "SOLID",
+    "LaidFlat",
+    "Measure",
+    "is_open",
+    "is_panel",
+    "part_solids",
+    "parts_within",
+    "wide_borders",
+]
 
 Ids = NDArray[np.int64]
-
 #: Seams of closed things are called by this word and a number.
 SOLID = "seam"
 
 # A part lies flat, or nearly, below this strain by estimate; a ball falls into eight gores by it.
 _FLAT = 0.022
+# Where it is measured, a part lies flat with less of it beyond its limit, and less of it over itself [m2].
+_BEYOND, _OVERLAP = 0.02, 1e-5
+# A part is narrow that is somewhere less wide than the first share of the size of the whole: nobody cuts a neck of cloth, or a tip, that
+# narrow. A cut that leaves one counts as the second strain more, where its width is nothing.
+NARROW, _THIN = 0.05, 0.05
+#: Nobody sews a neck of cloth narrower than this, half a usual allowance [m]; a part of less than such a share is a tip.
+SEWABLE, _TIP = 5e-3, 0.02
 # Normals are smoothed over this share of a part's size: wrinkles and facets are no shape.
 _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain.
@@ -47,6 +68,8 @@ _SEAM = 0.005
 _ALIKE, _UNLIKE = 0.03, 0.005
 # Axes along which a part is as long as along another within this share are none of its own: those of space serve.
 _ROUND = 0.05
+# Axes are the same from this cosine on.
+_NEARLY = 0.97
 # Where cloth faces an axis by more than this (cosine) it is a base.
 _BASE = 0.6
 # The border of a panel squared is at least this share of a disk's; a cap's is shorter.
@@ -57,6 +80,27 @@ _MOST = 16
 _LEAST = 0.02
 # Mirror images agree within this share of the size; a field is its own mirror image from this cosine on.
 _SAME, _ITSELF = 1e-4, 0.99
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LaidFlat:
+    """What becomes of a piece that is laid flat.
+
+    Attributes:
+        outside: the share beyond its limit.
+        overlap: how much of it lies over itself [m2].
+        width: where it is narrowest, no more than what nobody calls narrow [m].
+        neck: the ends of its narrowest place in space (2 by 3), where it is too narrow there to be sewn, and wider on both sides.
+    """
+
+    outside: float
+    overlap: float
+    width: float
+    neck: FloatArray | None = None
+
+
+#: Lays a piece of a cloth flat; the third argument is the width from which on nothing is narrow [m].
+Measure = Callable[[Cloth, PieceMesh, float], LaidFlat]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,6 +116,10 @@ def is_open(mesh: PieceMesh) -> bool:
     """Return whether a piece is a disk, or a tube that one cut opens."""
     loops = len(border_loops(mesh.faces.astype(np.int32)))
     return loops in (1, 2) and euler_characteristic(mesh.faces.astype(np.int32)) == 2 - loops
+
+
+def _is_disk(mesh: PieceMesh) -> bool:
+    return is_open(mesh) and len(border_loops(mesh.faces.astype(np.int32))) == 1
 
 
 def _is_sewn_inside(cloth: Cloth, mesh: PieceMesh) -> bool:
@@ -99,7 +147,12 @@ def is_panel(cloth: Cloth) -> bool:
 
 
 def part_solids(
-    cloth: Cloth, *, shape: bool, mirror: Anatomy | None = None, most: int | None = None
+    cloth: Cloth,
+    *,
+    shape: bool,
+    mirror: Anatomy | None = None,
+    most: int | None = None,
+    measure: Measure | None = None,
 ) -> tuple[Cloth, list[str]]:
     """Return the cloth with its pieces cut until each is a disk or a tube, and notes.
 
@@ -108,30 +161,42 @@ def part_solids(
         shape: whether pieces are cut for their shape, too, until each can lie flat.
         mirror: of a cloth that is its own mirror image, vertex by vertex: both sides are cut alike.
         most: pieces at most; 16 if not given.
+        measure: lays a disk flat; without it all goes by estimate.
     """
     total = float(cloth.face_areas.sum())
     number = 1
     most = _MOST if most is None else most
-    done, known = set[tuple[int, float]](), dict[int, float]()
+    done, known = set[tuple[int, tuple[int, float]]](), dict[int, float]()
+    laid = None if measure is None else _remembering(measure, NARROW * np.sqrt(total))
     for _ in range(4 * most):
         meshes = list(cloth.pieces())
         waiting = []
         for mesh in meshes:
             area = float(cloth.face_areas[mesh.face_of].sum())
-            key = len(mesh.face_of), round(area, 9)
-            topology = not is_open(mesh) or _is_sewn_inside(cloth, mesh)
-            if key in done or (not topology and (not shape or len(meshes) >= most)):
+            key = _key(mesh, area)
+            large, flat = shape and area > _LEAST * total, None
+            # What has no pattern, or one that nobody can sew, comes first and last; how many pieces there are is no matter.
+            if not is_open(mesh) or _is_sewn_inside(cloth, mesh):
+                rank, value = 2, _strain(mesh, known) * area
+            elif laid is not None and _is_disk(mesh):
+                flat = laid(cloth, mesh)
+                rank, value = (2, flat.overlap) if flat.overlap > _OVERLAP else (1, (flat.outside - _BEYOND) * area)
+            else:
+                rank, value = 1, (_strain(mesh, known) - _FLAT) * area
+            if rank == 1 and (not large or len(meshes) >= most or value <= 0.0 or (1, key) in done):
+                rank = 0
+            if rank == 0 and (not large or flat is None or flat.neck is None):
                 continue
-            value = _strain(mesh, known)
-            if topology or (value > _FLAT and area > _LEAST * total):
-                waiting.append((topology, value * area, key, mesh))
+            if (rank, key) not in done:
+                waiting.append((rank, value, key, mesh))
         if not waiting:
             break
-        _, _, key, mesh = max(waiting, key=lambda one: one[:2])
-        way = _best_way(mesh, total, known, mirror)
+        rank, _, key, mesh = max(waiting, key=lambda one: one[:2])
+        neck = laid(cloth, mesh).neck if laid is not None and rank == 0 else None
+        way = _best_way(mesh, total, known, mirror, laid, neck)
         made = None if way is None else _cut(cloth, mesh, way, f"{SOLID} {number}", mirror)
         if made is None:
-            done.add(key)
+            done.add((rank, key))
         else:
             cloth, number = made, number + 1
     left = sum(not is_open(mesh) for mesh in cloth.pieces())
@@ -150,13 +215,16 @@ def _cut(cloth: Cloth, mesh: PieceMesh, field: FloatArray, name: str, mirror: An
     """Return the cloth with a piece, and its mirror image, cut along a field's zero line (#V of the piece); None if it is not parted."""
     own, way = np.zeros(len(cloth.faces), dtype=np.int64), np.zeros(len(cloth.vertices))
     own[mesh.face_of], way[mesh.vertex_of] = 1, field
+    keep = 0.05
     for other in cloth.pieces() if mirror is not None else ():
         image = None if mirror is None or other.face_of[0] == mesh.face_of[0] else _image(other, mesh, mirror)
         if image is not None:
             own[other.face_of], way[other.vertex_of] = 1, field[image]
+            # Of both together, an island is half the share.
+            keep *= 0.5
             break
     made = replace(cloth, values={**cloth.values, "way": way}, labels={**cloth.labels, "own": own})
-    made, positive = tidied(made, "way", own > 0, keep=0.05).split("way", own > 0)
+    made, positive = tidied(made, "way", own > 0, keep=keep).split("way", own > 0)
     made = made.with_seam(name, made.line_between(positive, made.labels["own"] > 0))
     values = {key: value for key, value in made.values.items() if key != "way"}
     labels = {key: label for key, label in made.labels.items() if key != "own"}
@@ -214,8 +282,11 @@ def _smoothed_normals(mesh: PieceMesh | Cloth) -> tuple[FloatArray, FloatArray]:
     return corners, corners.mean(axis=1)
 
 
-def _ways(mesh: PieceMesh) -> Iterator[_Way]:
-    """Yield ways of cutting a part: across each of its axes through the middle, and where it begins to face each way along them."""
+def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
+    """Yield ways of cutting a part: across each of its axes through the middle, and where it begins to face each way along them.
+
+    With `mirror` it is its own mirror image: an axis that nearly is across the plane of symmetry is taken as that, and cut in the plane.
+    """
     triangles = mesh.vertices[mesh.faces]
     middles = triangles.mean(axis=1)
     areas = 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
@@ -238,13 +309,18 @@ def _ways(mesh: PieceMesh) -> Iterator[_Way]:
     axes = np.array(
         [
             np.sign(axis[np.abs(axis).argmax()]) * np.eye(3)[np.abs(axis).argmax()]
-            if np.abs(axis).max() > 0.97
+            if np.abs(axis).max() > _NEARLY
             else axis
             for axis in axes
         ]
     )
+    fields = (mesh.vertices - centre) @ axes.T
+    if mirror is not None:
+        k = int(np.abs(axes @ mirror.normal).argmax())
+        if abs(float(axes[k] @ mirror.normal)) > _NEARLY:
+            axes[k], fields[:, k] = mirror.normal, mesh.vertices @ mirror.normal - mirror.offset
     for k in (1, 2, 0):
-        yield _Way(field=(mesh.vertices - centre) @ axes[k], name="across", round=bool(same.any()))
+        yield _Way(field=fields[:, k], name="across", round=bool(same.any()))
     _, normals = _smoothed_normals(mesh)
     weight = np.maximum(np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices)), 1e-300)
     for axis in axes:
@@ -253,13 +329,41 @@ def _ways(mesh: PieceMesh) -> Iterator[_Way]:
             yield _Way(field=sign * facing / weight - _BASE, name="base", round=bool(same.any()))
 
 
-def _best_way(mesh: PieceMesh, total: float, known: dict[int, float], mirror: Anatomy | None) -> FloatArray | None:
+def _key(mesh: PieceMesh, area: float) -> tuple[int, float]:
+    """Return what a piece and its mirror image have in common."""
+    return len(mesh.face_of), round(area, 9)
+
+
+def _remembering(measure: Measure, width: float) -> Callable[[Cloth, PieceMesh], LaidFlat]:
+    """Return a measure that lays pieces that are alike flat once."""
+    known: dict[tuple[int, float], LaidFlat] = {}
+
+    def laid(cloth: Cloth, mesh: PieceMesh) -> LaidFlat:
+        key = _key(mesh, float(cloth.face_areas[mesh.face_of].sum()))
+        if key not in known:
+            known[key] = measure(cloth, mesh, width)
+        return known[key]
+
+    return laid
+
+
+def _best_way(
+    mesh: PieceMesh,
+    total: float,
+    known: dict[int, float],
+    mirror: Anatomy | None,
+    laid: Callable[[Cloth, PieceMesh], LaidFlat] | None,
+    neck: FloatArray | None,
+) -> FloatArray | None:
     """Return the field (#V) along whose zero line a part is cut so that the least is left to do; None if no cut parts it well."""
     image = None if mirror is None else _image(mesh, mesh, mirror)
-    best: tuple[float, FloatArray] | None = None
-    for way in _ways(mesh):
+    found = list[tuple[float, Cloth, FloatArray]]()
+    for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
         if image is not None and not _mirrors_itself(way.field, image):
-            continue
+            if neck is None:
+                continue
+            # At both of its necks.
+            way = replace(way, field=np.maximum(way.field, way.field[image]))
         local = Cloth(vertices=mesh.vertices, faces=mesh.faces, values={"way": way.field})
         everywhere = np.ones(len(local.faces), dtype=bool)
         made, positive = tidied(local, "way", everywhere, keep=0.05).split("way", everywhere)
@@ -267,20 +371,53 @@ def _best_way(mesh: PieceMesh, total: float, known: dict[int, float], mirror: An
         if len(edges) == 0:
             continue
         made = made.with_seam("way", edges)
-        area = float(made.face_areas.sum())
-        cost = _SEAM * made.seam_length("way") / np.sqrt(area)
-        areas = list[float]()
-        for part in made.pieces():
-            areas.append(float(made.face_areas[part.face_of].sum()))
-            if areas[-1] < 0.3 * _LEAST * total:
-                cost = np.inf
-                break
-            cost += _strain(part, known) * areas[-1] / area + _topology(part.faces)
-        if np.isfinite(cost):
-            cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
-        if np.isfinite(cost) and (best is None or cost < best[0]):
-            best = cost, way.field
+        parts = list(made.pieces())
+        areas = [float(made.face_areas[part.face_of].sum()) for part in parts]
+        if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
+            continue
+        cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part.faces) for part in parts)
+        cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
+        cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
+        found.append((cost, made, way.field))
+    best: tuple[float, FloatArray] | None = None
+    for cost, made, field in sorted(found, key=lambda one: one[0]):
+        if best is not None and best[0] <= cost:
+            break
+        if laid is not None:
+            widths = [laid(made, part).width for part in made.pieces() if _is_disk(part)]
+            cost += _THIN * max(1.0 - min(widths, default=np.inf) / (NARROW * np.sqrt(total)), 0.0)
+        if best is None or cost < best[0]:
+            best = cost, field
     return None if best is None else best[1]
+
+
+def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
+    """Return the way of cutting a part at its neck and nowhere else, in the plane through its ends that is at right angles to the cloth."""
+    middle, points = neck.mean(axis=0), mesh.vertices
+    triangles = points[mesh.faces]
+    near = np.linalg.norm(triangles.mean(axis=1) - middle, axis=1) < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = np.cross(neck[1] - neck[0], normals[near].sum(axis=0) if near.any() else normals.sum(axis=0))
+    field = (points - middle) @ along / max(float(np.linalg.norm(along)), 1e-300)
+    # Of what lies beyond the plane, only the part at the neck.
+    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    passed = (field[a] > 0.0) & (field[b] > 0.0)
+    graph = coo_array((np.ones(int(passed.sum())), (a[passed], b[passed])), shape=(len(points),) * 2)
+    _, label = connected_components(graph, directed=False)
+    ahead = np.flatnonzero(field > 0.0)
+    if len(ahead):
+        own = label == label[ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]]
+        field = np.where(own, field, -np.abs(field))
+    return _Way(field=field, name="neck", round=False)
+
+
+def parts_within(faces: IntArray, flat: FloatArray, width: float) -> int:
+    """Return in how many parts a pattern falls, but for its tips, with half a width [m] taken off all around; 0 where nothing is left."""
+    import shapely
+
+    rings = [shapely.Polygon(flat[loop]).buffer(0.0) for loop in border_loops(faces, flat)]
+    whole = rings[0].difference(shapely.union_all(rings[1:]))
+    return int((shapely.area(shapely.get_parts(whole.buffer(-0.5 * width))) > _TIP * whole.area).sum())
 
 
 def _topology(faces: Ids) -> float:

@@ -44,9 +44,9 @@ _BARE = 0.05
 _STEEP = 3.0
 # Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
-# Levels between armpits and crown; a hood is wider than the neck below it by this, and the shoulders are by more. It has such a share of
-# the cloth, and its opening goes up by at least this share of its height.
-_LEVELS, _WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 25, 1.12, 1.35, 1.5, (0.05, 0.4), 0.5
+# Levels between armpits and crown; a hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. It
+# has such a share of the cloth, and its opening goes up by at least this share of its height.
+_LEVELS, _WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 25, 1.1, 1.35, 1.5, (0.05, 0.4), 0.5
 #: A line that the user has drawn is meant where a tailor would have cut within this.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
@@ -374,7 +374,14 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
         (float(limb.fork @ anatomy.up) for limb in anatomy.limbs_of("sleeve")), default=top - 0.4 * anatomy.size
     )
     levels = np.linspace(shoulder, top, _LEVELS)[1:-1]
-    girths = np.array([section(cloth, heights - level, trunk)[0] for level in levels])
+    # Around the cloth and across the opening: a hood is open there.
+    girths = np.array(
+        [
+            section(cloth, heights - level, trunk)[0]
+            + _across(cloth.vertices[opening.vertices], heights[opening.vertices] - level)
+            for level in levels
+        ]
+    )
     # The narrowest level above which it is wider again, and below which the shoulders are much wider.
     above, below = np.maximum.accumulate(girths[::-1])[::-1], np.maximum.accumulate(girths)
     is_neck = (above > _WIDER * girths) & (below > _SHOULDERS * girths)
@@ -404,6 +411,18 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     trial, is_left = trial.split(LEFT, hood)
     trial = trial.with_seam("hood centre", trial.line_between(is_left, trial.labels["sleeve"] == number))
     return replace(trial, values={key: value for key, value in trial.values.items() if key != "hood"})
+
+
+def _across(loop: FloatArray, height: FloatArray) -> float:
+    """Return the way across a closed line (#L by 3) between the two places where its height (#L) is 0 [m]; 0 where it has not two."""
+    below = height < 0.0
+    first = np.flatnonzero(below != np.roll(below, -1))
+    if len(first) != 2:
+        return 0.0
+    following = (first + 1) % len(loop)
+    share = (height[first] / (height[first] - height[following]))[:, None]
+    one, other = loop[first] + share * (loop[following] - loop[first])
+    return float(np.linalg.norm(other - one))
 
 
 def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: Ids, anatomy: Anatomy) -> Cloth:
