@@ -129,6 +129,7 @@ class SpringNetwork:
         device: str | wp.Device | None = None,
         model: Model = "springs",
         stretch: FloatArray | None = None,
+        buckling_stiffness: float | None = None,
     ) -> SpringNetwork:
         """Make the network of a surface.
 
@@ -140,6 +141,7 @@ class SpringNetwork:
             model: "springs" or "membrane".
             stretch: #F by 2, intended length worn over length flat along warp and weft. Springs and cells are then at
                 rest in a pattern that is smaller by this factor.
+            buckling_stiffness: [N/m]; measured if not given.
 
         Raises:
             InputError: an unknown model.
@@ -155,7 +157,7 @@ class SpringNetwork:
                 fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, intended
             )
             springs, buckling_stiffness = with_stiffness(springs, cells, weights), np.inf
-        else:
+        elif buckling_stiffness is None:
             buckling_stiffness = (
                 isotropic_buckling_stiffness(surface, fabric)
                 if fabric.is_isotropic
