@@ -22,7 +22,7 @@ def head_of(mannequin: Mannequin) -> tuple[FloatArray, IntArray] | None:
     It is the mean head of the body model (:class:`warpflat.mannequin.body_model.BodyModel`). Its crown is as high as the person is tall,
     or its widest place as high as the tape around a scan's head, and its nape is that of the neck. None if no head's girth is known.
     """
-    from scipy.spatial import ConvexHull
+    from trimesh.convex import convex_hull
 
     girth = mannequin.extremity("head")
     if girth is None:
@@ -40,13 +40,5 @@ def head_of(mannequin: Mannequin) -> tuple[FloatArray, IntArray] | None:
     nape = neck[neck[:, 2].argmin()]
     behind = mean[np.abs(scale * mean[:, 1] + lift - nape[1]) < 0.01 * scale, 2].min()
     vertices = head + np.array([0.0, lift, nape[2] - scale * behind])
-    hull = ConvexHull(vertices)
-    used, rows = np.unique(hull.simplices, return_inverse=True)
-    faces: IntArray = rows.reshape(-1, 3).astype(np.int32)
-    corner = vertices[used][faces]
-    inwards = (
-        np.einsum("ta,ta->t", np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), hull.equations[:, :3])
-        < 0.0
-    )
-    faces[inwards] = faces[inwards][:, ::-1]
-    return vertices[used], faces
+    hull = convex_hull(vertices)
+    return np.asarray(hull.vertices), hull.faces.astype(np.int32)
