@@ -71,7 +71,8 @@ def held(network: SpringNetwork) -> SpringNetwork:
 def one_cell(shape: NDArray[np.float64]) -> SpringNetwork:
     """A network of one triangle (3 by 2 [m])."""
     surface = make_surface(np.column_stack([shape, np.zeros(3)]), [[0, 1, 2]])
-    return SpringNetwork.build(surface, CLOTH, shape, grain_angle=0.0, device=DEVICE, buckling_stiffness=np.inf)
+    network = SpringNetwork.build(surface, CLOTH, shape, grain_angle=0.0, device=DEVICE)
+    return replace(network, buckling_stiffness=np.inf)
 
 
 def random_cell(seed: int) -> tuple[SpringNetwork, NDArray[np.float64]]:
@@ -243,7 +244,7 @@ def test_a_quad_does_half_of_what_its_four_corner_triangles_do(squeeze: float):
     """Whether all, some or none of them are squeezed."""
     shape = np.array([[0.0, 0.0], [0.1, 0.01], [0.11, 0.12], [0.0, 0.1]])
     surface = make_surface(np.column_stack([shape, np.zeros(4)]), [[0, 1, 2, 3]])
-    network = SpringNetwork.build(surface, CLOTH, shape, device=DEVICE, buckling_stiffness=np.inf)
+    network = replace(SpringNetwork.build(surface, CLOTH, shape, device=DEVICE), buckling_stiffness=np.inf)
     rng = np.random.default_rng(4)
     positions, velocities = squeeze * shape, rng.normal(size=(4, 2))
     positions[2] *= 0.93

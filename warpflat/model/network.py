@@ -129,7 +129,6 @@ class SpringNetwork:
         device: str | wp.Device | None = None,
         model: Model = "springs",
         stretch: FloatArray | None = None,
-        buckling_stiffness: float | None = None,
     ) -> SpringNetwork:
         """Make the network of a surface.
 
@@ -141,7 +140,6 @@ class SpringNetwork:
             model: "springs" or "membrane".
             stretch: #F by 2, intended length worn over length flat along warp and weft. Springs and cells are then at
                 rest in a pattern that is smaller by this factor.
-            buckling_stiffness: [N/m]; measured if not given.
 
         Raises:
             InputError: an unknown model.
@@ -156,13 +154,11 @@ class SpringNetwork:
             weights, held = step_matrix(
                 fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, intended
             )
-            springs, buckling_stiffness = with_stiffness(springs, cells, weights), np.inf
-        elif buckling_stiffness is None:
-            buckling_stiffness = (
-                isotropic_buckling_stiffness(surface, fabric)
-                if fabric.is_isotropic
-                else measure_buckling_stiffness(surface, springs, positions, grain_axes(grain_angle)[0])
-            )
+            springs, buckling = with_stiffness(springs, cells, weights), np.inf
+        elif fabric.is_isotropic:
+            buckling = isotropic_buckling_stiffness(surface, fabric)
+        else:
+            buckling = measure_buckling_stiffness(surface, springs, positions, grain_axes(grain_angle)[0])
         return cls(
             surface=surface,
             fabric=fabric,
@@ -173,7 +169,7 @@ class SpringNetwork:
             model=model,
             stretch=stretch,
             held_stiffness=held,
-            buckling_stiffness=buckling_stiffness,
+            buckling_stiffness=buckling,
         )
 
     def __post_init__(self) -> None:
