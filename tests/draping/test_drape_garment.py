@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,11 +16,17 @@ from pxr import Sdf, Usd, UsdGeom
 
 import warpflat
 from warpflat.cli.tables import warnings_of
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.draping import drape_garment
+from warpflat.draping.body import Body
+from warpflat.draping.drape_garment import thread_elastics
 from warpflat.draping.frames import choose_frames, write_drape_frames
-from warpflat.draping.places import find_places
+from warpflat.draping.places import Place, find_places
 from warpflat.draping.result import HOLLOW_REACH, hollow_depths
 from warpflat.draping.sewn_cloth import SewnCloth, sew_cloth
+from warpflat.scene.drape import drape_scene
+from warpflat.scene.load import load_scene
 from warpflat.surface.connectivity import border_loops
 
 
@@ -52,7 +60,15 @@ def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
         near = np.linalg.norm(cloth.designed - cloth.designed[vertex], axis=1) < 0.05
         lift, none = np.where(near, 0.02, 0.0), np.zeros(len(near))
         (place,) = find_places(
-            cloth, worn.areas, misfit=lift, meant_to_touch=near, bridged=none, lift=lift, gap=lift, strains={}
+            cloth,
+            worn.areas,
+            misfit=lift,
+            meant_to_touch=near,
+            bridged=none,
+            lift=lift,
+            gap=lift,
+            strains={},
+            gathered=near & False,
         )
         assert words in place.words
 
@@ -76,7 +92,7 @@ def test_cloth_without_loops_around_it_has_places_too(faces: list[list[int]], wo
     )  # fmt: skip
     (place,) = find_places(
         cloth, 0.01 * ones, misfit=0.02 * ones, meant_to_touch=ones > 0.0, bridged=0.0 * ones, lift=0.02 * ones,
-        gap=0.02 * ones, strains={},
+        gap=0.02 * ones, strains={}, gathered=ones < 0.0,
     )  # fmt: skip
     assert words in place.words
 
@@ -259,3 +275,101 @@ def test_a_corrected_pattern_halves_the_misfit_and_keeps_its_seams(bodice: warpf
     # What is draped again is what was found.
     again = warpflat.drape(new)
     np.testing.assert_allclose(again.positions, found.after.positions, atol=1e-9)
+
+
+class _Cylinder:
+    """The gaps from an upright cylinder, in the place of a body's mesh."""
+
+    def __init__(self, radius: float) -> None:
+        self.radius = radius
+
+    def gaps(self, points: FloatArray) -> FloatArray:
+        return np.hypot(points[:, 0], points[:, 2]) - self.radius
+
+
+def _tube(worn: warpflat.Drape, radius: float, gaps: FloatArray, offset: FloatArray) -> warpflat.Drape:
+    """Return a tube of cloth around a cylinder, designed so far off it by rows [m], and moved by so much (3 or #V by 3 [m])."""
+    around, rows = 32, len(gaps)
+    angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    unit = np.column_stack([np.sin(angle), np.zeros(around), np.cos(angle)])
+    designed = np.concatenate([(radius + gap) * unit + [0.0, -0.02 * row, 0.0] for row, gap in enumerate(gaps)])
+    grid = np.arange(rows * around).reshape(rows, around)
+    beside = np.roll(grid, -1, axis=1)
+    faces = np.stack([grid[1:], beside[1:], beside[:-1], grid[:-1]], axis=-1).reshape(-1, 4)
+    areas = np.ones(len(designed))
+    cloth = SimpleNamespace(designed=designed, faces=faces, vertex_areas=lambda: areas)
+    moved = dataclasses.replace(worn.worn, positions=designed + offset)
+    body, form = _Cylinder(radius), _Cylinder(radius + float(gaps.min()))
+    return dataclasses.replace(worn, cloth=cloth, worn=moved, body=body, designed=form, hangs_below=-np.inf)  # type: ignore[arg-type]
+
+
+def test_cloth_hangs_from_where_it_was_designed_to_leave_the_body(worn: warpflat.Drape):
+    # Fitted, loose, and near the body again: all of it stands off by another 8 mm.
+    gaps = np.repeat([0.002, 0.02, 0.002], 8)
+    off = _tube(worn, 0.15, gaps, np.zeros(3)).cloth.designed * np.array([1.0, 0.0, 1.0])
+    off *= 0.008 / np.linalg.norm(off, axis=1, keepdims=True)
+    touches = _tube(worn, 0.15, gaps, off).meant_to_touch
+    assert touches[: 8 * 32].all()
+    assert not touches[8 * 32 :].any()
+
+
+@pytest.mark.parametrize("moved", [True, False])
+def test_ease_that_has_moved_is_no_misfit(worn: warpflat.Drape, moved: bool):
+    # Around an arm: pushed to one side it stands off there, too wide it does all around.
+    gaps = np.full(16, 0.006)
+    off = np.array([0.005, 0.0, 0.0])
+    if not moved:
+        off = _tube(worn, 0.04, gaps, np.zeros(3)).cloth.designed * np.array([1.0, 0.0, 1.0])
+        off *= 0.005 / np.linalg.norm(off, axis=1, keepdims=True)
+    tube = _tube(worn, 0.04, gaps, off)
+    aside = tube.gap > tube.designed_gap + 0.004
+    assert aside.sum() > 16
+    assert tube.meant_to_touch[aside].all() != moved
+    assert tube.meant_to_touch[aside].any() != moved
+
+
+def test_small_folds_are_told_and_overstretched_cloth_counts(worn: warpflat.Drape):
+    def fits(kind: str, worst: float, area: float) -> bool:
+        drape = dataclasses.replace(worn)
+        place = Place(kind=kind, line="front.bust", worst=worst, gap=0.0, area=area, words="", vertex=0)
+        vars(drape)["places"] = (place,)
+        return drape.fits
+
+    assert fits("strain", -0.3, 8e-4)
+    assert not fits("strain", -0.3, 12e-4)
+    assert not fits("strain", 0.3, 8e-4)
+    assert fits("misfit", 0.01, 8e-4)
+    assert not fits("misfit", 0.01, 12e-4)
+    assert fits("hang", 0.01, 1.0)
+
+
+def test_what_an_elastic_gathers_is_told_and_no_strain(bodice: warpflat.Garment, worn: warpflat.Drape):
+    cloth = worn.cloth
+    body = Body(cloth.designed * [0.9, 1.0, 0.9], cloth.faces, device=worn.body.device)
+    drawn, held = thread_elastics(cloth, ["waist"], body)
+    assert held == [line for line in cloth.lines if line.partition(".")[2] == "waist"]
+    rows = np.unique(np.concatenate([cloth.lines[line] for line in held]))
+    others = np.setdiff1d(np.arange(len(cloth.designed)), rows)
+    np.testing.assert_array_equal(drawn.designed[others], cloth.designed[others])
+    np.testing.assert_allclose(drawn.designed[rows, 1], cloth.designed[rows, 1], atol=1e-9)
+    assert np.abs(body.gaps(drawn.designed[rows])).max() < 1e-3 < body.gaps(cloth.designed[rows]).min()
+    # The cells above the waist pressed together, half of them.
+    pressed = dataclasses.replace(worn, threaded=held)
+    strain = np.where(np.isin(cloth.faces, rows).any(axis=1), -0.5, 0.0)
+    vars(pressed)["strains"] = {"warp": 0.0 * strain, "weft": strain}
+    vars(pressed)["misfit"] = np.zeros(len(cloth.designed))
+    gathered = [place for place in pressed.places if "gathered by its elastic" in place.words]
+    assert gathered
+    assert {place.kind for place in gathered} == {"hang"}
+    assert not any(place.kind == "strain" for place in pressed.places)
+    vars(other := dataclasses.replace(worn))["strains"] = vars(pressed)["strains"]
+    assert any(place.kind == "strain" for place in other.places)
+
+
+def test_a_scene_threads_the_elastics_of_its_finishings(monkeypatch: pytest.MonkeyPatch):
+    seen: list[Sequence[str]] = []
+    monkeypatch.setattr(drape_garment, "drape", lambda *_, elastics, **__: seen.append(elastics))
+    scenes = Path(__file__).parents[2] / "scenes"
+    for name in ("pyjama_trousers", "trousers"):
+        drape_scene(load_scene(scenes / f"{name}.toml"), None)  # type: ignore[arg-type]
+    assert seen == [["waist"], []]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import BoolArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.text import without_side
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
@@ -19,9 +21,13 @@ from warpflat.draping.sewn_cloth import SewnCloth, sew_cloth
 from warpflat.flattening.result import Flattening
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.pattern.whole_pieces import MIRRORED
 from warpflat.surface.mesh import Surface
 
-__all__ = ["drape", "held_vertices"]
+__all__ = ["drape", "held_vertices", "thread_elastics"]
+
+# So often is what an elastic draws in moved towards the body, level.
+_LEVELLED = 20
 
 
 def drape(
@@ -29,6 +35,7 @@ def drape(
     body: Mannequin | Surface | None = None,
     *,
     hold: Sequence[str] = (),
+    elastics: Sequence[str] = (),
     options: DrapeOptions | None = None,
     callback: Callable[[int, float], None] | None = None,
     device: str | None = None,
@@ -42,6 +49,7 @@ def drape(
         body: a mannequin or a surface, such as a scan's; a garment's own mannequin, or a piece's own surface, if not given.
         hold: lines and edges that stay where they are, as "piece.line", or "line" for every piece that has one: those that
             would be sewn to what is not there.
+        elastics: edges that an elastic draws to the body and holds there, such as "waist".
         options: friction, tolerance and limits.
         callback: called with the number of steps and the residual now and then.
         device: Warp device.
@@ -55,13 +63,18 @@ def drape(
     cloth = sew_cloth(garment)
     start_warp()
     where = wp.get_device(device)
-    designed = Body(cloth.designed, cloth.faces, device=where)
     if body is None:
         body = garment.mannequin if isinstance(garment, Garment) else None
     surface = body.surface() if isinstance(body, Mannequin) else body
-    solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
+    gripped: list[str] = []
+    if surface is None:
+        solid = designed = Body(cloth.designed, cloth.faces, device=where)
+    else:
+        solid = Body(surface.vertices, surface.faces, device=where)
+        cloth, gripped = thread_elastics(cloth, elastics, solid)
+        designed = Body(cloth.designed, cloth.faces, device=where)
     options = options or DrapeOptions()
-    held, frames = held_vertices(cloth, hold), list[NDArray[np.float32]]()
+    held, frames = held_vertices(cloth, [*hold, *gripped]), list[NDArray[np.float32]]()
     worn = relax_drape(
         cloth, solid, options=options, held=held, callback=callback,
         observer=lambda places: frames.append(places.astype(np.float32)),
@@ -77,7 +90,7 @@ def drape(
     hip = -np.inf if mannequin is None else float(mannequin.vertices[mannequin.layout.lines["hip"], 1].mean())
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
-        hangs_below=hip, cuts=cuts,
+        hangs_below=hip, cuts=cuts, threaded=gripped,
     )  # fmt: skip
 
 
@@ -102,3 +115,22 @@ def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:
         for line in lines:
             held[cloth.lines[line]] = True
     return held
+
+
+def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple[SewnCloth, list[str]]:
+    """Return the cloth with edges drawn to the body at their height, as an elastic does, and the lines along them that it holds.
+
+    Args:
+        cloth: the sewn cloth.
+        edges: what an elastic is threaded through, on whatever piece and side.
+        body: what it draws them to.
+    """
+    called = {line: line.partition(".")[2].removesuffix(MIRRORED).rstrip(" 0123456789") for line in cloth.lines}
+    gripped = [line for line, edge in called.items() if {edge, without_side(edge)} & set(edges)]
+    drawn = cloth.designed.copy()
+    if gripped:
+        rows = np.unique(np.concatenate([cloth.lines[line] for line in gripped]))
+        # By alternating projections on the body and on the level of each vertex.
+        for _ in range(_LEVELLED):
+            drawn[rows] = np.where([True, False, True], body.nearest(drawn[rows])[0], drawn[rows])
+    return replace(cloth, designed=drawn), gripped

@@ -13,9 +13,8 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
 from warpflat.core.short_repr import short_repr
-from warpflat.core.text import without_side
 from warpflat.draping.body import Body
-from warpflat.draping.drape_garment import held_vertices
+from warpflat.draping.drape_garment import held_vertices, thread_elastics
 from warpflat.draping.lift import Lift, whole_lifts
 from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
 from warpflat.draping.options import DrapeOptions
@@ -40,8 +39,6 @@ _SIZES = (0.05, 10.0)
 _WITHIN, _DEEP = 0.05, 0.01
 # Nor where its top, from this share of its vertices on, lies so far [m] off, or less than this share of it looks as the skin does.
 _TOP, _OFF, _ALIKE = 0.9, 0.05, 0.75
-# So often is what an elastic draws in moved towards the body, level.
-_LEVELLED = 20
 # The halves of a hood start this far beside the head [m].
 _BESIDE_HEAD = 0.01
 
@@ -198,17 +195,10 @@ def drape_pattern(
         for name in set(meshes) - set(drafted) if lifted else ():
             stays[welded[cloth.piece_vertices[name]]] = True
         cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid, fixed=stays))
-    # An elastic draws the edge along its casing to the body, and holds it there.
-    threaded = {elastic.edge for elastic in pattern.elastics}
-    edge_of = {line: line.partition(".")[2].removesuffix(MIRRORED).rstrip(" 0123456789") for line in lines}
-    gripped = [line for line, edge in edge_of.items() if threaded & {edge, without_side(edge)}]
+    threaded = sorted({elastic.edge for elastic in pattern.elastics})
+    cloth, gripped = thread_elastics(cloth, threaded, solid)
     if gripped:
-        notes.append(f"held by an elastic: {', '.join(sorted(threaded))}")
-        drawn, rows = cloth.designed.copy(), np.unique(np.concatenate([lines[line] for line in gripped]))
-        # At its height: by alternating projections on the body and on the level of each vertex.
-        for _ in range(_LEVELLED):
-            drawn[rows] = np.where([True, False, True], solid.nearest(drawn[rows])[0], drawn[rows])
-        cloth = replace(cloth, designed=drawn)
+        notes.append(f"held by an elastic: {', '.join(threaded)}")
     held, frames = held_vertices(cloth, [*placement.hold, *gripped]), list[NDArray[np.float32]]()
     worn = relax_drape(
         cloth, solid, options=options, held=held, callback=callback,
@@ -219,7 +209,14 @@ def drape_pattern(
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(
-        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames), drafted=drafted
+        cloth=cloth,
+        worn=worn,
+        body=solid,
+        designed=designed,
+        options=options,
+        frames=tuple(frames),
+        drafted=drafted,
+        threaded=gripped,
     ), notes
 
 

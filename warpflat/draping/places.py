@@ -26,7 +26,7 @@ class Place:
     """A connected place where the cloth does not lie as designed.
 
     Attributes:
-        kind: "misfit", "strain", "bridged", or "hang" where the cloth is not meant to touch the body.
+        kind: "misfit", "strain", "bridged", or "hang" where the cloth is not meant to touch the body, or is gathered.
         line: the feature line or edge next to its worst vertex, "piece.line".
         worst: the largest distance from the designed surface [m], or strain.
         gap: the distance from the body there [m].
@@ -61,6 +61,7 @@ def find_places(
     lift: FloatArray,
     gap: FloatArray,
     strains: Mapping[str, FloatArray],
+    gathered: BoolArray,
 ) -> tuple[Place, ...]:
     """Find the connected places of misfit, bridged hollows and strain beyond the cloth's limit, the largest first.
 
@@ -72,6 +73,7 @@ def find_places(
         lift: #V, how much farther than designed the cloth is from the body [m].
         gap: #V, the distance from the body [m].
         strains: #F along warp and weft.
+        gathered: #V, true where an elastic draws the cloth together.
     """
     found = []
     # Cloth gapes at an edge of the garment. Inside, as in a flute of a skirt, it stands off.
@@ -120,14 +122,20 @@ def find_places(
             if areas[part].sum() >= _LEAST_AREA:
                 worst = int(part[np.abs(at_vertices[part]).argmax()])
                 line, area, strain = _line_at(cloth, worst), float(areas[part].sum()), float(at_vertices[worst])
-                how = "stretched" if strain > 0.0 else "pressed together"
+                how, beyond = (
+                    "stretched" if strain > 0.0 else "pressed together",
+                    f", beyond the cloth's limit of {100 * limit:g} %",
+                )
+                kind = "strain"
+                if strain < 0.0 and gathered[part].any():
+                    kind, how, beyond = "hang", "gathered by its elastic", ""
                 words = (
-                    f"{_called(line)} is {how} by {100 * abs(strain):.1f} % along the {direction}, beyond the cloth's "
-                    f"limit of {100 * limit:g} %, over {1e4 * area:.0f} cm2"
+                    f"{_called(line)} is {how} by {100 * abs(strain):.1f} % along the {direction}{beyond}, "
+                    f"over {1e4 * area:.0f} cm2"
                 )
                 found.append(
                     Place(
-                        kind="strain",
+                        kind=kind,
                         line=line,
                         worst=strain,
                         gap=float(gap[worst]),

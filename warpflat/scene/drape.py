@@ -77,7 +77,7 @@ def write_drape(
         report_activity("correcting the pattern")
         with errors_named(scene.where):
             other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
-            found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
+            found = correct_pattern(draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None)
             drawing = pattern_options(scene.settings.pattern, None)
         if output.picture:
             with optional_file(folder / "corrected.png", files) as path:
@@ -111,4 +111,7 @@ def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | No
     report_activity("draping")
     with errors_named(scene.where):
         options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
-        return drape(garment, hold=table.hold, options=options, device=device or scene.settings.device)
+        return drape(
+            garment, hold=table.hold, elastics=[each.edge for each in scene.settings.finishing if each.elastic], options=options,
+            device=device or scene.settings.device,
+        )  # fmt: skip
