@@ -472,6 +472,7 @@ def test_an_elastic_draws_its_edge_to_the_body_at_its_height_and_holds_it():
     assert notes[-1] == "held by an elastic: waist"
     assert np.abs(drape.body.gaps(waist)).max() < 0.002
     assert np.ptp(waist[:, 1]) < 0.01
+    assert drape.hangs_below == pytest.approx(hip)
     with pytest.raises(InputError, match="falls off"):
         worn(replace(pattern, elastics=()))
 

@@ -24,7 +24,7 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.whole_pieces import MIRRORED
 from warpflat.surface.mesh import Surface
 
-__all__ = ["drape", "held_vertices", "thread_elastics"]
+__all__ = ["drape", "held_vertices", "hip_level", "thread_elastics"]
 
 # So often is what an elastic draws in moved towards the body, level.
 _LEVELLED = 20
@@ -86,11 +86,9 @@ def drape(
     for piece in _pieces(garment):
         paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
         cuts[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
-    mannequin = garment.mannequin if isinstance(garment, Garment) else None
-    hip = -np.inf if mannequin is None else float(mannequin.vertices[mannequin.layout.lines["hip"], 1].mean())
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
-        hangs_below=hip, cuts=cuts, threaded=gripped,
+        hangs_below=hip_level(garment.mannequin if isinstance(garment, Garment) else None), cuts=cuts, threaded=gripped,
     )  # fmt: skip
 
 
@@ -134,3 +132,8 @@ def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple
         for _ in range(_LEVELLED):
             drawn[rows] = np.where([True, False, True], body.nearest(drawn[rows])[0], drawn[rows])
     return replace(cloth, designed=drawn), gripped
+
+
+def hip_level(body: Mannequin | None) -> float:
+    """Return the height of a mannequin's hip, below which cloth hangs freely [m]; that of no body lies below everything."""
+    return -np.inf if body is None else float(body.vertices[body.layout.lines["hip"], 1].mean())

@@ -14,7 +14,7 @@ from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
 from warpflat.core.short_repr import short_repr
 from warpflat.draping.body import Body
-from warpflat.draping.drape_garment import held_vertices, thread_elastics
+from warpflat.draping.drape_garment import held_vertices, hip_level, thread_elastics
 from warpflat.draping.lift import Lift, whole_lifts
 from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
 from warpflat.draping.options import DrapeOptions
@@ -216,6 +216,7 @@ def drape_pattern(
         options=options,
         frames=tuple(frames),
         drafted=drafted,
+        hangs_below=hip_level(body),
         threaded=gripped,
     ), notes
 
