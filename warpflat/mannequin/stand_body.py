@@ -373,7 +373,8 @@ def _unsure(
         shown = _PARTS.get(name.split(".")[0])
         if shown and float(size[which] @ seen[which]) < _SEEN * float(size[which].sum()):
             return f"the scan does not show {shown}"
-    trunk = np.isin(part, [names.index("spine03"), names.index("pelvis")])
+    # Few scanners see between the legs.
+    trunk = np.isin(part, [names.index("spine03"), names.index("pelvis")]) & (model_places().mean[:, 1] > _HIP)
     bands = np.floor(standing[trunk, 1] / _BAND).astype(int)
     # A band and its neighbours, or a hole of a hand's breadth at the shoulders would do.
     count, shown_in = (np.convolve(np.bincount(bands, each), np.ones(3), "same") for each in (None, seen[trunk]))
