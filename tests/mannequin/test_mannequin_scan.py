@@ -387,7 +387,7 @@ def test_a_trunk_that_is_narrowest_under_the_bust_has_a_guessed_waist_below() ->
     levels, waist = body.levels(), body.measures["waist"]
     assert waist.guess is not None
     assert "no narrowest section below the underbust" in waist.guess
-    assert levels["underbust"].height - levels["waist"].height > 0.03 * body.vertices[:, 1].max()
+    assert levels["underbust"].height - levels["waist"].height > 0.02 * body.vertices[:, 1].max()
 
 
 @needs_bodies

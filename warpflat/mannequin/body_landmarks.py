@@ -34,7 +34,7 @@ __all__ = [
 LEVELS = {
     "bust": (0.7250, "front"), "underbust": (0.6974, "front"), "waist": (0.6290, "trunk"), "hip": (0.5137, "back"),
     "front_neck": (0.8225, "front"), "side_neck": (0.8465, "neck"), "head": (0.9300, "head"),
-    "knee": (0.3018, "leg"), "calf": (0.2196, "leg"), "ankle": (0.0755, "leg"), "foot": (0.0150, "leg"),
+    "knee": (0.3005, "leg"), "calf": (0.2196, "leg"), "ankle": (0.0755, "leg"), "foot": (0.0150, "leg"),
 }  # fmt: skip
 #: Distances from the elbow towards the hand on the mean body [m].
 ARM_PLACES = {"biceps": -0.0960, "elbow": -0.0024, "wrist": 0.1391, "hand": 0.1882}

@@ -38,8 +38,8 @@ _NECK = 0.014
 _CREASE, _KNEE_SURE = 0.03, 0.003
 # How far from its landmark a wrist may be narrowest, on the mean body [m].
 _WRIST = 0.013
-# The waist lies so far below the underbust at least, as a share of the stature: half as far as on the mean body.
-_BELOW_UNDERBUST = 0.034
+# The waist lies so far below the underbust at least, as a share of the stature: a third as far as on the mean body.
+_BELOW_UNDERBUST = 0.023
 # How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
 _BELOW_ARMPIT = 0.006
 # The fullest upper arm is sought from so far beyond the armpit, the thigh's tape lies so far below the crotch, both as
@@ -142,10 +142,10 @@ def find_levels(
         at = 0.5 * (at + fold) if abs(fold - at) < _FOLD_OFF * size else fold
     found["underbust"] = ScanLevel(height=at, guess=_noisy(noise) if noise > _NOISE_SURE else None)
     # Over a belly, or under a bust that hangs, the narrowest place may be the underbust itself.
-    around, under = smooth(t.girth, 1.5 if noise else 0.75), given.get("underbust", at)
+    around, chest = smooth(t.girth, 1.5 if noise else 0.75), given.get("underbust", at)
     lacking = "the trunk has no narrowest section below the underbust"
-    found["waist"] = least("waist", t.y, around, landmark("waist"), lacking, under - _BELOW_UNDERBUST * size)
-    low, high = under + 0.01 * size, armpit - _BELOW_ARMPIT * size
+    found["waist"] = least("waist", t.y, around, landmark("waist"), lacking, chest - _BELOW_UNDERBUST * size)
+    low, high = chest + 0.01 * size, armpit - _BELOW_ARMPIT * size
     rows = np.flatnonzero((t.y > low) & (t.y < high))
     row = int(rows[np.argmax(t.girth[rows])]) if len(rows) else 0
     above = (t.y > t.y[row]) & (t.y <= armpit - 0.003 * size)
