@@ -35,7 +35,7 @@ _NOISE_SURE = 0.0012
 # So far up and down the corner between neck and shoulder lies from its landmark, as a share of the stature.
 _NECK = 0.014
 # The crease behind the knee is sought so far from the knee, which is sure if the crease lies so near, as shares of the stature.
-_CREASE, _KNEE_SURE = 0.03, 0.003
+_CREASE, _KNEE_SURE = 0.03, 0.004
 # How far from its landmark a wrist may be narrowest, on the mean body [m].
 _WRIST = 0.013
 # The waist lies so far below the underbust at least, as a share of the stature: a third as far as on the mean body.
