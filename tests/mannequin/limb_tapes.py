@@ -44,10 +44,13 @@ def leg_tapes(mesh: trimesh.Trimesh, crotch: float, left: bool, knee_height: flo
     share = y / crotch
     calf = int(np.argmax(np.where((share > 0.3) & (y < 0.85 * knee_height), girth, 0.0)))
     ankle = int(np.argmin(np.where(share < 0.3, girth, np.inf)))
-    knee = int(np.argmin(np.abs(y - knee_height)))
     thigh = int(np.argmin(np.abs(y - crotch + 0.03 * stature)))
-    places = {"thigh": thigh, "knee": knee, "calf": calf, "ankle": ankle}
-    return {name: (float(y[i]), float(ConvexHull(sides[i]).area)) for name, i in places.items()}
+    places = {"thigh": thigh, "calf": calf, "ankle": ankle}
+    knee = max(section_parts(mesh, knee_height)[:2], key=lambda p: p[:, 0].mean() * (1.0 if left else -1.0))
+    return {
+        "knee": (knee_height, float(ConvexHull(knee).area)),
+        **{name: (float(y[i]), float(ConvexHull(sides[i]).area)) for name, i in places.items()},
+    }
 
 
 def foot_tape(mesh: trimesh.Trimesh, left: bool) -> tuple[float, float]:

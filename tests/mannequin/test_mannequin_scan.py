@@ -369,6 +369,28 @@ def test_a_trunk_that_is_no_body_is_refused_with_its_place() -> None:
 
 
 @needs_bodies
+def test_a_scan_that_does_not_show_the_crotch_is_no_refusal() -> None:
+    points, faces = scan("female")
+    hidden = (np.abs(points[:, 0]) < 0.05) & (points[:, 1] > 0.66) & (points[:, 1] < 0.77)
+    body = on_scan(points, faces[~hidden[faces[:, :3]].any(axis=1)])
+    assert body.measures["hip"].girth == pytest.approx(scanned_body("female").measures["hip"].girth, abs=0.004)
+
+
+@needs_bodies
+def test_a_trunk_that_is_narrowest_under_the_bust_has_a_guessed_waist_below() -> None:
+    points, faces = scan("female")
+    # The trunk grows broader from right below the underbust at 1.11 m down.
+    below = np.clip((1.12 - points[:, 1]) / 0.14, 0.0, 1.0) * np.clip((points[:, 1] - 0.70) / 0.20, 0.0, 1.0)
+    trunk = np.abs(points[:, 0]) < 0.2
+    grown = points * (1.0 + np.outer(0.35 * below * trunk, [1.0, 0.0, 1.0]))
+    body = on_scan(grown, faces)
+    levels, waist = body.levels(), body.measures["waist"]
+    assert waist.guess is not None
+    assert "no narrowest section below the underbust" in waist.guess
+    assert levels["underbust"].height - levels["waist"].height > 0.02 * body.vertices[:, 1].max()
+
+
+@needs_bodies
 def test_a_scan_is_compared_with_the_nearest_size() -> None:
     body = scanned_body("female")
     told = body.metrics()

@@ -35,9 +35,11 @@ _NOISE_SURE = 0.0012
 # So far up and down the corner between neck and shoulder lies from its landmark, as a share of the stature.
 _NECK = 0.014
 # The crease behind the knee is sought so far from the knee, which is sure if the crease lies so near, as shares of the stature.
-_CREASE, _KNEE_SURE = 0.03, 0.003
+_CREASE, _KNEE_SURE = 0.03, 0.004
 # How far from its landmark a wrist may be narrowest, on the mean body [m].
 _WRIST = 0.013
+# The waist lies so far below the underbust at least, as a share of the stature: a third as far as on the mean body.
+_BELOW_UNDERBUST = 0.023
 # How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
 _BELOW_ARMPIT = 0.006
 # The fullest upper arm is sought from so far beyond the armpit, the thigh's tape lies so far below the crotch, both as
@@ -90,7 +92,8 @@ def find_levels(
     """Return the levels of trunk and legs, from low to high the closed ones, and of ``armpit``, ``front_neck``, ``side_neck``.
 
     Waist: narrowest near its landmark. Bust: fullest between the underbust and the armpits. Hip: where the seat stands out most near its
-    landmark. Underbust and knee lie at their landmarks. Calf: fullest, ankle: narrowest, the mean of both legs.
+    landmark. Underbust and knee lie halfway between their landmarks and the fold or crease there, if that is near. Calf: fullest, ankle:
+    narrowest, the mean of both legs.
 
     Args:
         body: the sections as scanned.
@@ -107,19 +110,19 @@ def find_levels(
     def landmark(name: str, side: str = "left") -> float:
         return float(value_at(near_level(name, side), body.vertices[:, 1]))
 
-    def least(name: str, y: FloatArray, values: FloatArray, around: float, lacking: str) -> ScanLevel:
-        rows = np.flatnonzero(np.abs(y - around) < _REACH[name] * size)
+    def least(
+        name: str, y: FloatArray, values: FloatArray, around: float, lacking: str, below: float = np.inf
+    ) -> ScanLevel:
+        rows = np.flatnonzero((np.abs(y - around) < _REACH[name] * size) & (y < below))
         row = int(rows[np.argmin(values[rows])]) if len(rows) else 0
         if len(rows) < 3 or not rows[0] < row < rows[-1]:
-            return ScanLevel(height=around, guess=f"{lacking}; it is where the body model has it")
+            return ScanLevel(height=min(around, below), guess=f"{lacking}; it is where the body model has it")
         alike = y[_stretch(values < values[row] + _NOISE * noise, row)]
         moved = noise > 0.0 and float(np.abs(alike - y[row]).max()) > _ISO_HEIGHT
         return ScanLevel(height=summit(y, values, row), guess=_noisy(noise) if moved else None)
 
     found["armpit"] = ScanLevel(height=min(float(place[1]) for place in body.armpits.values()))
     armpit = given.get("armpit", found["armpit"].height)
-    around = smooth(t.girth, 1.5 if noise else 0.75)
-    found["waist"] = least("waist", t.y, around, landmark("waist"), "the trunk has no narrowest section")
     found["hip"] = least("hip", t.y, t.back, landmark("hip"), "the seat does not stand out")
     # Under a full bust the outline over the bust points bends forward in a fold, lower than on the mean body.
     at, bust = min(landmark("underbust"), armpit - 0.02 * size), landmark("bust")
@@ -138,7 +141,11 @@ def find_levels(
         # Each is a few millimetres off the fold's middle by itself.
         at = 0.5 * (at + fold) if abs(fold - at) < _FOLD_OFF * size else fold
     found["underbust"] = ScanLevel(height=at, guess=_noisy(noise) if noise > _NOISE_SURE else None)
-    low, high = given.get("underbust", at) + 0.01 * size, armpit - _BELOW_ARMPIT * size
+    # Over a belly, or under a bust that hangs, the narrowest place may be the underbust itself.
+    around, chest = smooth(t.girth, 1.5 if noise else 0.75), given.get("underbust", at)
+    lacking = "the trunk has no narrowest section below the underbust"
+    found["waist"] = least("waist", t.y, around, landmark("waist"), lacking, chest - _BELOW_UNDERBUST * size)
+    low, high = chest + 0.01 * size, armpit - _BELOW_ARMPIT * size
     rows = np.flatnonzero((t.y > low) & (t.y < high))
     row = int(rows[np.argmax(t.girth[rows])]) if len(rows) else 0
     above = (t.y > t.y[row]) & (t.y <= armpit - 0.003 * size)
@@ -183,18 +190,14 @@ def find_levels(
                 calf, at = landmark("calf", side), landmark(name, side)
                 ends = [calf, 0.86 * body.crotch]
                 inside = back - np.interp(y, ends, np.interp(ends, y, back))
-                crease = float(y[np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf))])
-                moved = abs(crease - at) > _KNEE_SURE * size
-                sides.append(
-                    ScanLevel(
-                        height=at,
-                        guess="the crease behind it lies elsewhere"
-                        if moved
-                        else _noisy(noise)
-                        if noise > _NOISE_SURE
-                        else None,
-                    )
-                )
+                row = int(np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf)))
+                crease = summit(y, inside, row)
+                if abs(crease - at) > _KNEE_SURE * size:
+                    sides.append(ScanLevel(height=at, guess="the crease behind it lies elsewhere"))
+                else:
+                    # Each is a few millimetres off the joint by itself.
+                    guess = _noisy(noise) if noise > _NOISE_SURE else None
+                    sides.append(ScanLevel(height=0.5 * (at + crease), guess=guess))
             else:
                 # Smoothed little, or the calf, which is rounder above than below, would be moved.
                 girth = smooth(body.legs.girths[side], 3.0 if noise else 1.0)

@@ -70,6 +70,7 @@ class StandingBody:
         shown: by triangle of the scan, the body's that it shows; -1 for hair, clothes, a floor and patches over holes.
         fit: of the model.
         unsure: why the scan is no such body; None if it is.
+        doubtful: whether it is none, or hides the crotch, as one that is taken for facing backward does.
         together: #V by 3 [m], `vertices` with the hip's flesh moved with the legs, as a tape with the legs together asks; None where they
             stand so.
         undone: whether arms or joints were bent so far that their pose is undone.
@@ -86,6 +87,7 @@ class StandingBody:
     shown: NDArray[np.int64]
     fit: FittedBody
     unsure: str | None
+    doubtful: bool = False
     together: FloatArray | None = None
     undone: bool = False
     raised: float = 0.0
@@ -214,7 +216,7 @@ def stand_body(
     if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
         triangles = triangles[:, ::-1]
     found = _stand(fit_body(vertices, triangles, landmarks, sits=sits), vertices, triangles, scanned, as_scanned)
-    if found.unsure is not None and not faces_ahead and not sits:
+    if found.doubtful and not faces_ahead and not sits:
         vertices = vertices * [-1.0, 1.0, -1.0]
         fit = fit_body(vertices, triangles, landmarks)
         if fit.cost < found.fit.cost:
@@ -261,7 +263,7 @@ def _stand(
     relaxed, _ = _arms_hanging(model, fit.person.standing(_BENT))
     hanging, elbows = _arms_hanging(model, fit.person)
     standing = model.rebend(fit.person, relaxed, finer, posed)
-    unsure = _unsure(fit, mesh, model.vertices(fit.person), standing, finer @ model.weights, seen)
+    unsure, doubtful = _unsure(fit, mesh, model.vertices(fit.person), standing, finer @ model.weights, seen)
     armpits = {side: meeting(standing, places.mean, sign) for side, sign in (("left", 1.0), ("right", -1.0))}
     notes = []
     # Sleeves hang, and a tape is laid, with arms lowered and no joint bent far.
@@ -329,6 +331,7 @@ def _stand(
         shown=shown,
         fit=fit,
         unsure=unsure,
+        doubtful=doubtful,
         together=together,
         undone=other is relaxed,
         raised=raised,
@@ -349,11 +352,14 @@ def _legs_apart(vertices: FloatArray) -> float:
 
 def _unsure(
     fit: FittedBody, scan: Mesh, model: FloatArray, standing: FloatArray, weights: FloatArray, seen: BoolArray
-) -> str | None:
-    """Return why a fit is no good: it lies far from the scan, or one of the two has parts that the other has not."""
+) -> tuple[str | None, bool]:
+    """Return why a fit is no good, and whether it is none or the crotch is hidden.
+
+    It is no good if it lies far from the scan, or one of the two has parts that the other has not.
+    """
     mean = float(fit.distance[np.isfinite(fit.distance)].mean())
     if mean > _FAR:
-        return f"the body model lies {1000.0 * mean:.0f} mm off the scan in the mean"
+        return f"the body model lies {1000.0 * mean:.0f} mm off the scan in the mean", True
     near = (
         np.linalg.norm(Mesh(model, BodyModel.load().triangles).closest(scan.vertices)[2] - scan.vertices, axis=1)
         < _BESIDE
@@ -362,7 +368,7 @@ def _unsure(
     area = scan.area * (scan.vertices[scan.triangles, 1].max(axis=1) > scan.vertices[:, 1].min() + _FLOOR)
     shared = float(area @ near[scan.triangles].mean(axis=1) / area.sum())
     if shared < _SHARED:
-        return f"{100.0 * (1.0 - shared):.0f} % of the scan is no part of a standing body"
+        return f"{100.0 * (1.0 - shared):.0f} % of the scan is no part of a standing body", True
     names = (*BodyModel.load().joints, "pelvis")
     part = np.argmax(weights, axis=1)
     triangles = finer_body()[1]
@@ -372,12 +378,15 @@ def _unsure(
         which = (part == number) & (plain | (name == "neck01"))
         shown = _PARTS.get(name.split(".")[0])
         if shown and float(size[which] @ seen[which]) < _SEEN * float(size[which].sum()):
-            return f"the scan does not show {shown}"
+            return f"the scan does not show {shown}", True
     trunk = np.isin(part, [names.index("spine03"), names.index("pelvis")])
     bands = np.floor(standing[trunk, 1] / _BAND).astype(int)
     # A band and its neighbours, or a hole of a hand's breadth at the shoulders would do.
     count, shown_in = (np.convolve(np.bincount(bands, each), np.ones(3), "same") for each in (None, seen[trunk]))
     share = np.where(count < _FEW, 1.0, shown_in / np.maximum(count, 1))
+    hidden = bool(share.min() < _SEEN)
+    # Few scanners see between the legs.
+    share[: bands[model_places().mean[trunk, 1] > _HIP].min()] = 1.0
     if share.min() < _SEEN:
-        return f"the scan does not show the trunk at {_BAND * float(np.argmin(share)):.2f} m"
-    return None
+        return f"the scan does not show the trunk at {_BAND * float(np.argmin(share)):.2f} m", True
+    return None, hidden
