@@ -5,8 +5,8 @@ python benchmarks/things.py [WORDS ...] [--fabric woven] [--out FOLDER]
 Each thing whose name contains one of the words, all by default, is written as OBJ, and `warpflat flatten` is run on it as a user runs it.
 
 Columns: faces; pieces, and how many of them are drawn; share of the cloth beyond its limit [%]; how much is taken off all around before a
-piece falls into parts, 30 mm at most [mm]; length of all seams over the square root of the area; processor seconds of the command, with film
-and pictures; its exit code, and what its last line says where that is not 0. With a folder the results stay there, with their pictures.
+piece falls into parts, 30 mm at most [mm]; length of all seams over the square root of the area; processor seconds of the command, with its
+film and pictures; its exit code, and what its last line says where that is not 0. With a folder the results stay there.
 """
 
 from __future__ import annotations
