@@ -27,7 +27,7 @@ from warpflat.garment.sew_pieces import sew_pieces
 from warpflat.seams.anatomy import Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
-from warpflat.seams.solid import NARROW, SOLID, LaidFlat
+from warpflat.seams.solid import NARROW, SEWABLE, SOLID, LaidFlat, parts_within
 from warpflat.seams.symmetric import other_side
 from warpflat.seams.tailor import FACING, LEFT, side_word
 from warpflat.solver.options import RelaxOptions
@@ -571,9 +571,9 @@ def laid_flat(surface: Surface, fabric: Fabric, width: float) -> LaidFlat:
         result = flatten(surface, fabric=fabric, datum=datum, relax=_trial_options(_PRICE_LEFT))
     except InputError:
         return LaidFlat(outside=1.0, overlap=0.0, width=width)
-    return LaidFlat(
-        outside=result.fit.outside, overlap=result.overlap, width=_narrowest(surface, result.positions, width)
-    )
+    least, ends = _narrowest(surface, result.positions, max(width, SEWABLE))
+    neck = surface.vertices[ends] if len(ends) and parts_within(surface.faces, result.positions, SEWABLE) > 1 else None
+    return LaidFlat(outside=result.fit.outside, overlap=result.overlap, width=min(least, width), neck=neck)
 
 
 def _can_be_sewn(
@@ -623,11 +623,16 @@ def _edges_of(piece: _Measured, seam: Ids) -> Ids:
     return np.asarray(edges[np.isin(own[:, 0] * stride + own[:, 1], seam[:, 0] * stride + seam[:, 1])])
 
 
-def _narrowest(surface: Surface, flat: FloatArray, width: float) -> float:
-    """Return the least width of a pattern between stretches of its border that are long compared with a width [m]; that width at most."""
+def _narrowest(surface: Surface, flat: FloatArray, width: float) -> tuple[float, Ids]:
+    """Return the least width of a pattern between stretches of its border that are long compared with a width [m]; that width at most.
+
+    Returns:
+        The width, and the two vertices between which it is; none where it is not less.
+    """
     from matplotlib.path import Path as Outline
 
-    loop = flat[border_loops(surface.faces)[0]]
+    border = border_loops(surface.faces)[0].astype(np.int64)
+    loop = flat[border]
     arc = arc_lengths(np.concatenate([loop, loop[:1]]))
     count = int(np.clip(4.0 * arc[-1] / width, 24, 400))
     at = np.arange(count) * arc[-1] / count
@@ -638,13 +643,18 @@ def _narrowest(surface: Surface, flat: FloatArray, width: float) -> float:
     one, other = np.nonzero((around > _BESIDE_NECK * width) & (distance < width))
     # Across an open dart or a concave corner there is no cloth.
     inside = Outline(points).contains_points(0.5 * (points[one] + points[other]))
-    return float(distance[one, other][inside].min(initial=width))
+    across = distance[one, other][inside]
+    if len(across) == 0:
+        return width, np.empty(0, dtype=np.int64)
+    least = int(across.argmin())
+    ends = points[[one[inside][least], other[inside][least]]]
+    return float(across[least]), border[np.linalg.norm(loop - ends[:, None], axis=2).argmin(axis=1)]
 
 
 def _least_width(pieces: Sequence[_Measured], size: float) -> float:
     """Return the least width of some patterns in a garment of a size [m]; what nobody calls narrow at most."""
     width = NARROW * size
-    return min((_narrowest(one.surface, one.result.positions, width) for one in pieces), default=width)
+    return min((_narrowest(one.surface, one.result.positions, width)[0] for one in pieces), default=width)
 
 
 def _key(mesh: PieceMesh) -> int:

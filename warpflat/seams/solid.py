@@ -6,8 +6,9 @@ squared. So a narrow gore of a ball lies flat where a cap of the same area does 
 left, over the area.
 
 Where the cloth is known, a part is laid flat before it is cut: what lies flat within its limit is cut no further, whatever the estimate
-says, and what is strained at a saddle is. A cut that leaves a narrow part costs more. To choose the cut, too, by what lies beyond the limit
-after it was worse (a plush of 18 % stayed at 18 %), and no better once its limbs were apart.
+says, and what is strained at a saddle is. A cut that leaves a narrow part costs more; a neck that is left, too narrow to be sewn, is cut
+through. To choose the cut, too, by what lies beyond the limit after it was worse (a plush of 18 % stayed at 18 %), and no better once its
+limbs were apart.
 
 Limbs are parted first, where they begin: a toy's ears, arms and feet, a chair's legs, a glove's fingers. The saddles there are what no
 halving relieves. What is its own mirror image is cut alike on both sides: in its plane of symmetry, or along lines that mirror each
@@ -22,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray, IntArray
@@ -36,6 +37,7 @@ from warpflat.surface.tubes import inner_borders, tube_borders
 
 __all__ = [
     "NARROW",
+    "SEWABLE",
     "SOLID",
     "LaidFlat",
     "Measure",
@@ -59,8 +61,8 @@ _ENOUGH = 0.03
 # A part is narrow that is somewhere less wide than the first share of the size of the whole: nobody cuts a neck of cloth, or a tip, that
 # narrow. A cut that leaves one counts as the second strain more, where its width is nothing.
 NARROW, _THIN = 0.05, 0.05
-# A part of less than such a share is a tip.
-_TIP = 0.02
+#: Nobody sews a neck of cloth narrower than this, half a usual allowance [m]; a part of less than such a share is a tip.
+SEWABLE, _TIP = 5e-3, 0.02
 # Normals are smoothed over this share of a part's size: wrinkles and facets are no shape.
 _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain.
@@ -83,7 +85,7 @@ _THIMBLE, _EXCESS, _ROOT, _SPENT = 1.7, 2.3, 1.5, 0.5
 # The ring around a limb squared is at most this share of a disk's of the limb's area.
 _LIMB = 0.35
 # Parts at most, and how many more for each limb.
-_MOST, _PER_LIMB = 16, 2
+_MOST, _PER_LIMB = 16, 3
 # A part smaller than this share of the whole is not cut further, and no cut leaves a smaller one.
 _LEAST = 0.02
 # Mirror images agree within this share of the size; a field is its own mirror image from this cosine on.
@@ -98,11 +100,13 @@ class LaidFlat:
         outside: the share beyond its limit.
         overlap: how much of it lies over itself [m2].
         width: where it is narrowest, no more than what nobody calls narrow [m].
+        neck: the ends of its narrowest place in space (2 by 3), where it is too narrow there to be sewn, and wider on both sides.
     """
 
     outside: float
     overlap: float
     width: float
+    neck: FloatArray | None = None
 
 
 #: Lays a piece of a cloth flat; the third argument is the width from which on nothing is narrow [m].
@@ -166,7 +170,7 @@ def part_solids(
         cloth: with the seams that it has.
         shape: whether pieces are cut for their shape, too, until each can lie flat.
         mirror: of a cloth that is its own mirror image, vertex by vertex: both sides are cut alike.
-        most: pieces at most; 16 if not given, and two more for each limb.
+        most: pieces at most; 16 if not given, and, with a measure, three more for each limb.
         measure: lays a disk flat; without it all goes by estimate.
     """
     total = float(cloth.face_areas.sum())
@@ -180,7 +184,7 @@ def part_solids(
         if made is not None:
             cloth, number, limbs = made, number + 1, limbs + count
     if most is None:
-        most = _MOST + _PER_LIMB * limbs
+        most = _MOST + (0 if laid is None else _PER_LIMB * limbs)
     for _ in range(4 * most):
         beyond = 0.0
         meshes = list(cloth.pieces())
@@ -203,14 +207,17 @@ def part_solids(
                 beyond += area if value > 0.0 else 0.0
             if rank == 1 and (not large or len(meshes) >= most or value <= 0.0 or (1, key) in done):
                 rank = 0
-            if rank and (rank, key) not in done:
+            if rank == 0 and (not large or flat is None or flat.neck is None):
+                continue
+            if (rank, key) not in done:
                 waiting.append((rank, value, key, mesh))
+        if beyond < _ENOUGH * total:
+            waiting = [one for one in waiting if one[0] != 1]
         if not waiting:
             break
         rank, _, key, mesh = max(waiting, key=lambda one: one[:2])
-        if rank == 1 and beyond < _ENOUGH * total:
-            break
-        way = _best_way(mesh, total, known, mirror, laid)
+        neck = laid(cloth, mesh).neck if laid is not None and rank == 0 else None
+        way = _best_way(mesh, total, known, mirror, laid, neck)
         made = None if way is None else _cut(cloth, mesh, way, f"{SOLID} {number}", mirror)
         if made is None:
             done.add((rank, key))
@@ -430,13 +437,17 @@ def _best_way(
     known: dict[int, float],
     mirror: Anatomy | None,
     laid: Callable[[Cloth, PieceMesh], LaidFlat] | None,
+    neck: FloatArray | None,
 ) -> FloatArray | None:
     """Return the field (#V) along whose zero line a part is cut so that the least is left to do; None if no cut parts it well."""
     image = None if mirror is None else _image(mesh, mesh, mirror)
     found = list[tuple[float, Cloth, FloatArray]]()
-    for way in _ways(mesh, None if image is None else mirror):
+    for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
         if image is not None and not _mirrors_itself(way.field, image):
-            continue
+            if neck is None:
+                continue
+            # At both of its necks.
+            way = replace(way, field=np.maximum(way.field, way.field[image]))
         local = Cloth(vertices=mesh.vertices, faces=mesh.faces, values={"way": way.field})
         everywhere = np.ones(len(local.faces), dtype=bool)
         made, positive = tidied(local, "way", everywhere, keep=0.05).split("way", everywhere)
@@ -463,6 +474,26 @@ def _best_way(
         if best is None or cost < best[0]:
             best = cost, field
     return None if best is None else best[1]
+
+
+def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
+    """Return the way of cutting a part at its neck and nowhere else, in the plane through its ends that is at right angles to the cloth."""
+    middle, points = neck.mean(axis=0), mesh.vertices
+    triangles = points[mesh.faces]
+    near = np.linalg.norm(triangles.mean(axis=1) - middle, axis=1) < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = np.cross(neck[1] - neck[0], normals[near].sum(axis=0) if near.any() else normals.sum(axis=0))
+    field = (points - middle) @ along / max(float(np.linalg.norm(along)), 1e-300)
+    # Of what lies beyond the plane, only the part at the neck.
+    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    passed = (field[a] > 0.0) & (field[b] > 0.0)
+    graph = coo_array((np.ones(int(passed.sum())), (a[passed], b[passed])), shape=(len(points),) * 2)
+    _, label = connected_components(graph, directed=False)
+    ahead = np.flatnonzero(field > 0.0)
+    if len(ahead):
+        own = label == label[ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]]
+        field = np.where(own, field, -np.abs(field))
+    return _Way(field=field, name="neck", round=False)
 
 
 def parts_within(faces: IntArray, flat: FloatArray, width: float) -> int:
