@@ -82,8 +82,8 @@ _TIPS, _RING = 16, 0.04
 # In a limb lies the curvature of half a ball, 2 pi, within these shares of pi; its root is the ring in which less than the third is left,
 # and the cloth beyond takes it below the last: the toe of a sock is no limb.
 _THIMBLE, _EXCESS, _ROOT, _SPENT = 1.7, 2.3, 1.5, 0.5
-# The ring around a limb squared is at most this share of a disk's of the limb's area.
-_LIMB = 0.35
+# The ring around a limb squared is at most this share of a disk's of the limb's area; what is a larger share of the whole is its trunk.
+_LIMB, _TRUNK = 0.35, 0.25
 # Parts at most, and how many more for each limb.
 _MOST, _PER_LIMB = 16, 3
 # A part smaller than this share of the whole is not cut further, and no cut leaves a smaller one.
@@ -324,7 +324,7 @@ def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
         length = section(whole, field, np.ones(len(mesh.faces), dtype=bool))[0]
         area = float(operators.mass[order[: lost[0]]].sum())
         ratio = length**2 / (4.0 * np.pi * area)
-        if ratio < _LIMB and area > 0.3 * _LEAST * size**2:
+        if ratio < _LIMB and 0.3 * _LEAST < area / size**2 < _TRUNK:
             found.append((ratio, tip, field))
     image = None if mirror is None else _image(mesh, mesh, mirror)
     taken, count = np.full(len(curvature), -np.inf), 0
