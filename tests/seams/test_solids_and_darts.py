@@ -19,6 +19,7 @@ from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.energy import laid_flat
 from warpflat.seams.fields import Operators
 from warpflat.seams.find import FoundSeams, cloth_of
+from warpflat.seams.solid import _limbs as limbs_of
 from warpflat.seams.solid import part_solids
 from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.mesh import Surface
@@ -319,3 +320,25 @@ def test_both_sides_of_a_seam_are_as_long_between_the_corners_at_which_its_patte
     for seam in pattern.seams:
         one, other = (sum(pattern.piece(side.piece, "").edge(side.edge).length for side in row) for row in seam.sides)
         assert one == pytest.approx(other, abs=5e-5)
+
+
+def test_limbs_are_parted_where_they_begin() -> None:
+    arms = [solids.rod((0.08 * s, 0.05, 0.02), (0.2 * s, 0.0, 0.06), 0.025) for s in (1, -1)]
+    toy = solids.skin(
+        solids.joined([solids.rod((0.0, -0.05, 0.0), (0.0, 0.05, 0.0), 0.09), *arms], 0.01),
+        [-0.26, -0.2, -0.15], [0.26, 0.2, 0.15], 0.02,
+    )  # fmt: skip
+    field, count = limbs_of(next(cloth_of(toy).pieces()), None)
+    assert count == 2
+    beyond = toy.vertices[field > 0.0]
+    assert np.abs(beyond[:, 0]).min() > 0.06
+    assert np.abs(beyond[:, 0]).max() == pytest.approx(np.abs(toy.vertices[:, 0]).max())
+    for whole in (trimesh.creation.icosphere(3, radius=0.12), trimesh.creation.capsule(0.3, 0.05)):
+        assert limbs_of(next(cloth_of(surface_of(whole)).pieces()), None)[1] == 0
+
+
+def test_the_gores_of_a_ball_are_drawn_once() -> None:
+    found = warpflat.find_seams(surface_of(trimesh.creation.icosphere(4, radius=0.11)))
+    flat = [warpflat.flatten(piece, datum="grain") for piece in found.pieces]
+    pattern, _ = pattern_of_garment({"": warpflat.sew_pieces(flat, eased=True)}, name="ball")
+    assert [piece.quantity for row in pattern.pieces.values() for piece in row] == [8]

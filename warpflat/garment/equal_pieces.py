@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise, product
 
 import numpy as np
 
@@ -21,6 +21,8 @@ __all__ = ["draw_equal_pieces_once"]
 _SAME_OUTLINE, _SHARE, _SAME_GRAIN = 1.5e-3, 0.01, np.radians(3.0)
 # Outlines that differ by no more than this [m] are not averaged.
 _SAME_LINE = 5e-5
+# So many ways of laying all copies are tried until their seams run alike.
+_MOST_WAYS = 256
 # Places along each edge at which outlines are compared.
 _SAMPLES = 33
 
@@ -71,42 +73,56 @@ def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern,
         if piece.name.startswith(called) and not (piece.darts or piece.holes or piece.on_fold or piece.name in unlike)
     ]
     at_seams = {(side.piece, side.edge) for side in sewn}
-    copies: dict[str, _Copy] = {}
+    copies: dict[str, list[_Copy]] = {}
     for number, head in enumerate(free):
-        if head.name in copies or any(copy.of == head.name for copy in copies.values()):
+        if head.name in copies or any(ways[0].of == head.name for ways in copies.values()):
             continue
         group = [
-            (piece, found)
+            (piece, ways)
             for piece in free[number + 1 :]
             if piece.name not in copies
             and _stem(piece) == _stem(head)
-            and (found := _laid_on(piece, head)) is not None
             # What is sewn at one is sewn at all: the notches of an edge are those of all its copies.
-            and all(
-                ((piece.name, own) in at_seams) == ((head.name, edge) in at_seams) for own, edge in found.edges.items()
+            and (
+                ways := [
+                    way
+                    for way in _laid_on(piece, head)
+                    if all(
+                        ((piece.name, own) in at_seams) == ((head.name, edge) in at_seams)
+                        for own, edge in way.edges.items()
+                    )
+                ]
             )
         ]
         pairs = head.quantity % 2 == 0 and head.paired
-        if not pairs and sum(found.turned for _, found in group) != sum(not found.turned for _, found in group) + 1:
+        if not pairs and sum(ways[0].turned for _, ways in group) != sum(not ways[0].turned for _, ways in group) + 1:
             # Of single pieces as many are cut turned over as not, or none.
-            group = [(piece, found) for piece, found in group if not found.turned]
+            group = [(piece, ways) for piece, ways in group if not ways[0].turned]
         counts = {False: 1, True: 1 if pairs else 0}
-        for piece, found in group:
-            copies[piece.name] = replace(found, copy=counts[found.turned and not pairs])
-            counts[found.turned and not pairs] += 1
+        for piece, ways in group:
+            kind = ways[0].turned and not pairs
+            copies[piece.name] = [
+                replace(way, copy=counts[kind]) for way in ways if pairs or way.turned == ways[0].turned
+            ]
+            counts[kind] += 1
     if not copies:
         return pattern, ()
-    seams = _run_alike([_told(seam, copies) for seam in pattern.seams])
-    if seams is None:
+    # A gore lies on another one upside down and turned over, too: its seams may run alike only so.
+    for row in islice(product(*copies.values()), _MOST_WAYS):
+        chosen = dict(zip(copies, row, strict=True))
+        seams = _run_alike([_told(seam, chosen) for seam in pattern.seams])
+        if seams is not None:
+            break
+    else:
         return pattern, ()
     drawn, notes = list[Piece](), list[str]()
-    for piece in (piece for piece in pieces if piece.name not in copies):
-        own = {name: copy for name, copy in copies.items() if copy.of == piece.name}
+    for piece in (piece for piece in pieces if piece.name not in chosen):
+        own = {name: copy for name, copy in chosen.items() if copy.of == piece.name}
         if own:
             piece, moved = _averaged(piece, list(own.values()))
             count = piece.quantity * (1 + len(own))
             paired = (piece.quantity % 2 == 0 and piece.paired) or any(copy.turned for copy in own.values())
-            if paired and _laid_on(piece, piece, turned=True) is not None:
+            if paired and _laid_on(piece, piece, turned=True):
                 # Turned over it is itself.
                 paired = False
             piece = replace(piece, quantity=count, paired=paired)
@@ -123,18 +139,15 @@ def _stem(piece: Piece) -> tuple[str, str, str, int]:
     return re.sub(r"[ _]\d+$", "", without_side(piece.name)), piece.role, piece.fabric, piece.quantity
 
 
-def _laid_on(piece: Piece, head: Piece, *, turned: bool | None = None) -> _Copy | None:
-    """Return how a piece lies on another one, perhaps turned over; None if it does not."""
+def _laid_on(piece: Piece, head: Piece, *, turned: bool | None = None) -> list[_Copy]:
+    """Return how a piece lies on another one, the nearest way first, and those turned over last."""
     if len(piece.edges) != len(head.edges) or piece.grain is None or head.grain is None:
-        return None
+        return []
     goal = np.concatenate([_samples(edge.points) for edge in head.edges])
     middle = goal.mean()
     within = min(_SAME_OUTLINE, _SHARE * 2.0 * float(np.abs(goal - middle).max()))
-    best: _Copy | None = None
+    found: list[_Copy] = []
     for over in (False, True) if turned is None else (turned,):
-        if best is not None:
-            # As it lies is better than turned over.
-            break
         edges = [
             replace(edge, points=(edge.points * [-1.0, 1.0])[::-1] if over else edge.points)
             for edge in (piece.edges[::-1] if over else piece.edges)
@@ -154,21 +167,23 @@ def _laid_on(piece: Piece, head: Piece, *, turned: bool | None = None) -> _Copy 
             way = turn * (grain[1] - grain[0]) * np.conj(np.diff(_complex(head.grain))[0])
             # Up or down the grain.
             aside = min(abs(np.angle(way)), np.pi - abs(np.angle(way)))
-            if apart > within or aside > _SAME_GRAIN or (best is not None and apart >= best.apart):
+            if apart > within or aside > _SAME_GRAIN:
                 continue
             laid = [middle + turn * (_complex(edge.points) - here.mean()) for edge in row]
-            best = _Copy(
-                of=head.name,
-                edges={edge.name: two.name for edge, two in zip(row, head.edges, strict=True)},
-                copy=0,
-                turned=over,
-                points={
-                    two.name: np.stack([points.real, points.imag], axis=1)
-                    for points, two in zip(laid, head.edges, strict=True)
-                },
-                apart=apart,
+            found.append(
+                _Copy(
+                    of=head.name,
+                    edges={edge.name: two.name for edge, two in zip(row, head.edges, strict=True)},
+                    copy=0,
+                    turned=over,
+                    points={
+                        two.name: np.stack([points.real, points.imag], axis=1)
+                        for points, two in zip(laid, head.edges, strict=True)
+                    },
+                    apart=apart,
+                )
             )
-    return best
+    return sorted(found, key=lambda one: (one.turned, one.apart))
 
 
 def _complex(points: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:

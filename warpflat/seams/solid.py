@@ -7,11 +7,12 @@ left, over the area.
 
 Where the cloth is known, a part is laid flat before it is cut: what lies flat within its limit is cut no further, whatever the estimate
 says, and what is strained at a saddle is. A cut that leaves a narrow part costs more; a neck that is left, too narrow to be sewn, is cut
-through. To choose the cut, too, by what lies beyond the limit after it was worse (a plush of 18 % stayed at 18 %): it takes chips.
+through. To choose the cut, too, by what lies beyond the limit after it was worse (a plush of 18 % stayed at 18 %), and no better once its
+limbs were apart.
 
-What is its own mirror image is cut alike on both sides: in its plane of symmetry, or along lines that mirror each other. So a toy falls
-into halves and gussets. Parting it at the narrow rings of its limbs first, where an eigenfunction of the Laplacian has a short level line
-(Cheeger), took 18 pieces to end at 22 % beyond the limit; halves and gussets are 16 and end at 5 %.
+Limbs are parted first, where they begin: a toy's ears, arms and feet, a chair's legs, a glove's fingers. The saddles there are what no
+halving relieves. What is its own mirror image is cut alike on both sides: in its plane of symmetry, or along lines that mirror each
+other. So a toy falls into halves and gussets.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.seams.anatomy import HOLE, Anatomy
-from warpflat.seams.cloth import Cloth, PieceMesh
+from warpflat.seams.cloth import Cloth, PieceMesh, section
 from warpflat.seams.fields import Operators
 from warpflat.seams.symmetric import mirrored
 from warpflat.seams.tailor import tidied
@@ -53,8 +54,10 @@ SOLID = "seam"
 
 # A part lies flat, or nearly, below this strain by estimate; a ball falls into eight gores by it.
 _FLAT = 0.022
-# Where it is measured, a part lies flat with less of it beyond its limit, and less of it over itself [m2].
-_BEYOND, _OVERLAP = 0.02, 1e-5
+# Where it is measured, a part lies flat with less beyond its limit than this share of the whole, and less of it over itself [m2].
+_WORTH, _OVERLAP = 0.005, 1e-5
+# No further cut is made for the shape while less of the whole than this is beyond its limit.
+_ENOUGH = 0.03
 # A part is narrow that is somewhere less wide than the first share of the size of the whole: nobody cuts a neck of cloth, or a tip, that
 # narrow. A cut that leaves one counts as the second strain more, where its width is nothing.
 NARROW, _THIN = 0.05, 0.05
@@ -74,8 +77,15 @@ _NEARLY = 0.97
 _BASE = 0.6
 # The border of a panel squared is at least this share of a disk's; a cap's is shorter.
 _PANEL = 0.8
-# Parts at most.
-_MOST = 16
+# Limbs are looked for around so many places, far from one another; rings around them are smooth over this share of the size.
+_TIPS, _RING = 16, 0.04
+# In a limb lies the curvature of half a ball, 2 pi, within these shares of pi; its root is the ring in which less than the third is left,
+# and the cloth beyond takes it below the last: the toe of a sock is no limb.
+_THIMBLE, _EXCESS, _ROOT, _SPENT = 1.7, 2.3, 1.5, 0.5
+# The ring around a limb squared is at most this share of a disk's of the limb's area; what is a larger share of the whole is its trunk.
+_LIMB, _TRUNK = 0.35, 0.25
+# Parts at most, and how many more for each limb.
+_MOST, _PER_LIMB = 16, 3
 # A part smaller than this share of the whole is not cut further, and no cut leaves a smaller one.
 _LEAST = 0.02
 # Mirror images agree within this share of the size; a field is its own mirror image from this cosine on.
@@ -160,15 +170,23 @@ def part_solids(
         cloth: with the seams that it has.
         shape: whether pieces are cut for their shape, too, until each can lie flat.
         mirror: of a cloth that is its own mirror image, vertex by vertex: both sides are cut alike.
-        most: pieces at most; 16 if not given.
+        most: pieces at most; 16 if not given, and, with a measure, three more for each limb.
         measure: lays a disk flat; without it all goes by estimate.
     """
     total = float(cloth.face_areas.sum())
     number = 1
-    most = _MOST if most is None else most
     done, known = set[tuple[int, tuple[int, float]]](), dict[int, float]()
     laid = None if measure is None else _remembering(measure, NARROW * np.sqrt(total))
+    limbs = 0
+    for mesh in list(cloth.pieces()) if shape else ():
+        field, count = _limbs(mesh, mirror)
+        made = _cut(cloth, mesh, field, f"{SOLID} {number}", mirror) if count else None
+        if made is not None:
+            cloth, number, limbs = made, number + 1, limbs + count
+    if most is None:
+        most = _MOST + (0 if laid is None else _PER_LIMB * limbs)
     for _ in range(4 * most):
+        beyond = 0.0
         meshes = list(cloth.pieces())
         waiting = []
         for mesh in meshes:
@@ -180,15 +198,21 @@ def part_solids(
                 rank, value = 2, _strain(mesh, known) * area
             elif laid is not None and _is_disk(mesh):
                 flat = laid(cloth, mesh)
-                rank, value = (2, flat.overlap) if flat.overlap > _OVERLAP else (1, (flat.outside - _BEYOND) * area)
+                beyond += flat.outside * area
+                rank, value = (
+                    (2, flat.overlap) if flat.overlap > _OVERLAP else (1, flat.outside * area - _WORTH * total)
+                )
             else:
                 rank, value = 1, (_strain(mesh, known) - _FLAT) * area
+                beyond += area if value > 0.0 else 0.0
             if rank == 1 and (not large or len(meshes) >= most or value <= 0.0 or (1, key) in done):
                 rank = 0
             if rank == 0 and (not large or flat is None or flat.neck is None):
                 continue
             if (rank, key) not in done:
                 waiting.append((rank, value, key, mesh))
+        if beyond < _ENOUGH * total:
+            waiting = [one for one in waiting if one[0] != 1]
         if not waiting:
             break
         rank, _, key, mesh = max(waiting, key=lambda one: one[:2])
@@ -215,7 +239,7 @@ def _cut(cloth: Cloth, mesh: PieceMesh, field: FloatArray, name: str, mirror: An
     """Return the cloth with a piece, and its mirror image, cut along a field's zero line (#V of the piece); None if it is not parted."""
     own, way = np.zeros(len(cloth.faces), dtype=np.int64), np.zeros(len(cloth.vertices))
     own[mesh.face_of], way[mesh.vertex_of] = 1, field
-    keep = 0.05
+    keep = 0.01
     for other in cloth.pieces() if mirror is not None else ():
         image = None if mirror is None or other.face_of[0] == mesh.face_of[0] else _image(other, mesh, mirror)
         if image is not None:
@@ -262,12 +286,72 @@ def _strain(mesh: PieceMesh | Cloth, known: dict[int, float]) -> float:
     return known[corners]
 
 
-def _reach(mesh: PieceMesh | Cloth) -> float:
-    """Return the way along a mesh between two places that are about as far from each other as any [m]."""
+def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
+    """Return a field (#V) that is positive on the limbs of a part: its ears, legs, fingers, and how many there are.
+
+    Rings around a place far out enclose more and more curvature: 2 pi, that of half a ball, at the end of a limb and all along it. Where
+    the limb begins the cloth is a saddle, and takes it away again: to 0 on a trunk that is flat (Gauss and Bonnet).
+    """
+    operators, graph = Operators(vertices=mesh.vertices, faces=mesh.faces), _graph(mesh)
+    size = float(np.sqrt(operators.mass.sum()))
+    triangles = mesh.vertices[mesh.faces]
+    curvature = np.full(len(mesh.vertices), 2.0 * np.pi)
+    for k in range(3):
+        u, v = (triangles[:, (k + n) % 3] - triangles[:, k] for n in (1, 2))
+        angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
+        curvature -= np.bincount(mesh.faces[:, k], angle, minlength=len(curvature))
+    loops = border_loops(mesh.faces.astype(np.int32))
+    rim = np.concatenate(loops).astype(np.int64) if loops else np.empty(0, np.int64)
+    tips = [int(np.linalg.norm(mesh.vertices - mesh.vertices.mean(axis=0), axis=1).argmax())]
+    away = dijkstra(graph, indices=tips[0])
+    while len(tips) < _TIPS:
+        tips.append(int(np.where(np.isfinite(away), away, -1.0).argmax()))
+        away = np.minimum(away, dijkstra(graph, indices=tips[-1]))
+    heat = np.zeros((len(curvature), _TIPS))
+    heat[tips, np.arange(_TIPS)] = 1.0 / operators.mass[tips]
+    whole = Cloth(vertices=mesh.vertices, faces=mesh.faces)
+    found = list[tuple[float, int, FloatArray]]()
+    for tip, warm in zip(tips, operators.smooth(heat, _RING * size).T, strict=True):
+        # Varadhan's formula: how heat spreads is how far it is.
+        far = -_RING * size * np.log(np.maximum(warm, 1e-300))
+        order = np.argsort(far)
+        inside = np.cumsum(curvature[order])[: int(np.isin(order, rim).argmax()) if len(rim) else None] / np.pi
+        grown = np.flatnonzero(inside > _THIMBLE)
+        lost = grown[0] + np.flatnonzero(inside[grown[0] :] < _ROOT) if len(grown) else grown
+        if len(lost) == 0 or inside[lost[0] :].min() > _SPENT or np.abs(inside[: lost[0]] - 1.0).max() > _EXCESS - 1.0:
+            continue
+        field = far[order[lost[0]]] - far
+        length = section(whole, field, np.ones(len(mesh.faces), dtype=bool))[0]
+        area = float(operators.mass[order[: lost[0]]].sum())
+        ratio = length**2 / (4.0 * np.pi * area)
+        if ratio < _LIMB and 0.3 * _LEAST < area / size**2 < _TRUNK:
+            found.append((ratio, tip, field))
+    image = None if mirror is None else _image(mesh, mesh, mirror)
+    taken, count = np.full(len(curvature), -np.inf), 0
+    for _, tip, field in sorted(found, key=lambda one: one[0]):
+        if taken[tip] > 0.0:
+            continue
+        # Limbs stand apart: what is beside one belongs to no other.
+        beside = np.unique(mesh.faces[(taken > 0.0)[mesh.faces].any(axis=1)])
+        field = field - max(float(field[beside].max(initial=0.0)), 0.0)
+        count += 1
+        if image is not None:
+            count += int(field[image[tip]] <= 0.0)
+            field = np.maximum(field, field[image])
+        taken = np.maximum(taken, field)
+    return taken, count
+
+
+def _graph(mesh: PieceMesh | Cloth) -> csr_array:
     a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     step = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
     graph = coo_array((step, (a, b)), shape=(len(mesh.vertices),) * 2).tocsr()
-    graph = graph.maximum(graph.T)
+    return csr_array(graph.maximum(graph.T))
+
+
+def _reach(mesh: PieceMesh | Cloth) -> float:
+    """Return the way along a mesh between two places that are about as far from each other as any [m]."""
+    graph = _graph(mesh)
     far = dijkstra(graph, indices=0)
     far = dijkstra(graph, indices=int(np.where(np.isfinite(far), far, -1.0).argmax()))
     return float(far[np.isfinite(far)].max())
@@ -384,7 +468,8 @@ def _best_way(
         if best is not None and best[0] <= cost:
             break
         if laid is not None:
-            widths = [laid(made, part).width for part in made.pieces() if _is_disk(part)]
+            disks = [part for part in made.pieces() if _is_disk(part)]
+            widths = [laid(made, part).width for part in disks]
             cost += _THIN * max(1.0 - min(widths, default=np.inf) / (NARROW * np.sqrt(total)), 0.0)
         if best is None or cost < best[0]:
             best = cost, field
