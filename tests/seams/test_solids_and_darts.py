@@ -16,7 +16,7 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.scene.found_seams import plain_panel, seams_entry
 from warpflat.scene.load import load_scene
 from warpflat.seams.cloth import Cloth, PieceMesh
-from warpflat.seams.energy import laid_flat
+from warpflat.seams.energy import _TRIAL, _can_be_sewn, _Candidate, _cut, _Measured, laid_flat
 from warpflat.seams.fields import Operators
 from warpflat.seams.find import FoundSeams, cloth_of
 from warpflat.seams.solid import part_solids
@@ -231,6 +231,36 @@ def test_darts_are_mirrored_and_release_what_they_say() -> None:
         surface, warpflat.SeamOptions(no=("dart", "yoke", "waist", "centre back", "princess", "panel")), fabric="woven"
     )
     assert {seam.name for seam in none.seams} == {seam.name for seam in plain.seams}
+
+
+@pytest.mark.parametrize(("leaves", "fits"), [(0.06, True), (0.012, False)])
+def test_a_dart_that_all_but_parts_a_piece_is_not_made(leaves: float, fits: bool) -> None:
+    # A strip of 14 cm that is a flat cone about the tip of the dart, so that the dart opens.
+    x, y = np.meshgrid(np.linspace(-0.2, 0.2, 41), np.linspace(0.0, 0.14, 15))
+    z = -0.3 * np.hypot(x, y - 0.14 + leaves)
+    quads = np.array(
+        [[41 * i + k, 41 * i + k + 1, 41 * i + k + 42, 41 * i + k + 41] for i in range(14) for k in range(40)]
+    )
+    strip = Cloth(
+        vertices=np.stack([x, y, z], axis=2).reshape(-1, 3), faces=np.vstack([quads[:, :3], quads[:, [0, 2, 3]]])
+    )
+    start, end = np.array([0.001, 0.0, 0.0]), np.array([0.001, 0.14 - leaves, 0.0])
+    dart = _Candidate(name="dart", normal=np.array([1.0, 0.0, 0.0]), point=start, start=start, end=end)
+    (whole,) = strip.pieces()
+    made = _cut(strip, whole, dart, _TRIAL)
+    assert made is not None
+    before, after = (laid_on_trial(cloth) for cloth in (strip, made))
+    assert _can_be_sewn(made, dart, before, [after], size=0.5) == fits
+
+
+def laid_on_trial(cloth: Cloth) -> _Measured:
+    """Return the only piece of a cloth, laid flat."""
+    (mesh,) = cloth.pieces()
+    surface = as_surface(cloth, mesh)
+    result = warpflat.flatten(surface, fabric="woven")
+    return _Measured(
+        mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0, place=mesh.vertices.mean(axis=0)
+    )
 
 
 def test_who_asks_for_less_beyond_the_limit_gets_darts_that_bring_less() -> None:
