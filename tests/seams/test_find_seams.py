@@ -324,3 +324,15 @@ def test_limbs_of_a_garment_of_equal_sides_are_mirror_images() -> None:
     one, other = averaged_limbs(anatomy, alike=True)
     np.testing.assert_allclose(one.along - 2.0 * (one.along @ anatomy.normal) * anatomy.normal, other.along, atol=1e-12)
     assert (one.fork + other.fork) @ anatomy.normal == pytest.approx(2.0 * anatomy.offset)
+
+
+def test_holes_in_the_mesh_are_closed_before_it_is_cut() -> None:
+    plain = solids.skirt(60, 140)
+    middles = plain.vertices[plain.faces].mean(axis=1)
+    keep = np.ones(len(plain.faces), dtype=bool)
+    for place in ([0.0, 0.3, 0.16], [0.05, 0.2, -0.17], [-0.1, 0.1, 0.17]):
+        keep[np.linalg.norm(middles - place, axis=1).argmin()] = False
+    found = warpflat.find_seams(warpflat.make_surface(plain.vertices, plain.faces[keep], name="skirt"))
+    assert {seam.name for seam in found.seams} == {"side left", "side right"}
+    assert [len(border_loops(piece.faces)) for piece in found.pieces] == [1, 1]
+    assert any(note.startswith("3 holes of at most ") and note.endswith(" mm around closed") for note in found.notes)

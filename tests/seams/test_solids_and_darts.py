@@ -16,7 +16,7 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.scene.found_seams import plain_panel, seams_entry
 from warpflat.scene.load import load_scene
 from warpflat.seams.cloth import Cloth, PieceMesh
-from warpflat.seams.energy import laid_flat
+from warpflat.seams.energy import _TRIAL, _can_be_sewn, _Candidate, _cut, _Measured, laid_flat
 from warpflat.seams.fields import Operators
 from warpflat.seams.find import FoundSeams, cloth_of
 from warpflat.seams.solid import _limbs as limbs_of
@@ -234,6 +234,36 @@ def test_darts_are_mirrored_and_release_what_they_say() -> None:
     assert {seam.name for seam in none.seams} == {seam.name for seam in plain.seams}
 
 
+@pytest.mark.parametrize(("leaves", "fits"), [(0.06, True), (0.012, False)])
+def test_a_dart_that_all_but_parts_a_piece_is_not_made(leaves: float, fits: bool) -> None:
+    # A strip of 14 cm that is a flat cone about the tip of the dart, so that the dart opens.
+    x, y = np.meshgrid(np.linspace(-0.2, 0.2, 41), np.linspace(0.0, 0.14, 15))
+    z = -0.3 * np.hypot(x, y - 0.14 + leaves)
+    quads = np.array(
+        [[41 * i + k, 41 * i + k + 1, 41 * i + k + 42, 41 * i + k + 41] for i in range(14) for k in range(40)]
+    )
+    strip = Cloth(
+        vertices=np.stack([x, y, z], axis=2).reshape(-1, 3), faces=np.vstack([quads[:, :3], quads[:, [0, 2, 3]]])
+    )
+    start, end = np.array([0.001, 0.0, 0.0]), np.array([0.001, 0.14 - leaves, 0.0])
+    dart = _Candidate(name="dart", normal=np.array([1.0, 0.0, 0.0]), point=start, start=start, end=end)
+    (whole,) = strip.pieces()
+    made = _cut(strip, whole, dart, _TRIAL)
+    assert made is not None
+    before, after = (laid_on_trial(cloth) for cloth in (strip, made))
+    assert _can_be_sewn(made, dart, before, [after], size=0.5) == fits
+
+
+def laid_on_trial(cloth: Cloth) -> _Measured:
+    """Return the only piece of a cloth, laid flat."""
+    (mesh,) = cloth.pieces()
+    surface = as_surface(cloth, mesh)
+    result = warpflat.flatten(surface, fabric="woven")
+    return _Measured(
+        mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0, place=mesh.vertices.mean(axis=0)
+    )
+
+
 def test_who_asks_for_less_beyond_the_limit_gets_darts_that_bring_less() -> None:
     surface = dented(0.03)
     names = [
@@ -241,6 +271,26 @@ def test_who_asks_for_less_beyond_the_limit_gets_darts_that_bring_less() -> None
         for limit in (0.02, 0.0005)
     ]
     assert names == [{"side left", "side right"}, {"side left", "side right", "dart left", "dart right"}]
+
+
+def test_a_piece_within_the_limit_gets_its_darts_while_the_whole_is_beyond() -> None:
+    plain = dented(0.06)
+    vertices = plain.vertices.copy()
+    # Saddles in front, which no dart takes up.
+    turn = np.arctan2(vertices[:, 0], vertices[:, 2])
+    ripple = 0.022 * np.sin(8 * turn) * np.sin(30 * vertices[:, 1]) * np.clip(20 * vertices[:, 2] - 0.4, 0, 1)
+    vertices += ripple[:, None] * np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
+    surface = warpflat.make_surface(vertices, plain.faces, name="skirt")
+    flat = [warpflat.flatten(piece, fabric="woven", datum="grain") for piece in warpflat.find_seams(surface).pieces]
+    area = np.array([piece.fit.area.sum() for piece in flat])
+    outside = np.array([piece.fit.outside for piece in flat])
+    back, whole = outside[[piece.surface.name == "back" for piece in flat]].item(), area @ outside / area.sum()
+    assert whole > 1.2 * back
+    limit = 0.5 * (back + whole)
+    no = ("yoke", "waist", "centre back", "centre front", "princess", "panel")
+    found = warpflat.find_seams(surface, warpflat.SeamOptions(limit=limit, no=no), fabric="woven")
+    assert {"dart left", "dart right"} <= {seam.name for seam in found.seams}
+    assert any(name.startswith("dart") for piece in found.pieces for name in piece.lines if piece.name == "back")
 
 
 def write(surface: Surface, path: Path) -> Path:

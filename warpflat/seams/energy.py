@@ -68,8 +68,6 @@ _SEWN_ON_TRIAL = 3
 _OTHER_WAY = 0.6
 # Lengths are shares of the garment's size. A dart is between these long, and its tip a little behind the place.
 _SHORTEST, _LONGEST, _BEHIND = 0.03, 0.32, 0.01
-# Ahead of its tip a dart leaves at least this share of its length: one that all but parts a piece is no dart.
-_CLEAR = 0.6
 # Seams and darts at most, mirrored ones counted once; and how many are tried.
 _MOST_ROUNDS, _MOST_TRIALS = 6, 48
 # Pieces of as many faces are the same if the sums of their coordinates agree within this [m].
@@ -579,11 +577,19 @@ def laid_flat(surface: Surface, fabric: Fabric, width: float) -> LaidFlat:
 def _can_be_sewn(
     cloth: Cloth, candidate: _Candidate, before: _Measured, after: Sequence[_Measured], size: float
 ) -> bool:
-    """Return whether nothing lies over itself that did not before, a dart opens wide enough and not too wide, a piece is nowhere narrow."""
+    """Return whether nothing lies over itself that did not before, a dart opens wide enough and not too wide, a piece is nowhere narrow.
+
+    Beside a dart's mouth its piece is narrow, and may be: what counts is that it hangs together around the tip.
+    """
     if sum(piece.result.overlap for piece in after) > before.result.overlap + _OVERLAP:
         return False
     if candidate.parts:
         return _least_width(after, size) >= _least_width([before], size)
+    before_it, *after_it = (
+        parts_within(one.surface.faces, one.result.positions, NARROW * size) for one in (before, *after)
+    )
+    if max(after_it) > before_it:
+        return False
     line = np.unique(cloth.seams[_TRIAL])
     widest = 0.0
     for piece in after:
@@ -764,8 +770,7 @@ def _candidates(
             way = (place - rim[k]) / length
             flat = np.cross(way, normal)
             tip = place + _BEHIND * size * way
-            ahead_of_tip = np.linalg.norm(rim - tip, axis=1)[(rim - tip) @ way > 0.0]
-            if np.linalg.norm(flat) < 0.3 or ahead_of_tip.min(initial=np.inf) < _CLEAR * length:
+            if np.linalg.norm(flat) < 0.3:
                 continue
             yield _Candidate(
                 name="dart",

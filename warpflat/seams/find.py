@@ -17,7 +17,7 @@ from warpflat.core.text import find_unused_name, format_count
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.pattern.pieces import FoundSeam
-from warpflat.seams.anatomy import ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
+from warpflat.seams.anatomy import HOLE, ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
 from warpflat.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.seams.cloth import Cloth, PieceMesh
 from warpflat.seams.energy import Trial, cut_by_energy, laid_flat
@@ -135,7 +135,9 @@ def find_seams(
 
 
 def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
+    cloth, closed_holes = _without_holes(cloth)
     cloth, turned = without_thickness(cloth)
+    turned = [*closed_holes, *turned]
     operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     if options.smooth:
         cloth, words = _smoothed(cloth, operators, options.smooth)
@@ -250,6 +252,30 @@ def _smoothed(cloth: Cloth, operators: Operators, length: float) -> tuple[Cloth,
     moved = 1e3 * np.linalg.norm(vertices - cloth.vertices, axis=1)
     words = f"smoothed over {1e3 * length:g} mm, on request: it moved by {moved.mean():.1f} mm in the mean, {moved.max():.1f} mm at most"
     return replace(cloth, vertices=vertices), words
+
+
+def _without_holes(cloth: Cloth) -> tuple[Cloth, list[str]]:
+    """Return the cloth with its holes closed, and a note if there were any: nobody sews around a fault of the mesh, or a buttonhole."""
+    vertices, fans, longest = [cloth.vertices], list[Ids](), 0.0
+    for loop in cloth.borders():
+        ring = cloth.vertices[loop]
+        length = polyline_length(np.append(ring, ring[:1], axis=0))
+        if length < HOLE * np.sqrt(float(cloth.face_areas.sum())):
+            middle = np.full(len(loop), len(cloth.vertices) + len(fans))
+            vertices.append(ring.mean(axis=0)[None])
+            fans.append(np.stack([np.roll(loop, -1), loop, middle], axis=1))
+            longest = max(longest, length)
+    if not fans:
+        return cloth, []
+    added = len(np.concatenate(fans))
+    cloth = replace(
+        cloth,
+        vertices=np.concatenate(vertices),
+        faces=np.concatenate([cloth.faces, *fans]),
+        values={name: np.append(value, np.zeros(len(fans))) for name, value in cloth.values.items()},
+        labels={name: np.append(label, np.zeros(added, dtype=np.int64)) for name, label in cloth.labels.items()},
+    )
+    return cloth, [f"{format_count(len(fans), 'hole')} of at most {1e3 * longest:.0f} mm around closed"]
 
 
 def cloth_of(surface: Surface) -> Cloth:
