@@ -77,7 +77,9 @@ def write_drape(
         report_activity("correcting the pattern")
         with errors_named(scene.where):
             other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
-            found = correct_pattern(draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None)
+            found = correct_pattern(
+                draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None
+            )
             drawing = pattern_options(scene.settings.pattern, None)
         if output.picture:
             with optional_file(folder / "corrected.png", files) as path:
