@@ -13,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import warp as wp
 from command import Command, Ended
@@ -51,6 +52,20 @@ def test_flatten_writes_its_files_and_a_summary(command: Command):
         "metrics.json", "cloth.obj", "frames.usdc", "picture.png", "review.html", *PATTERN_FILES
     }  # fmt: skip
     assert json.loads(Path("out/cloth/metrics.json").read_text())["pieces"]["cloth"]["fabric"] == "denim"
+
+
+@pytest.mark.parametrize(("bent", "told"), [(3.0, True), (0.3, False)])
+def test_a_panel_that_is_no_pattern_in_one_piece_says_how_to_part_it(command: Command, bent: float, told: bool):
+    # A saddle, more or less.
+    across = np.linspace(-0.5, 0.5, 13)
+    points = "".join(f"v {x:.4f} {y:.4f} {bent * x * y:.4f}\n" for x in across for y in across)
+    faces = "".join(
+        f"f {i} {i + 13} {i + 14} {i + 1}\n" for row in range(12) for i in range(13 * row + 1, 13 * row + 13)
+    )
+    Path("saddle.obj").write_text(points + faces)
+    _, out, *_ = command("flatten", "saddle.obj", "--units", "m", "--fabric", "woven")
+    assert "beyond the limit" in out
+    assert ("--seams auto" in out) is told
 
 
 def test_run_prints_its_metrics_as_json_and_nothing_else(command: Command):

@@ -11,6 +11,7 @@ from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_wo
 from warpflat.flattening.progress import relaxation_words
 from warpflat.garment.rings import rings_line
 from warpflat.garment.to_pattern import LACKING
+from warpflat.scene.found_seams import NO_PATTERN
 
 __all__ = ["cut_words", "notes_line", "summary_lines"]
 
@@ -108,6 +109,9 @@ def summary_lines(
             place = next(iter(wear["where_not"]), "").partition(" (limit")[0]
             lines.append(_clipped(f"{head}: no: {_some(unfit)}; {beyond}; {worst} {place}", width))
             lines.append(_clipped(f"  {advice}", width))
+            # One piece of a mesh for which no seams were looked for.
+            if size and len(pieces) == 1 and "garment" not in metrics and all_of_it["outside"] > NO_PATTERN:
+                lines.append('  if it may be parted: --seams auto (find = "auto" in [seams]) looks for seams and darts')
     seams, constraints = metrics.get("seams", ()), metrics.get("constraints", ())
     if seams or constraints:
         parts = []

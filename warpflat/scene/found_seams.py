@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from warpflat.surface.io.file_seams import FileSeams
     from warpflat.surface.mesh import Surface
 
-__all__ = ["found_seams", "plain_panel", "read_edges", "seams_entry"]
+__all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry"]
 
-# More than this share of the cloth beyond its limit is no pattern yet.
-_NO_PATTERN = 0.1
+#: More than this share of the cloth beyond its limit is no pattern yet.
+NO_PATTERN = 0.1
 # A pattern is nowhere narrower than this share of its seams' allowance.
 _WIDTH = 0.5
 # A ring that lacks more than this share of a full turn does not lie flat: its cloth would be stretched by as much.
@@ -383,7 +383,7 @@ def seams_entry(found: FoundSeams, pieces: Sequence[Flattening], allowance: floa
         "found_seams": [seam.as_dict() for seam in found.seams],
         "notes": list(found.notes),
     }
-    if share > _NO_PATTERN:
+    if share > NO_PATTERN:
         worst = pieces[int((outside * area).argmax())].surface.name
         entry["no_pattern"] = (
             f"no pattern yet: {100 * share:.0f} % of the cloth is beyond its limit, most of it in {worst}; take a fabric that gives more, "
