@@ -172,6 +172,31 @@ def test_islands_that_are_not_as_large_as_the_cloth_are_taken_only_when_asked(tm
     check_gores(found(path, find="uv"))
 
 
+def test_islands_that_are_no_pattern_are_taken_only_when_asked(tmp_path: Path) -> None:
+    # A ball in two halves, in a texture that keeps their area: as large as cut pieces, and far from flat.
+    ball = trimesh.creation.icosphere(4, radius=0.15)
+    front = ball.triangles_center[:, 2] > 0.0
+    unit = ball.vertices / 0.15
+    rows = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in ball.vertices]
+    for side in (1.0, -1.0):
+        places = 0.15 * np.sqrt(2.0 / (1.0 + np.maximum(side * unit[:, 2], -0.5)))[:, None] * unit[:, :2] * [side, 1.0]
+        rows += [f"vt {u + 0.5 * side:.6f} {v:.6f}" for u, v in places]
+    offset = np.where(front, 0, len(unit))[:, None]
+    rows += [
+        "f " + " ".join(f"{v}/{t}" for v, t in zip(face, corner, strict=True))
+        for face, corner in zip((ball.faces + 1).tolist(), (ball.faces + 1 + offset).tolist(), strict=True)
+    ]
+    path = tmp_path / "ball.obj"
+    path.write_text("\n".join([*rows, ""]))
+    for options in ({}, {"find": "auto"}):
+        result = found(path, **options)
+        assert "2 islands of the file's texture were not taken, as" in " ".join(result.notes)
+        assert "look like cut pieces" not in " ".join(result.notes)
+        assert result.along == ""
+        assert len(result.pieces) == 8
+    assert len(found(path, find="uv").pieces) == 2
+
+
 def test_what_the_file_does_not_have_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_obj(tmp_path / "skirt.obj", texture=False, kind="g")
     arguments = ["flatten", str(path), "--units", "m", "--out", str(tmp_path / "out")]

@@ -27,6 +27,7 @@ from warpflat.surface.repair.weld import weld_map
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from warpflat.fabric.fabric import Fabric
     from warpflat.flattening.result import Flattening
     from warpflat.pattern.pieces import FoundSeam
     from warpflat.seams.find import FoundSeams
@@ -111,7 +112,6 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         more = len(seams["uv"].names) > parts
         if not why and (by_itself or (more and not drawn) or asked is not None):
             taken = seams["uv"]
-            notes.append("islands of the texture were taken, as they look like cut pieces; --seams none keeps it whole")
         elif why and (by_itself or asked is not None) and not all_parts:
             notes.append(f"{seams['uv'].describe()} were not taken for cut pieces, as {why}; --seams uv takes them")
     if taken is None and (all_parts or (asked is None and not drawn and not by_itself)):
@@ -125,15 +125,16 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     elif table.component == "largest":
         layers = layers[:1]
     given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"smooth_mm", "body"})
-    given["find"] = "auto" if taken is None and (by_itself or (asked is not None and asked.find == "auto")) else "none"
+    looked_for = by_itself or (asked is not None and asked.find == "auto")
+    given["find"] = "auto" if taken is None and looked_for else "none"
     smooth = 0.0 if asked is None else 1e-3 * asked.smooth_mm
-    cuts = [cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, read.marks)]
+    cuts = by_hand = [cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, read.marks)]
     if taken is not None:
         if taken.joined:
             notes.append(
                 f"{format_count(taken.joined, 'island')} of less than a thousandth of the cloth joined to a neighbour"
             )
-        cuts += _cuts_of_file(taken, read, layers, f"{path}")
+        cuts = [*by_hand, *_cuts_of_file(taken, read, layers, f"{path}")]
     waist = None
     if asked is not None and asked.body is not None:
         with errors_named(f"{scene.where}: find_seams.body"):
@@ -146,8 +147,19 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             cuts=tuple(cuts),
             waist=waist,
         )
-        found = find_seams(layers, options, fabric=scene_fabric(scene))
+        fabric = scene_fabric(scene)
+        found = find_seams(layers, options, fabric=fabric)
+        if taken is not None and looked_for and (beyond := _beyond_limit(found.pieces, fabric)) > NO_PATTERN:
+            notes.append(
+                f"{taken.describe()} were not taken, as {100 * beyond:.0f} % of the cloth would be beyond its limit; --seams uv takes them"
+            )
+            taken, options = None, replace(options, find="auto", cuts=tuple(by_hand))
+            found = find_seams(layers, options, fabric=fabric)
     if taken is not None:
+        if not of_file:
+            notes.insert(
+                0, "islands of the texture were taken, as they look like cut pieces; --seams none keeps it whole"
+            )
         found = _named_by_file(found, taken, read)
     elif by_itself:
         why = "one piece cannot lie flat, so its seams were found; --seams none keeps it whole"
@@ -155,6 +167,16 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             why = "one piece cannot lie flat, so other seams were found, too; --seams none makes no others than you have drawn"
         notes.insert(0, why)
     return replace(found, notes=(*notes, *found.notes))
+
+
+def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
+    """Return the share of the cloth that is beyond its limit where pieces are laid flat, about."""
+    from warpflat.seams.energy import laid_flat
+    from warpflat.surface.triangles import triangulate
+
+    corners = [piece.vertices[triangulate(piece.faces)[0]] for piece in pieces]
+    area = [float(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum()) for p in corners]
+    return float(np.average([laid_flat(piece, fabric, 0.0).outside for piece in pieces], weights=area))
 
 
 def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface], file: str) -> list[SeamCut]:

@@ -68,6 +68,8 @@ _SEWN_ON_TRIAL = 3
 _OTHER_WAY = 0.6
 # Lengths are shares of the garment's size. A dart is between these long, and its tip a little behind the place.
 _SHORTEST, _LONGEST, _BEHIND = 0.03, 0.32, 0.01
+# What hangs by a neck of so many times what can be sewn hangs by less once it is sewn.
+_HARDLY = 1.5
 # Seams and darts at most, mirrored ones counted once; and how many are tried.
 _MOST_ROUNDS, _MOST_TRIALS = 6, 48
 # Pieces of as many faces are the same if the sums of their coordinates agree within this [m].
@@ -585,11 +587,13 @@ def _can_be_sewn(
         return False
     if candidate.parts:
         return _least_width(after, size) >= _least_width([before], size)
-    before_it, *after_it = (
-        parts_within(one.surface.faces, one.result.positions, NARROW * size) for one in (before, *after)
-    )
-    if max(after_it) > before_it:
-        return False
+    # A flap that hangs by what is hardly sewn counts while it is small, too.
+    for necks in ((NARROW * size,), (_HARDLY * SEWABLE, 0.005)):
+        before_it, *after_it = (
+            parts_within(one.surface.faces, one.result.positions, *necks) for one in (before, *after)
+        )
+        if max(after_it) > before_it:
+            return False
     line = np.unique(cloth.seams[_TRIAL])
     widest = 0.0
     for piece in after:

@@ -496,13 +496,16 @@ def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
     return _Way(field=field, name="neck", round=False)
 
 
-def parts_within(faces: IntArray, flat: FloatArray, width: float) -> int:
-    """Return in how many parts a pattern falls, but for its tips, with half a width [m] taken off all around; 0 where nothing is left."""
+def parts_within(faces: IntArray, flat: FloatArray, width: float, tip: float = _TIP) -> int:
+    """Return in how many parts a pattern falls with half a width [m] taken off all around; 0 where nothing is left.
+
+    Tips, which are no more than a share of the whole, are no parts.
+    """
     import shapely
 
     rings = [shapely.Polygon(flat[loop]).buffer(0.0) for loop in border_loops(faces, flat)]
     whole = rings[0].difference(shapely.union_all(rings[1:]))
-    return int((shapely.area(shapely.get_parts(whole.buffer(-0.5 * width))) > _TIP * whole.area).sum())
+    return int((shapely.area(shapely.get_parts(whole.buffer(-0.5 * width))) > tip * whole.area).sum())
 
 
 def _topology(faces: Ids) -> float:
