@@ -122,11 +122,8 @@ def find_places(
             if areas[part].sum() >= _LEAST_AREA:
                 worst = int(part[np.abs(at_vertices[part]).argmax()])
                 line, area, strain = _line_at(cloth, worst), float(areas[part].sum()), float(at_vertices[worst])
-                how, beyond = (
-                    "stretched" if strain > 0.0 else "pressed together",
-                    f", beyond the cloth's limit of {100 * limit:g} %",
-                )
-                kind = "strain"
+                kind, how = "strain", "stretched" if strain > 0.0 else "pressed together"
+                beyond = f", beyond the cloth's limit of {100 * limit:g} %"
                 if strain < 0.0 and gathered[part].any():
                     kind, how, beyond = "hang", "gathered by its elastic", ""
                 words = (

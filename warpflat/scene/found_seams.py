@@ -172,10 +172,11 @@ def found_seams(scene: Scene) -> FoundSeams | None:
 def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
     """Return the share of the cloth that is beyond its limit where pieces are laid flat, about."""
     from warpflat.seams.energy import laid_flat
+    from warpflat.surface.normals import area_vectors
     from warpflat.surface.triangles import triangulate
 
-    corners = [piece.vertices[triangulate(piece.faces)[0]] for piece in pieces]
-    area = [float(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum()) for p in corners]
+    vectors = [area_vectors(piece.vertices, triangulate(piece.faces)[0]) for piece in pieces]
+    area = [float(np.linalg.norm(each, axis=1).sum()) for each in vectors]
     return float(np.average([laid_flat(piece, fabric, 0.0).outside for piece in pieces], weights=area))
 
 
