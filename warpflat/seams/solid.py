@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
@@ -294,12 +295,7 @@ def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
     """
     operators, graph = Operators(vertices=mesh.vertices, faces=mesh.faces), _graph(mesh)
     size = float(np.sqrt(operators.mass.sum()))
-    triangles = mesh.vertices[mesh.faces]
-    curvature = np.full(len(mesh.vertices), 2.0 * np.pi)
-    for k in range(3):
-        u, v = (triangles[:, (k + n) % 3] - triangles[:, k] for n in (1, 2))
-        angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
-        curvature -= np.bincount(mesh.faces[:, k], angle, minlength=len(curvature))
+    curvature = np.asarray(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).vertex_defects)
     loops = border_loops(mesh.faces.astype(np.int32))
     rim = np.concatenate(loops).astype(np.int64) if loops else np.empty(0, np.int64)
     tips = [int(np.linalg.norm(mesh.vertices - mesh.vertices.mean(axis=0), axis=1).argmax())]
