@@ -263,7 +263,9 @@ def test_every_row_of_the_equations_is_held_by_a_test_and_names_what_there_is() 
     rows = [line for line in (ROOT / "docs" / "how.md").read_text(encoding="utf-8").splitlines() if "`tests/" in line]
     assert len(rows) >= 12
     for row in rows:
-        for path, names in re.findall(r"`((?:kernels|solver|mannequin|flattening|cutting)/\w+\.py)`((?:, `[\w.]+`)*)", row):
+        for path, names in re.findall(
+            r"`((?:kernels|solver|mannequin|flattening|cutting)/\w+\.py)`((?:, `[\w.]+`)*)", row
+        ):
             code = next(file for file in (ROOT / path, ROOT / "warpflat" / path) if file.is_file()).read_text()
             for name in re.findall(r"`([\w.]+)`", names):
                 assert f"def {name.rpartition('.')[2]}(" in code, (path, name)
