@@ -279,9 +279,7 @@ def _page(
         ("Files", f'<ul class="files">{links}</ul>'),
     ]
     body = "".join(f"<h2>{title}</h2>{content}" if title else content for title, content in sections if content)
-    body += "".join(
-        f"<details><summary>{title}</summary>{content}</details>" for title, content in folded if content
-    )
+    body += "".join(f"<details><summary>{title}</summary>{content}</details>" for title, content in folded if content)
     script = f"<script>{_data('viewer.js')}</script>" if packed else ""
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(name)} - review</title>'
