@@ -231,10 +231,10 @@ def fabric_called(name: str, library: Mapping[str, Fabric]) -> Fabric:
     """
     wanted = _plain(name)
     for fabric in library.values():
-        names = (fabric.name, *fabric.aliases)
-        for called in names:
+        known = (fabric.name, *fabric.aliases)
+        for called in known:
             if wanted == _plain(called):
-                return replace(fabric, name=called, aliases=tuple(other for other in names if other != called))
+                return replace(fabric, name=called, aliases=tuple(other for other in known if other != called))
     names = [*library, *(alias for fabric in library.values() for alias in fabric.aliases)]
     raise InputError(f"unknown fabric {name!r}: {nearest(wanted, names)}")
 
