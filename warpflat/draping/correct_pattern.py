@@ -220,8 +220,7 @@ def correct_pattern(
 
 
 def _round(drape: Drape, share: float, bridging: bool) -> Round:
-    limit, faces = drape.cloth.fabric.strain_limit, drape.face_areas
-    strained = max(float(faces[np.abs(drape.strains[name]) > limit].sum() / faces.sum()) for name in ("warp", "weft"))
+    strained = drape.demand.outside(drape.face_areas)
     off = drape.misfit if bridging else drape.distance
     mean = float((off * drape.areas).sum() / drape.areas.sum())
     return Round(
@@ -250,8 +249,8 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
     difference = edge_lengths(drape.cloth.flat, seams[:, 0]) - edge_lengths(drape.cloth.flat, seams[:, 1])
 
     def told(worn: Drape, share: float) -> Round:
-        beyond = [worn.face_areas @ (worn.strains[name] > limit) for name in ("warp", "weft")]
-        return replace(_round(worn, share, True), strained=float(max(beyond) / worn.face_areas.sum()))
+        stretched = float(worn.face_areas[worn.demand.stretched].sum() / worn.face_areas.sum())
+        return replace(_round(worn, share, True), strained=stretched)
 
     before, history, reason = drape, [told(drape, 0.0)], f"{rounds} rounds"
     for _ in range(rounds):
