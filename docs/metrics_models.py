@@ -51,8 +51,14 @@ class PieceWear(Entry):
     outside_unsewn: float | None = None
     hollow: float
     """Share of the cloth over hollows, where no pressure is known."""
+    held: float
+    """Share of the cloth that is stretched or sheared beyond a limit where it lies close to the body; what `fits` is about."""
+    slack: float
+    """Share of the cloth that lies in folds: longer than the surface by more than the limit."""
     where_not: list[str]
-    """Places where it does not fit, in words."""
+    """Places where it is held, in words."""
+    where_slack: list[str]
+    """Places where it lies in folds, in words."""
     strain_warp: Distribution
     strain_weft: Distribution
     shear: Distribution
@@ -236,8 +242,10 @@ class GarmentWear(Entry):
     """How the whole garment fits."""
 
     fits: bool
-    """On the form, ease included."""
+    """At most 1 % of the cloth is held beyond its limits; `verdict` says all."""
     outside: float
+    held: float
+    slack: float
     where_not: list[str]
     would_help: list[Remedy]
     against: Literal["form"] | None = None
@@ -469,6 +477,8 @@ class Place(Entry):
     gap_m: float
     area_m2: float
     words: str
+    fails: bool = False
+    """Whether the garment does not fit because of it."""
 
 
 class CorrectionRound(Entry):
@@ -503,7 +513,7 @@ class Drape(Entry):
 
     converged: bool
     fits: bool
-    """At rest, and no place that misfits the designed surface where it is meant to touch, or is beyond the cloth's limits."""
+    """At rest, and no place that fails."""
     residual: float
     steps: int
     seconds: float
@@ -547,6 +557,26 @@ class CutPattern(PanelDistances):
     pieces: dict[str, PanelDistances]
 
 
+class Finding(Entry):
+    """One thing that the verdict rests on."""
+
+    kind: Literal["held", "pressing", "too large", "misfit", "not at rest", "folds", "ease", "opening"]
+    fails: bool
+    """Whether the garment does not fit because of it; otherwise it is told."""
+    words: str
+    remedy: str
+
+
+class Verdict(Entry):
+    """Whether the garment fits, said once: console, review page, print and batch read it here."""
+
+    fits: bool
+    by: Literal["strain", "drape"]
+    words: str
+    findings: list[Finding]
+    """Those that fail first."""
+
+
 class Metrics(Entry):
     """The whole file."""
 
@@ -573,6 +603,7 @@ class Metrics(Entry):
     cloths: list[ClothCut] | None = None
     marker: Marker | None = None
     drape: Drape | None = None
+    verdict: Verdict | None = None
     files: dict[str, dict[str, str]] | None = None
     """SHA-256 of every file, by run and name."""
     sha256: str | None = None

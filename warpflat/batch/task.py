@@ -180,8 +180,7 @@ def read_row(task: Task, out: Path) -> Row | None:
     with suppress(Exception):  # others may have changed it in any way
         metrics, record = read_result(folder / "metrics.json"), read_result(folder / "task.json")
         pieces = list(metrics["pieces"].values())
-        wear = metrics.get("wear") or pieces[0].get("wear") or {}
-        fits = metrics.get("drape", wear).get("fits")
+        fits = metrics.get("verdict", {}).get("fits")
         if fits not in (None, True, False):
             raise ValueError(fits)
         return Row(

@@ -78,6 +78,7 @@ def drape(
     """
     from dataclasses import replace
 
+    from warpflat.cli.summary import summary_lines
     from warpflat.cli.tables import drape_lines, warnings_of
     from warpflat.core.errors import InputError
     from warpflat.scene.load import load_scene
@@ -102,10 +103,10 @@ def drape(
         if as_json:
             click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
         elif not quiet:
-            lines = drape_lines(result.metrics)
-            for line in lines if verbose else lines[:6]:
+            for line in summary_lines(result.metrics, result.files, str(folder)):
                 click.echo(line)
-            click.echo(f"files: {folder}: {', '.join(result.files)}")
+            for line in drape_lines(result.metrics) if verbose else ():
+                click.echo(line)
         return NOT_CONVERGED if warnings else DONE
     options = {
         "--units": units,

@@ -118,7 +118,24 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         from warpflat.garment.rings import rings_line
 
         tables.append(rings_line(metrics["rings"]))
+    if len(metrics.get("cloths", ())) > 1:
+        # What is cut from each of several cloths.
+        parts = [
+            f"{cloth['name']}: " + ", ".join(f"{piece['title']} {piece['quantity']}" for piece in cloth["pieces"])
+            for cloth in metrics["cloths"]
+        ]
+        tables.append(f"cut from {'; '.join(parts)}")
+    if taken := metrics.get("pattern_of_file"):
+        tables.append(f"pattern: {cut_words(taken)}")
     return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
+
+
+def cut_words(taken: Mapping[str, Any]) -> str:
+    """Return in words how a pattern that was taken as it is compares with what flattening gives: the entry `pattern_of_file`."""
+    return (
+        f"as the file's texture has it, in {taken['unit']}, {taken['area_ratio']:.3f} times the area of the worn cloth; flattening lies "
+        f"{taken['mean_mm']:.2f} mm from it on average, 95 % within {taken['p95_mm']:.2f} mm"
+    )
 
 
 def _price(joules: float | None) -> str:
@@ -180,7 +197,7 @@ def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
     drape = metrics["drape"]
     misfit, distance = drape["misfit_m"], drape["distance_m"]
     first = (
-        f"worn: fits: {'yes' if drape['fits'] else 'no'}; {1e3 * distance['mean']:.2f} mm from the {drape['compared_with']}, "
+        f"worn {1e3 * distance['mean']:.2f} mm from the {drape['compared_with']}, "
         f"of which {1e3 * misfit['mean']:.2f} mm is misfit (95 %: {1e3 * misfit['p95']:.1f}, at most {1e3 * misfit['max']:.1f} mm)"
     )
     return [first, *(f"  {place['words']}" for place in drape["places"])]

@@ -67,7 +67,7 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
         return []
     found: list[Remedy] = []
     # One by one, since a path over a large mesh takes a while.
-    paths = (remedy for misfit in fit.misfits[:4] for remedy in _candidates(result, misfit))
+    paths = (remedy for misfit in fit.held_regions[:4] for remedy in _candidates(result, misfit))
     while len(found) < (_MOST_TRIALS if trial else _KEPT) and (remedy := next(paths, None)) is not None:
         known = any(np.array_equal(remedy.path, other.path) for other in found)
         if not known and remedy.length >= _LEAST_CUT:

@@ -34,6 +34,8 @@ class Place:
         area: flat area [m2].
         words: a sentence.
         vertex: the worst one, of the sewn mesh.
+        gapes: whether cloth stands off at an edge of the garment.
+        fails: whether the garment does not fit because of it; other places are told.
     """
 
     kind: str
@@ -43,12 +45,14 @@ class Place:
     area: float
     words: str
     vertex: int
+    gapes: bool = False
+    fails: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `metrics.json`."""
         return {
             "kind": self.kind, "line": self.line, "worst": self.worst, "gap_m": self.gap, "area_m2": self.area,
-            "words": self.words,
+            "words": self.words, "fails": self.fails,
         }  # fmt: skip
 
 
@@ -91,11 +95,13 @@ def find_places(
                 worst = int(part[values[part].argmax()])
                 line, area, distance = _line_at(cloth, worst), float(areas[part].sum()), float(values[worst])
                 size = f"over {1e4 * area:.0f} cm2"
+                stands_off = lift[worst] > 0.5 * distance
+                gapes = bool(stands_off and kind == "misfit" and edge[part].any())
                 if kind == "bridged":
                     words = f"{_called(line)} bridges a hollow, {1e3 * distance:.1f} mm off, {size}"
-                elif lift[worst] > 0.5 * distance and kind == "misfit" and edge[part].any():
+                elif gapes:
                     words = f"{_called(line)} gapes by {1e3 * gap[worst]:.1f} mm {size}"
-                elif lift[worst] > 0.5 * distance:
+                elif stands_off:
                     words = f"{_called(line)} stands off {1e3 * distance:.1f} mm farther than designed, {size}"
                 elif lift[worst] < -0.5 * distance:
                     words = f"{_called(line)} falls in by {1e3 * distance:.1f} mm {size}"
@@ -110,6 +116,7 @@ def find_places(
                         area=area,
                         words=words,
                         vertex=worst,
+                        gapes=gapes,
                     )
                 )
     # The mean of the faces at each vertex.

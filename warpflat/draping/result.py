@@ -21,6 +21,7 @@ from warpflat.draping.places import Place, find_places
 from warpflat.draping.relax_drape import DrapedCloth
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.fabric.limits import Demand
+from warpflat.model.fit import TOUCHING
 from warpflat.model.strain import shear_angles
 from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
@@ -29,10 +30,10 @@ __all__ = ["HOLLOW_REACH", "Drape", "hollow_depths"]
 
 # Distances up to this are not looked into [m].
 _NEGLIGIBLE = 1e-3
-# Cloth that is designed within this distance of the body is meant to touch it [m]: 6 cm of ease around a trunk.
-_TOUCHING = 0.010
-# A smaller place that stands off, or is pressed together in a fold, is told, and does not spoil the fit [m2].
+# A smaller place that stands off or is sheared is told, and does not spoil the fit [m2].
 _MISFIT_AREA = 1e-3
+# Edges that lie on the body whatever the garment.
+_JUDGED_EDGES = ("neck", "armhole", "waist")
 # Ease has moved where cloth within this distance stands off by no more than so much in the mean [m].
 _BESIDE, _MOVED = 0.08, 3e-3
 # Cloth hangs from what is above it within 60 degrees of the plumb line.
@@ -130,7 +131,7 @@ class Drape:
 
         Cloth that was designed to leave the body hangs from there on. Ease that has moved stands off here, and lies closer beside.
         """
-        free, designed = self.designed_gap > _TOUCHING, self.cloth.designed
+        free, designed = self.designed_gap > TOUCHING, self.cloth.designed
         triangles, _ = triangulate(self.cloth.faces)
         below, above = triangles[:, [[0, 1], [1, 2], [2, 0], [1, 0], [2, 1], [0, 2]]].reshape(-1, 2).T
         rise = designed[above] - designed[below]
@@ -204,22 +205,27 @@ class Drape:
             # A hollow that is bridged asks for no cut, nor does cloth that hangs.
             if place.kind not in ("bridged", "hang") and distance <= _NEAR_CUT:
                 place = replace(place, words=f"{place.words}; {words} may take it up")
-            places.append(place)
+            places.append(replace(place, fails=self._fails(place)))
         return tuple(places)
 
     @property
     def fits(self) -> bool:
-        """True if the cloth is at rest and no place is beyond its limits, or misfits where it is meant to touch the body.
+        """True if the cloth is at rest and no place fails."""
+        return self.converged and not any(place.fails for place in self.places)
 
-        Places of less than 10 cm2 that stand off, fold or are sheared are told. How it hangs elsewhere is told, too, and is no misfit.
-        Against a body alone, ease is no misfit.
+    def _fails(self, place: Place) -> bool:
+        """Return whether a garment does not fit because of a place: it is held beyond a limit, or gapes at the neck or an armhole.
+
+        Cloth of less than 10 cm2 that gapes or is sheared is told, as are folds, and how it hangs elsewhere. Against a body alone, ease is
+        no misfit.
         """
-        misfits = {"strain", "shear"} if self.designed is self.body else {"strain", "shear", "misfit"}
-        # A misfit or a fold of a few square centimetres is told, cloth stretched beyond its limit counts.
-        return self.converged and not any(
-            place.kind in misfits and (place.area >= _MISFIT_AREA or (place.kind == "strain" and place.worst > 0.0))
-            for place in self.places
-        )
+        if place.kind == "strain":
+            return place.worst > 0.0
+        if place.kind == "misfit" and (self.designed is self.body or not place.gapes):
+            return False
+        edge = place.line.rpartition(".")[2].partition(" ")[0]
+        judged = place.kind == "shear" or (place.kind == "misfit" and edge in _JUDGED_EDGES)
+        return judged and place.area >= _MISFIT_AREA
 
     def measures(self) -> dict[str, Any]:
         """Return the entry `drape` of `metrics.json`."""

@@ -150,8 +150,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
         bar.set_label(unit, fontsize=9)
         bar.ax.tick_params(labelsize=8)
         _mark_limit(bar, factor * _limit(fit, name), scales[name])
-    beyond = f"does not fit: {100 * fit.outside:.1f} % of the cloth beyond the limit (outlined)"
-    verdict = "fits" if fit.fits else beyond
+    verdict = f"{100 * fit.held:.1f} % held beyond its limit, {100 * fit.slack:.1f} % in folds (outlined)"
     figure.suptitle(
         f"{result.surface.name} in {result.fabric.name}, as worn: {verdict}; limit {limit_words(fit.as_dict())}",
         fontsize=12,
@@ -184,7 +183,6 @@ def write_wear_sheet(
     scales = _scales(fits, [*([name] for name in maps if name in _BODY_MAPS), *_ALIKE], bodies)
     limits = "; ".join(dict.fromkeys(limit_words(fit.as_dict()) for fit in fits))
     top = _TOP
-    word = "lies on the form" if on_body else "fits"
     # One axis over the page, in inches: an axis for each map takes longer than all that is drawn in it.
     page = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, sheet.size[0]), ylim=(0.0, sheet.size[1]))
     page.set_axis_off()
@@ -193,7 +191,7 @@ def write_wear_sheet(
     for result, body, height in zip(results, bodies, sheet.rows, strict=True):
         # Label the row.
         fit = result.fit
-        lines = [f"{word}: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
+        lines = [f"{100 * fit.held:.1f} % held beyond its limit, {100 * fit.slack:.1f} % in folds"]
         measures = fit.as_dict()
         lines += [f"{RANGES}:", *strain_words(measures)]
         if pressure := pressure_words(measures):
@@ -235,14 +233,8 @@ def write_wear_sheet(
             above = bar.ax.secondary_xaxis("top", functions=in_mmhg)
             above.tick_params(labelsize=7)
             above.set_xlabel("mmHg", fontsize=8)
-    unfit = [result.surface.name for result in results if not result.fit.fits]
-    verdict = (
-        word
-        if not unfit
-        else f"{word.replace('lies', 'does not lie').replace('fits', 'does not fit')}: {', '.join(unfit)}"
-    )
     fabrics = ", ".join(dict.fromkeys(result.fabric.name for result in results))
-    figure.text(*sheet.point(0.15, 0.32), f"{title} in {fabrics}, as worn: {verdict}", fontsize=13)
+    figure.text(*sheet.point(0.15, 0.32), f"{title} in {fabrics}, as worn", fontsize=13)
     figure.text(
         *sheet.point(0.15, 0.52),
         f"outlined in green: beyond the cloth's limit of {limits}; red is stretched, blue is slack"

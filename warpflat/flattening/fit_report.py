@@ -97,9 +97,13 @@ def garment_wear(pieces: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     worn = {name: piece["wear"] for name, piece in pieces.items()}
     area = {name: float(piece["area_m2"]) for name, piece in pieces.items()}
     unfit = {name: wear for name, wear in worn.items() if not wear["fits"]}
+    shares = {
+        key: sum(wear[key] * area[name] for name, wear in worn.items()) / sum(area.values())
+        for key in ("outside", "held", "slack")
+    }
     return {
-        "fits": not unfit,
-        "outside": sum(wear["outside"] * area[name] for name, wear in worn.items()) / sum(area.values()),
+        "fits": shares["held"] <= TOLERATED,
+        **shares,
         "where_not": [f"{name}: {words}" for name, wear in unfit.items() for words in wear["where_not"]],
         "would_help": [{"piece": name, **remedy} for name, wear in unfit.items() for remedy in wear["would_help"]],
     }
@@ -129,7 +133,7 @@ def no_cut_words(outside: float, *, sewn: bool) -> str:
         sewn: whether the piece is sewn; the share is that of the unsewn piece.
     """
     if sewn and outside <= TOLERATED:
-        return "unsewn it fits: its seams, folds and constraints strain it; ask less of them, or take another fabric"
+        return "without its seams the piece fits; relax its seams, folds or constraints, or choose a stretchier fabric"
     return "would help: another fabric, or another stretch; no single dart does"
 
 
@@ -157,23 +161,22 @@ def pressure_words(wear: Mapping[str, Any]) -> str:
 
 
 def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
-    """Return the console's lines on the fit: one per piece, and one for each place and remedy where a piece does not fit."""
+    """Return what `-v` tells of the fit: a line per piece, one for each place and remedy where a piece is held beyond its limits."""
     lines = []
-    against = metrics.get("wear", {}).get("against")
-    # Of a draped garment its drape says whether it fits.
-    word = f"lies on the {against or 'surface'}" if against or "drape" in metrics else "fits"
+    against = metrics.get("wear", {}).get("against", "surface")
     for name, piece in metrics["pieces"].items():
         wear = piece.get("wear")
         if wear is None:
             continue
-        verdict = f"{name}: {word}: {'yes' if wear['fits'] else 'no'}"
+        shares = f"{100 * wear['held']:.1f} % held beyond its limit, {100 * wear['slack']:.1f} % in folds"
         ranges = f"{', '.join(strain_words(wear))}, limit {limit_words(wear)}"
         if pressure := pressure_words(wear):
             ranges += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
-        lines.append(f"{verdict} ({ranges})")
+        lines.append(f"{name}: {shares} ({ranges})")
+        lines += [f"  folds: {words}" for words in wear["where_slack"]]
         if wear["fits"]:
             continue
-        lines += [f"  where not: {words}" for words in wear["where_not"]]
+        lines += [f"  held: {words}" for words in wear["where_not"]]
         sewn = "outside_unsewn" in wear
         before = wear["outside_unsewn"] if sewn else wear["outside"]
         lines += [f"  {remedy_words(remedy, before, sewn=sewn)}" for remedy in wear["would_help"]]
@@ -183,25 +186,19 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         if not wear["would_help"]:
             lines.append(f"  {no_cut_words(before, sewn=sewn)}")
     if lines:
-        lines.append(
-            f"ranges: {RANGES}" + ("" if against is None else f"; strain and pressure are against the {against}")
-        )
-    if "wear" in metrics:
-        unfit = [name for name, piece in metrics["pieces"].items() if not piece["wear"]["fits"]]
-        verdict = f"no: {', '.join(unfit)}" if unfit else "yes"
-        lines.append(
-            f"garment: {word}: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
-        )
-        if wearer := metrics["wear"].get("wearer"):
-            lines += [wearer_words(wearer, draped="drape" in metrics), *filter(None, [wearer_places(wearer)])]
+        lines.append(f"ranges: {RANGES}, against the {against}")
+    if wearer := metrics.get("wear", {}).get("wearer"):
+        lines += [wearer_words(wearer), *filter(None, [wearer_places(wearer)])]
+    if verdict := metrics.get("verdict"):
+        lines.append(verdict["words"])
+        lines += [
+            "; ".join(filter(None, [f"  {finding['words']}", finding["remedy"]])) for finding in verdict["findings"]
+        ]
     return lines
 
 
-def wearer_words(wearer: Mapping[str, Any], *, draped: bool = False) -> str:
-    """Return how a garment fits the body: strain and pressure where the cloth is smaller, and the ease where it is larger.
-
-    Whether a garment fits that was draped is said by its drape.
-    """
+def wearer_words(wearer: Mapping[str, Any]) -> str:
+    """Return how a garment lies on the body: strain and pressure where the cloth is smaller, and the ease where it is larger."""
     # Levels of a left and a right limb are one where they are equal within 0.5 mm and 0.05 %.
     levels, found = wearer["levels"], dict[str, Mapping[str, Any]]()
     for name, level in levels.items():
@@ -218,7 +215,7 @@ def wearer_words(wearer: Mapping[str, Any], *, draped: bool = False) -> str:
         pressure = max(side["pressure_pa"] for side in level["sides"].values())
         tight.append(f"{ease} ({100 * level['strain']:.1f} %, {pressure:,.0f} Pa)")
     words = "; ".join(f"{word} at {', '.join(row)}" for word, row in (("stretched", tight), ("ease", loose)) if row)
-    return f"wearer: {words}" if draped else f"wearer: fits: {'yes' if wearer['fits'] else 'no'} ({words})"
+    return f"wearer: {words}"
 
 
 def wearer_places(wearer: Mapping[str, Any]) -> str:

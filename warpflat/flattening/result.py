@@ -21,6 +21,7 @@ from warpflat.flattening.develop import Development
 from warpflat.flattening.fit_report import Remedy, wear_measures
 from warpflat.flattening.progress import CONTACT, Stage
 from warpflat.flattening.stretched_faces import StretchedFaces, find_stretched_faces
+from warpflat.flattening.verdict import judge
 from warpflat.model.fit import WornFit, assess_fit
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import LayoutErrors, WornStrain, layout_errors, worn_strain
@@ -59,6 +60,8 @@ class Flattening:
         options: options of the last relaxation.
         unsewn: the piece as it lay before it was sewn or given fullness; None if it was not.
         remedies: cuts that may help where the piece does not fit, found by `warpflat.advise`.
+        close: #F, true where the surface lies close to the wearer's body; None where it is the body, or nothing is known of one. Elsewhere
+            the cloth hangs, and what would hold it against the surface is no strain of the worn garment.
     """
 
     surface: Surface
@@ -77,6 +80,7 @@ class Flattening:
     options: RelaxOptions = field(default_factory=RelaxOptions)
     unsewn: Flattening | None = None
     remedies: tuple[Remedy, ...] = ()
+    close: BoolArray | None = None
 
     def __post_init__(self) -> None:
         """Make the layout read-only for whoever holds the result."""
@@ -157,7 +161,7 @@ class Flattening:
     @cached_property
     def fit(self) -> WornFit:
         """The fit when worn: strain, tension and pressure, and what lies beyond the fabric's limit."""
-        return assess_fit(self.network, self.positions)
+        return replace(assess_fit(self.network, self.positions), close=self.close)
 
     @property
     def face_energy_density(self) -> FloatArray:
@@ -329,7 +333,7 @@ def run_metrics(
         device: on which they were relaxed.
         more: entries besides the pieces.
     """
-    return {
+    metrics = {
         "schema": 1,
         "warpflat": __version__,
         "warp": wp.config.version,
@@ -337,6 +341,8 @@ def run_metrics(
         "pieces": dict(pieces),
         **(more or {}),
     }
+    verdict = judge(metrics)
+    return metrics if verdict is None else {**metrics, "verdict": verdict.as_dict()}
 
 
 def write_files(

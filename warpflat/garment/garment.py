@@ -35,6 +35,7 @@ from warpflat.garment.sewn import MeasuredSeam, Sewn, Stitching
 from warpflat.garment.wearer import WearerFit, assess_wearer
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.model.fit import TOUCHING
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import BorderSeam
 from warpflat.surface.mirror import mirror_images
@@ -363,6 +364,11 @@ def flatten_form(
         for number, seam in enumerate(form.seams)
         for i, run in enumerate(seam.runs)
     ]  # fmt: skip
+    near = np.linalg.norm(form.vertices - mannequin.vertices, axis=1) <= TOUCHING
+    for name, piece in form.pieces.items():
+        faces = piece.surface.faces
+        close = np.where(faces >= 0, near[piece.grid_vertices[faces]], True).all(axis=1)
+        pieces[name] = replace(pieces[name], close=close)
     garment = Garment(
         name=form.name,
         mannequin=mannequin,

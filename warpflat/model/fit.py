@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.short_repr import short_repr
 from warpflat.core.sorting import counting_sort
@@ -28,7 +28,7 @@ from warpflat.surface.curvature import curvature_tensors
 from warpflat.surface.energy_map import place_in_words, smooth_to_vertices
 from warpflat.surface.mesh import Surface
 
-__all__ = ["MAPS", "Misfit", "WornFit", "assess_fit", "assess_pattern"]
+__all__ = ["MAPS", "TOUCHING", "Misfit", "WornFit", "assess_fit", "assess_pattern"]
 
 
 # A pattern fits if less than this share of its cloth is strained or sheared beyond a limit: a corner's last face may be.
@@ -36,6 +36,9 @@ TOLERATED = 0.01
 
 # Curvature that shears cloth is gathered over so far [m].
 _CURVED_OVER = 0.03
+
+# A surface within this distance of the body is meant to touch it [m]: 6 cm of ease around a trunk. Farther off cloth hangs.
+TOUCHING = 0.010
 
 MAPS: dict[str, tuple[str, float, str]] = {
     "strain_warp": ("worn strain along warp", 100.0, "%"),
@@ -108,6 +111,8 @@ class WornFit:
         demand: what is asked of each face, as shares of the fabric's limits.
         misfits: regions beyond a limit, largest first.
         hollow: share of the flat area where the tension would lift the cloth off.
+        close: #F, true where the surface lies close to the wearer's body; None if it does everywhere. Elsewhere the cloth hangs, and is not
+            held.
     """
 
     __repr__ = short_repr
@@ -122,6 +127,7 @@ class WornFit:
     demand: Demand
     misfits: tuple[Misfit, ...] = field(default=())
     hollow: float = 0.0
+    close: BoolArray | None = None
 
     @property
     def limit(self) -> float:
@@ -135,13 +141,32 @@ class WornFit:
 
     @cached_property
     def outside(self) -> float:
-        """The share of the flat area that is beyond a limit; a place counts once, whichever limit it is."""
+        """The share of the flat area that is beyond a limit, slack cloth included; a place counts once, whichever limit it is."""
         return self.demand.outside(self.area)
+
+    @cached_property
+    def held(self) -> float:
+        """The share of the flat area that is stretched or sheared beyond a limit where it lies close to the body."""
+        return self._share(self.demand.held if self.close is None else self.demand.held & self.close)
+
+    @cached_property
+    def slack(self) -> float:
+        """The share of the flat area that is longer than the surface by more than the limit: it lies in folds."""
+        return self._share(self.demand.slack)
+
+    @cached_property
+    def held_regions(self) -> tuple[Misfit, ...]:
+        """The regions that are held beyond a limit where they lie close to the body, largest first."""
+        held = [misfit for misfit in self.misfits if misfit.worst.state != "slack"]
+        return tuple(misfit for misfit in held if self.close is None or self.close[misfit.faces].any())
+
+    def _share(self, chosen: BoolArray) -> float:
+        return float(self.area[chosen].sum() / max(float(self.area.sum()), 1e-300))
 
     @property
     def fits(self) -> bool:
-        """True if at most 1 % of the cloth is beyond the fabric's limits: stretched, slack or sheared."""
-        return self.outside <= TOLERATED
+        """True if at most 1 % of the cloth is stretched or sheared beyond the fabric's limits."""
+        return self.held <= TOLERATED
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entries for `metrics.json`: fractions, degrees, N/m and Pa, with percentiles by area, extremes and mean."""
@@ -157,8 +182,11 @@ class WornFit:
             "strain_limit": self.limit,
             "shear_limit": self.shear_limit,
             "outside": self.outside,
+            "held": self.held,
+            "slack": self.slack,
             "hollow": self.hollow,
-            "where_not": [misfit.words for misfit in self.misfits[:3]],
+            "where_not": [misfit.words for misfit in self.held_regions[:3]],
+            "where_slack": [misfit.words for misfit in self.misfits if misfit.worst.state == "slack"][:3],
             **distributions,
         }
 
@@ -215,9 +243,11 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     pressure = smooth_face_values(surface, loaded, smoothing_length)
     demand = Demand.of(fabric, strain_warp, strain_weft, shear)
     total_area = max(float(weight.sum()), 1e-300)
-    # Regions that are held beyond a limit, the largest first.
-    outside, misfits = np.flatnonzero(demand.beyond), list[Misfit]()
-    if len(outside):
+    misfits = list[Misfit]()
+    # Held cloth and slack cloth are regions of their own: a dart helps the one, folds are the other.
+    for outside in map(np.flatnonzero, (demand.held, demand.slack)):
+        if not len(outside):
+            continue
         part = components(surface.faces[outside])
         count = int(part.max()) + 1
         order, begin = counting_sort(part.astype(np.int32), count)
@@ -225,16 +255,16 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         regions = np.bincount(part, weight[outside], minlength=count)
         # Of each region the face of which most is asked, and of several the first.
         worst = outside[np.lexsort((-demand.most[outside], part))[begin[:-1]]]
-        for k in np.argsort(-regions, kind="stable").tolist():
-            misfits.append(
-                Misfit(
-                    surface=surface,
-                    faces=members[begin[k] : begin[k + 1]],
-                    area=float(regions[k]),
-                    worst=demand.amount(int(worst[k])),
-                    vertex=int(surface.faces[worst[k], 0]),
-                )
+        misfits += [
+            Misfit(
+                surface=surface,
+                faces=members[begin[k] : begin[k + 1]],
+                area=float(regions[k]),
+                worst=demand.amount(int(worst[k])),
+                vertex=int(surface.faces[worst[k], 0]),
             )
+            for k in range(count)
+        ]
     return WornFit(
         strain_warp=strain_warp,
         strain_weft=strain_weft,
@@ -244,6 +274,6 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         pressure=np.maximum(pressure, 0.0),
         area=weight,
         demand=demand,
-        misfits=tuple(misfits),
+        misfits=tuple(sorted(misfits, key=lambda misfit: -misfit.area)),
         hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
     )

@@ -291,10 +291,7 @@ def _page(
 
 
 def verdict_words(metrics: Mapping[str, Any]) -> str:
-    """Return the verdict as HTML: at rest or not, whether it fits and where not, and which openings are needed.
-
-    Where a garment was draped, the drape says whether it fits.
-    """
+    """Return the verdict as HTML: at rest or not, whether it fits and why not, and what a maker should know."""
     pieces = metrics["pieces"]
     flips = sum(piece["flipped_faces"] for piece in pieces.values())
     unfinished = [name for name, piece in pieces.items() if not piece["converged"]]
@@ -304,40 +301,24 @@ def verdict_words(metrics: Mapping[str, Any]) -> str:
         *([format_count(flips, "flipped face")] if flips else []),
         *([f"{1e6 * overlap:.3g} mm² lie over each other"] if overlap else []),
     ]
-    drape, wear = metrics.get("drape"), metrics.get("wear") or {}
-    judged = [piece["wear"] for piece in pieces.values() if piece.get("wear")]
-    places = [*(drape or {}).get("places", ())]
-    worst = [place["words"] for place in places] if drape else [*(wear.get("where_not") or ())]
-    if not worst and not drape:
-        named = {name: piece["wear"]["where_not"] for name, piece in pieces.items() if piece.get("wear")}
-        worst = [f"{name}: {words}" if len(named) > 1 else words for name, each in named.items() for words in each]
-    fits = None
-    if drape:
-        fits = bool(drape["fits"])
-    elif judged:
-        fits = all(each["fits"] for each in judged) and (wear.get("wearer") or {}).get("fits", True)
     lines = [("bad", f"Not done: {'; '.join(wrong)}.")] if wrong else []
-    if fits is not None:
-        how = "as it was draped on the body" if drape else "by its strain, not draped"
-        lines.append(("good", f"It fits, {how}.") if fits else ("bad", f"It does not fit, {how}."))
+    verdict = metrics.get("verdict")
+    findings = verdict["findings"] if verdict else []
+    if verdict:
+        words = verdict["words"]
+        lines.append(("good" if verdict["fits"] else "bad", f"{words[0].upper()}{words[1:]}."))
     if not wrong:
         lines.append(("good", "At rest, no flipped faces, no overlap."))
-    shut = [ring for ring in metrics.get("rings") or () if ring["passes"] is False]
-    for ring in shut:
-        lines.append(
-            (
-                "bad",
-                f"Needs an opening at the {ring['name']}, {ring['opening_needed_mm'] / 10:g} cm deep: "
-                f"{ring['length_mm'] / 10:.1f} cm around, and {ring['girth_mm'] / 10:.1f} cm must pass ({ring['over']}).",
-            )
-        )
-    if metrics.get("rings") and not shut:
+    if metrics.get("rings") and not any(finding["kind"] == "opening" for finding in findings):
         lines.append(("good", "It can be put on: every edge and level passes what of the body goes through it."))
-    html = "".join(f'<p class="verdict {kind}">{_typeset(words)}</p>' for kind, words in lines)
-    if worst:
-        title = "Worst places" if fits is False else "Places to look at"
-        items = "".join(f"<li>{_typeset(words)}</li>" for words in list(dict.fromkeys(worst))[:5])
-        html += f"<p><b>{title}</b></p><ul>{items}</ul>"
+    html = "".join(f'<p class="verdict {kind}">{words}</p>' for kind, words in lines)
+    for title, fails in (("Why it does not fit", True), ("To know", False)):
+        items = [
+            f"<li>{_typeset(finding['words'])}{_typeset('; ' + finding['remedy']) if finding['remedy'] else ''}</li>"
+            for finding in findings
+            if finding["fails"] is fails
+        ]
+        html += f"<p><b>{title}</b></p><ul>{''.join(items)}</ul>" if items else ""
     return html
 
 

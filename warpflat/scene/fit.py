@@ -443,13 +443,13 @@ class Fitted:
 
     @property
     def fits(self) -> bool | None:
-        """Whether the cloth is held within its limits everywhere; None where no cloth is judged."""
-        judged = [piece["wear"]["fits"] for piece in self.metrics["pieces"].values() if piece.get("wear")]
-        return all(judged) if judged else None
+        """Whether it fits, by the verdict of its run; None where no cloth is judged."""
+        verdict = self.metrics.get("verdict")
+        return None if verdict is None else bool(verdict["fits"])
 
     def verdict(self) -> str:
         """Return in one line how the garment fits the body, its cloth too."""
-        return self.carried.verdict() + ("; it does not fit by its strain" if self.fits is False else "")
+        return self.carried.verdict() + ("" if self.fits is not False else f"; it {self.metrics['verdict']['words']}")
 
     def row(self) -> dict[str, Any]:
         """Return the row of a study's table."""

@@ -62,7 +62,7 @@ def _measures(garment: Garment) -> dict[str, Any]:
         "strain_energy_j": sum(piece["strain_energy_j"] for piece in pieces.values()),
         "model_energy_j": sum(piece["model_energy_j"] for piece in pieces.values()),
         "outside": metrics["wear"]["outside"],
-        "fits": metrics["wear"]["fits"],
+        "fits": metrics["verdict"]["fits"],
         "converged": garment.sewn is None or garment.sewn.converged,
         "mouths_m": {
             f"{name}.{dart['name']}": dart["intake_m"]

@@ -27,6 +27,7 @@ from warpflat.core.output import (
 from warpflat.export.letters import note_on_names
 from warpflat.flattening.fit_report import Remedy
 from warpflat.flattening.progress import Progress
+from warpflat.flattening.verdict import judge
 from warpflat.garment.garment import Garment
 from warpflat.garment.pattern_files import WrittenPattern, garment_files, pattern_names
 from warpflat.garment.sew_pieces import unsewn_notes
@@ -202,6 +203,8 @@ def _run(
         files += written.files
         measured |= {"sizes": {size: each.summary() for size, each in graded.items()}} if graded else {}
         measured |= {**draped, **written.metrics}
+        if (verdict := judge(measured)) is not None:
+            measured["verdict"] = verdict.as_dict()
         if settings.mannequin is not None:
             table = settings.mannequin.model_dump(exclude_defaults=True)
             measured["mannequin"] = {**measured["mannequin"], "table": table}

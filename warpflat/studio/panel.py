@@ -261,13 +261,13 @@ def _head(session: Session) -> str:
 
 
 def _fit_words(solution: Solution) -> str:
-    """Return whether the cloth fits by its strain, and where not; nothing while that is not known."""
-    fits = {name: piece.fit for name, piece in solution.pieces.items()}
-    area = {name: float(fit.area.sum()) for name, fit in fits.items()}
-    outside = sum(fit.outside * area[name] for name, fit in fits.items()) / max(sum(area.values()), 1e-12)
-    unfit = [name for name, fit in fits.items() if not fit.fits]
-    verdict = f"<b style='color:#b00020'>no</b>: {escape(', '.join(unfit))}" if unfit else "<b>yes</b>"
-    return f"fits by its strain: {verdict}; {100.0 * outside:.1f} % of the cloth beyond its limit"
+    """Return the verdict on the solution; nothing while that is not known."""
+    verdict = solution.verdict
+    if verdict is None:
+        return ""
+    failing = [finding.words for finding in verdict.findings if finding.fails]
+    colour = "" if verdict.fits else " style='color:#b00020'"
+    return ": ".join([f"<b{colour}>{escape(verdict.words)}</b>", *map(escape, failing[:1])])
 
 
 def _links(saved: Saved) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.applied_cut import measure_cut
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
+from warpflat.flattening.verdict import Verdict, judge
 from warpflat.garment.darts import measure_darts
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.mannequin import Mannequin
@@ -58,6 +59,13 @@ class Solution:
     def strain_energy(self) -> float:
         """The strain energy of all pieces [J]."""
         return sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
+
+    @cached_property
+    def verdict(self) -> Verdict | None:
+        """Whether it fits, and why not; None where no cloth is judged."""
+        if self.garment is not None:
+            return judge(self.garment.metrics())
+        return judge({"pieces": {name: piece.measures for name, piece in self.pieces.items()}})
 
     @property
     def at_rest(self) -> bool:
