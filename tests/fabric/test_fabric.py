@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -137,7 +138,9 @@ def test_a_limit_of_shear_that_nobody_gave_is_an_estimate_by_kind(tmp_path: Path
 def test_names_and_aliases_are_found_as_people_type_them():
     assert find_fabric("Power Net").name == "power-net"
     assert find_fabric("WOOL_plain").name == "wool-plain"
-    assert find_fabric("jersey").name == "interlock"
+    jersey, interlock = find_fabric("Jersey"), find_fabric("interlock")
+    assert (jersey.name, jersey.aliases) == ("jersey", ("interlock", "t-shirt"))
+    assert replace(jersey, name=interlock.name, aliases=interlock.aliases) == interlock
     with pytest.raises(InputError, match=r"^unknown fabric 'demin': did you mean 'denim'\? valid: cotton, denim"):
         find_fabric("demin")
 

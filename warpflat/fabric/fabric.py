@@ -249,13 +249,17 @@ class Fabric:
 def fabric_called(name: str, library: Mapping[str, Fabric]) -> Fabric:
     """Return a library's fabric of that name or alias; case, spaces and underscores do not matter.
 
+    Who asks by an alias gets the fabric under that name, so that files and messages call it as the user does.
+
     Raises:
         InputError: there is none; names the nearest.
     """
     wanted = _plain(name)
     for fabric in library.values():
-        if wanted in (_plain(fabric.name), *map(_plain, fabric.aliases)):
-            return fabric
+        known = (fabric.name, *fabric.aliases)
+        for called in known:
+            if wanted == _plain(called):
+                return replace(fabric, name=called, aliases=tuple(other for other in known if other != called))
     names = [*library, *(alias for fabric in library.values() for alias in fabric.aliases)]
     raise InputError(f"unknown fabric {name!r}: {nearest(wanted, names)}")
 
