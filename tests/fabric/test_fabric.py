@@ -123,6 +123,13 @@ def test_a_limit_of_shear_that_nobody_gave_is_an_estimate_by_kind(tmp_path: Path
     of_base = load_library([write(tmp_path, file)])
     assert of_base["a"].shear_limit == cloth(strain_limit=0.25).shear_limit
     assert of_base["b"].shear_limit == find_fabric("denim").shear_limit
+    allowed = find_fabric("woven").allowing(8.0)
+    assert (allowed.shear_limit, allowed.provenance["shear_limit"].source) == (8.0, "asked for")
+    assert allowed.strain_limit == find_fabric("woven").strain_limit
+    with pytest.raises(
+        InputError, match="says nothing of paper, an isotropic sheet, which has no threads; take a cloth"
+    ):
+        find_fabric("paper").allowing(8.0)
     given = cloth(strain_limit=0.15, shear_limit=9.0)
     assert given.shear_limit == 9.0
     assert "shear_limit" not in given.provenance

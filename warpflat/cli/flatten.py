@@ -240,6 +240,7 @@ def flatten(
         message = (
             message.replace("command line: find_seams.body", "--body")
             .replace("command line: bands", "--bands")
+            .replace("command line: shear_limit", "--shear-limit")
             .replace("--bands_shorter", "--bands-shorter")
         )
         message = re.sub(

@@ -192,10 +192,15 @@ class Fabric:
         """Return the fabric with the limit of shear that its maker allows [degrees]; itself for None.
 
         Raises:
-            InputError: no limit can be that.
+            InputError: no limit can be that, or the fabric is an isotropic sheet.
         """
         if shear_limit is None:
             return self
+        if self.is_isotropic:
+            raise InputError(
+                f"a limit of shear says nothing of {self.name}, an isotropic sheet, which has no threads; take a cloth, such "
+                "as woven, or leave the limit out"
+            )
         asked = Provenance(source="asked for", unit="degrees")
         return replace(self, shear_limit=shear_limit, provenance={**self.provenance, "shear_limit": asked})
 
