@@ -333,17 +333,19 @@ def test_ease_that_has_moved_is_no_misfit(worn: warpflat.Drape, moved: bool):
 
 
 def test_small_folds_are_told_and_overstretched_cloth_counts(worn: warpflat.Drape):
-    def fits(kind: str, worst: float, area: float) -> bool:
-        drape = dataclasses.replace(worn)
-        place = Place(kind=kind, line="front.bust", worst=worst, gap=0.0, area=area, words="", vertex=0)
-        vars(drape)["places"] = (place,)
-        return drape.fits
+    def fits(kind: str, worst: float, area: float, line: str = "front.armhole left", gapes: bool = True) -> bool:
+        place = Place(kind=kind, line=line, worst=worst, gap=0.0, area=area, words="", vertex=0, gapes=gapes)
+        return not worn._fails(place)
 
-    assert fits("strain", -0.3, 8e-4)
-    assert not fits("strain", -0.3, 12e-4)
+    assert fits("strain", -0.3, 1.0)
     assert not fits("strain", 0.3, 8e-4)
+    assert fits("shear", 30.0, 8e-4)
+    assert not fits("shear", 30.0, 12e-4)
     assert fits("misfit", 0.01, 8e-4)
     assert not fits("misfit", 0.01, 12e-4)
+    # Elsewhere, and where it does not gape, it is told.
+    assert fits("misfit", 0.01, 12e-4, line="front.hem")
+    assert fits("misfit", 0.01, 12e-4, gapes=False)
     assert fits("hang", 0.01, 1.0)
 
 

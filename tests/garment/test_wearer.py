@@ -52,7 +52,7 @@ def test_ease_where_the_cloth_is_larger_and_strain_where_it_is_smaller() -> None
     assert fit.pieces["front"].strain[np.isfinite(fit.pieces["front"].strain)].max() > 0.02
     assert not np.isfinite(fit.pieces["front"].strain).all()
     lines = fit_lines({"pieces": {}, "wear": {"fits": True, "outside": 0.0, "against": "form", "wearer": wearer}})
-    assert lines[-2].startswith(f"wearer: fits: yes (stretched at bust {100 * bust['ease_m']:+.1f} cm (")
+    assert lines[-2].startswith(f"wearer: stretched at bust {100 * bust['ease_m']:+.1f} cm (")
     assert "; ease at " in lines[-2]
     assert "biceps -" in lines[-2]
     assert lines[-1].startswith("wearer: touches with ")

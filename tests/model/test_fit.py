@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from warpflat.core.errors import InputError
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.fit_picture import write_wear_sheet
 from warpflat.flattening.fit_report import fit_lines, garment_wear
+from warpflat.flattening.verdict import judge
 from warpflat.model.fit import MAPS, assess_pattern
 from warpflat.model.wear import Wear
 from warpflat.scene.load import load_scene
@@ -173,7 +175,9 @@ def test_an_isotropic_sheet_has_no_threads_and_is_judged_by_its_principal_strain
         fit = assess_pattern(sheared(shear, triangles=False), sheet, SQUARE, grain_angle=turn)
         assert fit.outside == pytest.approx(float(share > 1.0))
         assert fit.shear_limit is None
-    assert fit.misfits[0].words.startswith("slack 5.5 % (limit 5 %), ")
+    assert fit.held == fit.outside
+    # Of a place that is stretched one way and slack the other the stretch is told.
+    assert fit.misfits[0].words.startswith("stretched 5.2 % (limit 5 %), ")
 
 
 @pytest.mark.parametrize(
@@ -234,7 +238,10 @@ def test_a_bodice_that_does_not_fit_says_where_and_which_cut_helps(tmp_path: Pat
     assert best["outside_after"] < 0.7 * wear["outside"]
     assert all(wear[name]["min"] <= wear[name]["p05"] <= wear[name]["p50"] <= wear[name]["max"] for name in MAPS)
     lines = fit_lines(result.metrics)
-    assert lines[0].startswith("front: fits: no (warp ")
+    assert re.match(r"front: \d+\.\d % held beyond its limit, \d\.\d % in folds \(warp ", lines[0])
+    verdict = result.metrics["verdict"]
+    assert (verdict["fits"], verdict["by"]) == (False, "strain")
+    assert verdict["findings"][0]["remedy"].startswith("would help: a ")
     assert any(line.startswith("  would help: a ") for line in lines)
     assert (tmp_path / "out" / "front.wear.png").stat().st_size > 10_000
 
@@ -247,6 +254,8 @@ def worn_entry(outside: float, area: float, cut: str) -> dict[str, object]:
         "wear": {
             "fits": fits,
             "outside": outside,
+            "held": outside,
+            "slack": 0.0,
             "strain_limit": 0.05,
             "shear_limit": 15.0,
             "strain_warp": strain,
@@ -254,6 +263,7 @@ def worn_entry(outside: float, area: float, cut: str) -> dict[str, object]:
             "shear": {"min": -12.0, "p05": -3.0, "p95": 4.0, "max": 9.0},
             "pressure": {"p05": 0.0, "p50": 30.0, "p95": 256.0, "max": 676.0},
             "where_not": [] if fits else ["stretched 8 % along weft"],
+            "where_slack": [],
             "would_help": [] if fits else [{"cut": cut, "length_m": 0.1, "outside_after": 0.02}],
         },
     }
@@ -265,19 +275,29 @@ def test_a_garment_fits_if_all_of_its_pieces_do_and_says_which_do_not():
     assert found == {
         "fits": False,
         "outside": pytest.approx(0.09),
+        "held": pytest.approx(0.09),
+        "slack": 0.0,
         "where_not": ["front: stretched 8 % along weft"],
         "would_help": [
             {"piece": "front", "cut": "a dart from the border", "length_m": 0.1, "outside_after": 0.02},
         ],
     }
-    lines = fit_lines({"pieces": pieces, "wear": found})
+    metrics = {"pieces": pieces, "wear": found}
+    verdict = judge(metrics)
+    assert verdict is not None
+    assert verdict.words == "does not fit by its strain"
+    assert verdict.findings[0].words == "9.0 % of the cloth is held beyond its limit; front: stretched 8 % along weft"
+    lines = fit_lines({**metrics, "verdict": verdict.as_dict()})
     assert lines[0] == (
-        "front: fits: no (warp -1.0 to +8.0 % [-2.0 to +20.3], weft -1.0 to +8.0 % [-2.0 to +20.3], "
+        "front: 12.0 % held beyond its limit, 0.0 % in folds (warp -1.0 to +8.0 % [-2.0 to +20.3], weft -1.0 to +8.0 % [-2.0 to +20.3], "
         "shear -3.0 to +4.0 degrees [-12.0 to +9.0], limit 5 % and 15 degrees; pressure 0 to 256 Pa [up to 676], median 30)"
     )
-    assert lines[-2] == "ranges: 5 to 95 % of the cloth [all of it]"
+    assert lines[-3] == "ranges: 5 to 95 % of the cloth [all of it], against the surface"
     assert "  would help: a dart from the border: 12.0 % -> 2.0 % beyond the limit" in lines
-    assert lines[-1] == "garment: fits: no: front (9.0 % of its cloth beyond the limit)"
+    assert lines[-2] == "does not fit by its strain"
+    assert lines[-1].startswith(
+        "  9.0 % of the cloth is held beyond its limit; front: stretched 8 % along weft; would help: "
+    )
     assert garment_wear({"back": pieces["back"]})["fits"] is True  # type: ignore[dict-item]
 
 
@@ -310,8 +330,10 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     for first, second in zip(maps[: len(MAPS)], maps[len(MAPS) :], strict=True):
         assert first.mappable.get_clim() == second.mappable.get_clim()
     told = " ".join(text.get_text() for text in figure.texts)
-    assert "does not fit: cylinder" in told
-    assert "fits: yes, 0.0 % beyond the limit" in told
+    told = " ".join(told.split())
+    assert "0.0 % held beyond its limit, 0.0 % in folds" in told
+    slack = 100 * results[1].fit.slack
+    assert slack > 50.0 or results[1].fit.held > 0.5
     # The most is told as well: a twentieth of the cloth lies beyond the upper end of the range.
     most = [result.measures["wear"] for result in results]
     assert "5 to 95 % of the cloth [all of it]" in told

@@ -16,6 +16,7 @@ import pytest
 from PIL import Image
 
 from warpflat.cli.main import main
+from warpflat.flattening.verdict import judge
 from warpflat.review.film import open_film
 from warpflat.review.page import verdict_words
 from warpflat.scene.load import make_scene
@@ -191,8 +192,11 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
 
 def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error() -> None:
     strain = {"p95": 0.10}
-    fit = {"fits": True, "strain_limit": 0.15, "where_not": [], "strain_warp": {"p95": 0.01}, "strain_weft": strain}
-    piece = {"flipped_faces": 0, "converged": True, "wear": fit}
+    fit = {
+        "fits": True, "held": 0.0, "slack": 0.0, "outside": 0.0, "strain_limit": 0.15, "where_not": [], "where_slack": [],
+        "would_help": [], "strain_warp": {"p95": 0.01}, "strain_weft": strain,
+    }  # fmt: skip
+    piece = {"flipped_faces": 0, "converged": True, "area_m2": 0.5, "wear": fit}
     ring = {
         "name": "neck",
         "passes": False,
@@ -201,22 +205,33 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
         "girth_mm": 569,
         "over": "head",
     }
-    words = verdict_words({"pieces": {"front": piece}, "rings": [ring]})
+
+    def told(metrics: dict[str, object]) -> str:
+        verdict = judge(metrics)
+        assert verdict is not None
+        return verdict_words({**metrics, "verdict": verdict.as_dict()})
+
+    words = told({"pieces": {"front": piece}, "rings": [ring]})
     # No number is parted from its unit.
-    assert "10&nbsp;cm deep" in words
+    assert "10&nbsp;cm at the neck" in words
     words = words.replace("&nbsp;", " ")
-    assert "It fits, by its strain" in words
-    assert "Needs an opening at the neck, 10 cm deep: 37.0 cm around, and 56.9 cm must pass (head)." in words
+    assert "Fits by its strain" in words
+    assert "needs an opening of 10 cm at the neck to be put on: 37.0 cm around, and 56.9 cm must pass (head)" in words
+    assert "It can be put on" not in words
     # Where it was draped, the drape alone says whether it fits.
-    drape = {"fits": False, "places": [{"words": "the front stands off by 20 mm"}]}
-    words = verdict_words({"pieces": {"front": piece}, "drape": drape})
-    assert "It does not fit, as it was draped" in words
-    assert "It fits" not in words
+    drape = {"converged": True, "places": [{"words": "the front stands off by 20 mm", "kind": "misfit", "fails": True}]}
+    words = told({"pieces": {"front": piece}, "drape": drape})
+    assert "Does not fit as draped" in words
+    assert "Fits by" not in words
     assert "stands off by 20&nbsp;mm" in words
-    unfit = {**piece, "wear": {**fit, "fits": False, "where_not": ["stretched 9 %, 3 cm2"]}, "converged": False}
-    words = verdict_words({"pieces": {"front": unfit, "back": piece}})
+    unfit = {
+        **piece,
+        "wear": {**fit, "fits": False, "held": 0.1, "where_not": ["stretched 9 %, 3 cm2"]},
+        "converged": False,
+    }
+    words = told({"pieces": {"front": unfit, "back": piece}})
     assert (
         words.index("not at rest: front")
-        < words.index("It does not fit, by its strain")
+        < words.index("Does not fit by its strain")
         < words.index("front: stretched 9&nbsp;%, 3&nbsp;cm²")
     )

@@ -112,7 +112,8 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
     assert carried.vertices.shape == job.read.raw.vertices.shape
     # What its cloth cannot bear is told beside an ease that is kept.
     for fits, word in ((True, "yes"), (False, "no")):
-        metrics = {"pieces": {"front": {"area_m2": 0.5, "wear": {"fits": fits}}}}
+        verdict = {"fits": fits, "words": f"{'fits' if fits else 'does not fit'} by its strain"}
+        metrics = {"pieces": {"front": {"area_m2": 0.5}}, "verdict": verdict}
         ended = Fitted(carried=carried, folder=tmp_path, metrics=metrics, converged=True)
         assert ended.verdict().endswith("; it does not fit by its strain") is not fits
         assert study_table([ended, ended])[1].split()[-1] == word

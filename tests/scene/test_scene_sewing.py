@@ -83,19 +83,11 @@ def test_the_console_is_a_line_each_and_none_is_wide(skirt):
     result, _ = skirt
     lines = summary_lines(result.metrics, result.files, "out", width=100)
     heads = [line.split(":")[0] for line in lines if not line.startswith(" ")]
-    assert heads == [
-        "pieces",
-        "relaxed",
-        "girths [cm] (ease)",
-        "wearer",
-        "lies on the form",
-        "seams",
-        "rings",
-        "files",
-        "result",
-    ]
+    assert len(lines) <= 5
+    assert heads[0] == result.metrics["verdict"]["words"]
+    assert "pattern.pdf" in heads[-1] or "pattern.pdf" in lines[-1]
+    assert heads[-1] == "out"
     assert max(map(len, lines)) <= 100
-    assert "side left -0.99 %" in next(line for line in lines if line.startswith("seams"))
     assert "-0.0" not in " ".join(lines)
     guessed = sum("guess" not in note and " cm is " in note for note in result.notes)
     assert guessed > 5

@@ -1,0 +1,84 @@
+"""The verdict on a block as it is, and on controls that no tailor would let go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies import body_of_size
+
+from warpflat.core.toml_file import read_toml
+from warpflat.flattening.verdict import Verdict, judge
+from warpflat.garment.garment import Garment, flatten_form
+from warpflat.scene.load import make_scene
+from warpflat.scene.plan import plan_scene
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+@pytest.fixture(scope="module")
+def block() -> Garment:
+    tables = read_toml(SCENES / "basic_block.toml")
+    tables["mannequin"] = {**tables["mannequin"], "resolution_mm": 20.0}
+    scene = make_scene(tables, name="block", folder=SCENES, where="block")
+    return plan_scene(scene).flatten()
+
+
+def verdict_of(garment: Garment) -> Verdict:
+    found = judge(garment.metrics())
+    assert found is not None
+    return found
+
+
+def scaled(garment: Garment, wide: float, long: float) -> Garment:
+    pieces = {name: replace(piece, positions=piece.positions * [wide, long]) for name, piece in garment.pieces.items()}
+    return replace(garment, pieces=pieces)
+
+
+def test_a_block_fits(block: Garment):
+    found = verdict_of(block)
+    assert found.words == "fits by its strain"
+    assert not any(finding.fails for finding in found.findings)
+
+
+@pytest.mark.parametrize(
+    ("wide", "long", "kind"),
+    [(1.04, 1.0, "too large"), (1.06, 1.06, "too large"), (0.94, 0.94, "held")],
+    ids=["4 % wider", "6 % larger", "6 % smaller"],
+)
+def test_controls_do_not_fit(block: Garment, wide: float, long: float, kind: str):
+    found = verdict_of(scaled(block, wide, long))
+    assert found.words == "does not fit by its strain"
+    first = found.findings[0]
+    assert (first.kind, first.fails) == (kind, True)
+    assert first.remedy
+
+
+def test_a_bodice_without_darts_does_not_fit():
+    body = body_of_size(20.0)
+    found = verdict_of(flatten_form(body, body.form("bodice"), fabric="woven"))
+    assert not found.fits
+    assert found.findings[0].kind == "held"
+
+
+def test_folds_and_missed_ease_are_told(block: Garment):
+    metrics = block.metrics()
+    for piece in metrics["pieces"].values():
+        piece["wear"] = {
+            **piece["wear"],
+            "slack": 0.2,
+            "where_slack": ["slack 9.0 % along weft (limit 5 %), hem; 40 cm2"],
+        }
+    metrics["girths"]["bust"] = {
+        **metrics["girths"]["bust"],
+        "ease_wanted_m": metrics["girths"]["bust"]["ease_m"] - 0.01,
+    }
+    found = judge(metrics)
+    assert found is not None
+    assert found.fits
+    kinds = {finding.kind: finding.words for finding in found.findings}
+    assert kinds["folds"].startswith("20.0 % of the cloth lies in folds; ")
+    assert kinds["ease"].startswith("ease: bust +")
+    assert np.isclose(metrics["girths"]["bust"]["ease_m"], metrics["girths"]["bust"]["ease_wanted_m"] + 0.01)
