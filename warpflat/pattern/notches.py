@@ -164,10 +164,10 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 double = back if seam.double is None else seam.double
                 if place_all(number, 0, at, double, 0.0 if seam.notches is not None else CLEAR):
                     break
-        for side in (0, 1):
-            if lines[number][1 - side].is_marked:
-                for joint in lines[number][side].joints[1:-1]:
-                    place_all(number, 1 - side, opposite_length(seam, lines[number], side, float(joint)), False, CLEAR)
+        for own, other in ((0, 1), (1, 0)):
+            if lines[number][other].is_marked:
+                for joint in lines[number][own].joints[1:-1]:
+                    place_all(number, other, opposite_length(seam, lines[number], own, float(joint)), False, CLEAR)
     return notches
 
 
