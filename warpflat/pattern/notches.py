@@ -155,14 +155,14 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
             fractions = [f for f in evenly if np.abs(joints - f).min() * first.length > CLEAR]
         for fraction in fractions:
             for share in SHARES_FROM_START:
-                at = share * fraction * first.length
+                start = share * fraction * first.length
                 names = [
                     line.piece_name(length).lower()
-                    for line, length in ((first, at), (second, opposite_length(seam, lines[number], 0, at)))
+                    for line, length in ((first, start), (second, opposite_length(seam, lines[number], 0, start)))
                 ]
                 back = any("back" in name for name in names) and not any("front" in name for name in names)
                 double = back if seam.double is None else seam.double
-                if place_all(number, 0, at, double, 0.0 if seam.notches is not None else CLEAR):
+                if place_all(number, 0, start, double, 0.0 if seam.notches is not None else CLEAR):
                     break
         for own, other in ((0, 1), (1, 0)):
             if lines[number][other].is_marked:
