@@ -283,6 +283,7 @@ class MeasureEntry(Entry):
     name: Name
     body: Length
     finished: Length
+    asked: Length | None = None
 
 
 class NeededEntry(Entry):
@@ -302,6 +303,7 @@ class WornEntry(Entry):
     measures: dict[Text, list[MeasureEntry]] = Field(default_factory=dict)
     needed: list[NeededEntry] = Field(default_factory=list)
     knits: list[Text] = Field(default_factory=list)
+    failing: list[Literal["held", "pressing", "too large"]] = Field(default_factory=list)
 
 
 class FoundSeamEntry(Entry):
@@ -585,6 +587,7 @@ def _worn(worn: Worn) -> dict[str, Any]:
         "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},
         "needed": [asdict(each) for each in worn.needed],
         "knits": list(worn.knits),
+        "failing": list(worn.failing),
     }
 
 
@@ -603,6 +606,7 @@ def _read_worn(data: WornEntry) -> Worn:
         measures={size: tuple(Measure(**each.model_dump()) for each in row) for size, row in data.measures.items()},
         needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
         knits=tuple(data.knits),
+        failing=tuple(data.failing),
     )
 
 

@@ -33,8 +33,18 @@ THUMBNAIL, IN_ROW = (0.026, 0.034), 7
 SIZES_IN_ROW = 5
 #: The pictures of a step: their height and width in all [m], and how many there are at most.
 STEP_HEIGHT, STEP_WIDTH, STEP_PIECES = 0.013, 0.048, 4
+#: Why a garment does not fit, by its verdict.
+FAILING = {
+    "held": "This garment does not fit: its cloth is stretched or sheared beyond what it bears.",
+    "pressing": "This garment does not fit: it presses on the body.",
+    "too large": "This garment does not fit: it is larger than it was drafted.",
+}
 #: Sizes of type [pt] and distance of lines [m].
 HEADING, TEXT, LINE = 11.0, 8.0, 0.0046
+
+
+def _signed(length: float, units: str) -> str:
+    return f"{'+' if length >= 0 else '-'}{length_words(abs(length), units)}"
 
 
 class _Page:
@@ -242,6 +252,7 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
     page.y = top + 0.004
     left, page.left, page.width = page.left, page.left + 0.100, page.width - 0.100
     measures = worn.measures.get(size, ())
+    missed = any(measure.misses for measure in measures)
     if measures:
         page.text(page.left, translate("Measures") + (f", {printed_size(size)}" if size else ""), HEADING, bold=True)
         page.y -= 0.003
@@ -250,12 +261,21 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
                 translate_name(measure.name),
                 length_words(measure.body, units),
                 length_words(measure.finished, units),
-                f"{'+' if measure.ease >= 0 else '-'}{length_words(abs(measure.ease), units)}",
+                _signed(measure.ease, units),
+                *(
+                    [_signed(measure.asked, units) if measure.misses and measure.asked is not None else ""]
+                    if missed
+                    else []
+                ),
             ]
             for measure in measures
         ]
-        page.table(["", *(translate(word) for word in ("body", "finished", "ease"))], rows, (0.31, 0.23, 0.23, 0.23))
+        heads = ("body", "finished", "ease", *(["asked for"] if missed else []))
+        widths = (0.28, *(0.72 / len(heads) for _ in heads))
+        page.table(["", *map(translate, heads)], rows, widths)
     page.y -= 0.006
+    for kind in worn.failing:
+        page.paragraph(translate(FAILING[kind]))
     if worn.needed:
         page.paragraph(translate("Too small to put on without an opening:"))
         for need in worn.needed:

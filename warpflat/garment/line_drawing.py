@@ -13,6 +13,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import other_side
+from warpflat.flattening.verdict import judge
 from warpflat.garment.button_stand import button_depths
 from warpflat.garment.drawn_finishing import finishing_views
 from warpflat.garment.girths import pattern_girths
@@ -78,7 +79,7 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         if each.form is not None and each.mannequin is not None:
             girths = pattern_girths(each.mannequin, each.form, each.positions)
             measures[size] = tuple(
-                Measure(name=level, body=girth["body_m"], finished=girth["pattern_m"])
+                Measure(name=level, body=girth["body_m"], finished=girth["pattern_m"], asked=girth.get("ease_wanted_m"))
                 for level, girth in girths.items()
             )
     needed = tuple(
@@ -89,7 +90,9 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
     knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
-    return Worn(views=views, measures=measures, needed=needed, knits=tuple(knits))
+    verdict = judge(garment.metrics()) if garment.form is not None else None
+    failing = dict.fromkeys(finding.kind for finding in verdict.findings if finding.fails) if verdict else {}
+    return Worn(views=views, measures=measures, needed=needed, knits=tuple(knits), failing=tuple(failing))
 
 
 def _with_slanted_hems(garment: Garment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:

@@ -25,16 +25,22 @@ class ViewedPiece:
 
 @dataclass(frozen=True, kw_only=True)
 class Measure:
-    """A girth [m] of the body and of the finished garment."""
+    """A girth [m] of the body and of the finished garment, and the ease that was asked for there; None where none was."""
 
     name: str
     body: float
     finished: float
+    asked: float | None = None
 
     @property
     def ease(self) -> float:
         """What the garment has more than the body [m], to a millimetre."""
         return round(self.finished - self.body, 3)
+
+    @property
+    def misses(self) -> bool:
+        """True if the ease is more than 5 mm off the one that was asked for."""
+        return self.asked is not None and abs(self.finished - self.body - self.asked) > 5e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,9 +71,11 @@ class Worn:
         measures: by size.
         needed: openings that are missing, of the sample size.
         knits: names of its cloths that are knits.
+        failing: why it does not fit, by the verdict of its run: "held", "pressing" or "too large"; nothing where it fits.
     """
 
     views: Mapping[str, tuple[ViewedPiece, ...]] = field(default_factory=dict)
     measures: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
     needed: tuple[NeededOpening, ...] = ()
     knits: tuple[str, ...] = ()
+    failing: tuple[str, ...] = ()
