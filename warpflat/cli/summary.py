@@ -66,7 +66,9 @@ def summary_lines(
     cloth = ", ".join(dict.fromkeys(piece["fabric"] for piece in pieces.values()))
     area = sum(piece["area_m2"] for piece in pieces.values())
     energy = energy_words(sum(piece["strain_energy_j"] for piece in pieces.values()))
-    what = [f"{format_count(len(pieces), 'piece')}, {area:.3g} m2 of {cloth}, strain energy {energy}"] if pieces else []
+    # With what was drafted beside them, such as collars and bands.
+    titles = {each["title"] for part in metrics.get("cloths", ()) for each in part["pieces"]} or pieces
+    what = [f"{format_count(len(titles), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"] if pieces else []
     what += [size] if size else []
     what += openings or (["it goes on without a further opening"] if metrics.get("rings") else [])
     lines.append("; ".join(what))
