@@ -144,7 +144,7 @@ def draw_figure(
     _draw_colour_bar(pen, scale, density, areas, quantity, left=left, top=height)
     top = height - STRIP
     if worn is not None:
-        worn.draw(pen, MARGIN, top, scale)
+        worn.draw(pen, MARGIN, top, scale, without=[each.name.partition(", ")[0] for each in drafted])
     for cell in cells:
         draw_cell(pen, cell, top, scale, page_scale)
     if rows is not None:

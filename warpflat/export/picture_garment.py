@@ -93,8 +93,16 @@ class GarmentViews:
     def _scale_at(self, share: float, room: float) -> float:
         return share * min((room - len(SIDES) * _LEAST_GAP) / self._width, _HEIGHT / self._tallest)
 
-    def draw(self, pen: Pen, left: float, top: float, scale: float) -> None:
-        """Draw the band whose upper left corner is at (`left`, `top`) [in], colours up to `scale` [J/m2]."""
+    def draw(self, pen: Pen, left: float, top: float, scale: float, *, without: Sequence[str] = ()) -> None:
+        """Draw the band whose upper left corner is at (`left`, `top`) [in], colours up to `scale` [J/m2].
+
+        Args:
+            pen, left, top, scale: where and how.
+            without: pieces of the garment that the views do not show, as collars; a line below says so.
+        """
+        if without:
+            words = f"not shown on the body: {', '.join(without)}"
+            pen.write(left, top - _HEAD - self._tallest * self._scale - 0.16, words, 8, color=GREY)
         colours = np.concatenate([energy_colours(self._density, scale), np.tile(_SKIN, (self._skin_faces, 1))])
         for title, view in self._views:
             width, height = view.size[:2] * self._scale
