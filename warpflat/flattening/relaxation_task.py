@@ -24,7 +24,7 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["RelaxationTask", "RelaxedPiece"]
 
-# Each round leaves about a fifth of the error of the directions before it, so that more rounds than this would change little.
+# Each round leaves about a fifth of the error of the lengths before it, so that more rounds than this would change little.
 _MAX_UPDATES = 6
 
 
@@ -50,8 +50,8 @@ class RelaxationTask:
     options: RelaxOptions
     callback: Callable[[Progress], bool | None] | None
     datum: IntArray
+    model: Model
     stage_name: str = "relax"
-    model: Model = "springs"
     wear: Wear | None = None
 
     history: list[tuple[float, float, float, float]] = field(default_factory=list)
@@ -107,8 +107,7 @@ class RelaxationTask:
 
     def follows_layout(self, network: SpringNetwork) -> bool:
         """Return whether the energy of the piece's network depends on the layout in which it is measured."""
-        springs = self.model == "springs"
-        return self._is_tight or (springs and (not self.fabric.is_isotropic or network.spring_arrays.long_quads > 0))
+        return self._is_tight or (self.model == "springs" and network.spring_arrays.long_quads > 0)
 
     @property
     def _is_tight(self) -> bool:
@@ -116,16 +115,8 @@ class RelaxationTask:
         return self.wear is not None and self.wear.is_tight and (self.model == "springs" or bool(self.wear.pressure))
 
     def max_direction_updates(self, *, mended: bool = False) -> int:
-        """Return how many times directions are updated at most.
-
-        That is several times where springs, or the lengths for a stretch, depend on the layout; once where only the steps of a
-        membrane do, or where the development was repaired; and not at all otherwise.
-
-        Args:
-            mended: whether folds of the development were repaired.
-        """
-        alike = self.fabric.is_isotropic or bool(self.surface.is_quad.all())
-        return _MAX_UPDATES if self._is_tight or (self.model == "springs" and not alike) else int(mended or not alike)
+        """Return how many times the network is measured anew at most: once where the development was mended, and often for a stretch."""
+        return _MAX_UPDATES if self._is_tight else int(mended)
 
     def report_progress(self, stage: str, state: Relaxation) -> None:
         """Call the callback with the state at the last convergence check; it may stop the relaxation."""

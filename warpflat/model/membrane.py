@@ -9,20 +9,59 @@ import warp as wp
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.text import format_count
 from warpflat.fabric.fabric import Curve, Fabric
 from warpflat.kernels.membrane_cell import Cloth
+from warpflat.model.springs import grain_offset
+from warpflat.surface.mesh import Surface
 
-__all__ = ["MODELS", "Model", "check_model", "corner_sums", "make_cloth", "step_matrix"]
+__all__ = ["MODELS", "Model", "ModelChoice", "check_model", "choose_model", "corner_sums", "make_cloth", "step_matrix"]
 
 
 Model = Literal["springs", "membrane"]
-MODELS: tuple[Model, ...] = ("springs", "membrane")
+ModelChoice = Literal["auto", "springs", "membrane"]
+MODELS: tuple[ModelChoice, ...] = ("auto", "springs", "membrane")
+
+# Edges of quads within this angle of the grain, by their mean, count as threads [degrees].
+_ALIGNED = 7.5
 
 
 def check_model(model: str) -> None:
     """Raise InputError, with the nearest name, for an unknown model."""
     if model not in MODELS:
         raise InputError(f"model {model!r} is unknown: {nearest(str(model), MODELS)}")
+
+
+def choose_model(
+    choice: ModelChoice, surface: Surface, fabric: Fabric, positions: FloatArray, *, grain_angle: float = 0.0
+) -> Model:
+    """Return the model of a piece: springs on quads along the grain, where they are exact, and the membrane on all other meshes.
+
+    Args:
+        choice: "auto", or the model that is asked for.
+        surface, fabric: the piece and its cloth; an isotropic one has no grain.
+        positions: #V by 2, a layout, in which quads and grain are compared [m].
+        grain_angle: of the warp against +y, degrees.
+
+    Raises:
+        InputError: an unknown model, or springs for a mesh on which they are another cloth.
+    """
+    check_model(choice)
+    if choice == "membrane":
+        return choice
+    triangles, off = int(np.count_nonzero(~surface.is_quad)), 0.0
+    if not triangles and not fabric.is_isotropic:
+        off = grain_offset(surface.faces, positions, grain_angle)
+    if not triangles and off <= _ALIGNED:
+        return "springs"
+    if choice == "auto":
+        return "membrane"
+    what = (
+        f"has {format_count(triangles, 'triangle')}" if triangles else f"has its quads {off:.0f} degrees off the grain"
+    )
+    raise InputError(
+        f'piece {surface.name!r} {what}: model = "springs" needs quads along warp and weft; leave model out to measure it cell by cell'
+    )
 
 
 def plane_stress(fabric: Fabric) -> tuple[float, float, float]:
