@@ -44,8 +44,7 @@ class LayoutEnergy:
         at = (np.repeat(np.arange(len(held)), 4), cells.faces[held].ravel())
         self._hourglass = csr_matrix((hourglass[held].ravel(), at), (len(held), self.count))
         warp, weft = grain_axes(network.grain_angle)
-        # One piece has one onset for all its cells.
-        onset_warp, onset_weft = network.cells.onset.numpy()[0].tolist()
+        onset_warp, onset_weft = map(float, network.guard.onset)
         self._threads = [
             (warp, fabric.stiffness_warp, onset_warp),
             (weft, fabric.stiffness_weft, onset_weft),

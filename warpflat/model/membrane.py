@@ -12,7 +12,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import format_count
 from warpflat.fabric.fabric import Curve, Fabric
 from warpflat.kernels.membrane_cell import Cloth
-from warpflat.model.springs import grain_offset
+from warpflat.model.springs import fourfold_direction
 from warpflat.surface.mesh import Surface
 
 __all__ = ["MODELS", "Model", "ModelChoice", "check_model", "choose_model", "corner_sums", "make_cloth", "step_matrix"]
@@ -22,8 +22,9 @@ Model = Literal["springs", "membrane"]
 ModelChoice = Literal["auto", "springs", "membrane"]
 MODELS: tuple[ModelChoice, ...] = ("auto", "springs", "membrane")
 
-# Edges of quads within this angle of the grain, by their mean, count as threads [degrees].
-_ALIGNED = 7.5
+# Edges of quads count as threads where they run within this angle of the grain [degrees], on average, and are spread about that by less
+# than what leaves so much of their mean of exp(4i a): 17 degrees.
+_ALIGNED, _LEAST_COMMON = 7.5, 0.5
 
 
 def check_model(model: str) -> None:
@@ -49,16 +50,18 @@ def choose_model(
     check_model(choice)
     if choice == "membrane":
         return choice
-    triangles, off = int(np.count_nonzero(~surface.is_quad)), 0.0
-    if not triangles and not fabric.is_isotropic:
-        off = grain_offset(surface.faces, positions, grain_angle)
-    if not triangles and off <= _ALIGNED:
-        return "springs"
+    triangles = int(np.count_nonzero(~surface.is_quad))
+    what = f"has {format_count(triangles, 'triangle')}"
+    if not triangles:
+        mean = 1.0 + 0.0j if fabric.is_isotropic else fourfold_direction(surface.faces, positions, grain_angle)
+        off = abs(np.rad2deg(np.angle(mean))) / 4.0
+        if off <= _ALIGNED and abs(mean) >= _LEAST_COMMON:
+            return "springs"
+        what = "has quads that turn away from the grain"
+        if off > _ALIGNED:
+            what = f"has its quads {off:.0f} degrees off the grain"
     if choice == "auto":
         return "membrane"
-    what = (
-        f"has {format_count(triangles, 'triangle')}" if triangles else f"has its quads {off:.0f} degrees off the grain"
-    )
     raise InputError(
         f'piece {surface.name!r} {what}: model = "springs" needs quads along warp and weft; leave model out to measure it cell by cell'
     )

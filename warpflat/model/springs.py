@@ -32,7 +32,7 @@ __all__ = [
     "SpringArrays",
     "SpringGeometry",
     "SpringsAround",
-    "grain_offset",
+    "fourfold_direction",
     "shorten_springs",
     "spring_geometry",
     "springs_along_cells",
@@ -219,10 +219,10 @@ def hourglass_weights(corners: FloatArray, stiffness: FloatArray) -> FloatArray:
     return np.asarray(mode * np.where(has_shape, np.sqrt(stiffness), 0.0)[:, None])
 
 
-def grain_offset(quads: IntArray, positions: FloatArray, grain_angle: float) -> float:
-    """Return the angle between the edges of quads (#Q by 4) and the nearer of warp and weft, from 0 to 45 degrees.
+def fourfold_direction(quads: IntArray, positions: FloatArray, grain_angle: float) -> complex:
+    """Return the mean of exp(4i a) over quads (#Q by 4) in a layout (#V by 2 [m]), a the angle of their edges to the grain.
 
-    It is that of the whole piece: the mean over its quads in a layout (#V by 2 [m]), taken with the fourfold symmetry of a grid.
+    A grid has this fourfold symmetry. A fourth of its angle is the mean of a; its modulus is 1 where all quads run alike.
     """
     warp, _ = grain_axes(grain_angle)
     # Vectors as complex numbers: a row of these is summed many times as fast as two columns of reals.
@@ -230,7 +230,7 @@ def grain_offset(quads: IntArray, positions: FloatArray, grain_angle: float) -> 
     along = ((p[quads[:, 1]] - p[quads[:, 0]]) + (p[quads[:, 2]] - p[quads[:, 3]])) * complex(warp[0], -warp[1])
     length = np.abs(along)
     twofold = (np.where(length > 0.0, along, 1.0) / np.where(length > 0.0, length, 1.0)) ** 2
-    return float(np.rad2deg(abs(np.angle(complex((twofold * twofold).sum()))) / 4.0))
+    return complex((twofold * twofold).mean())
 
 
 @once_per_surface

@@ -315,7 +315,7 @@ def _guard_rows(network: SpringNetwork, positions: FloatArray, part: slice) -> l
     rows = []
     axes = zip(grain_axes(network.grain_angle), (fabric.stiffness_warp, fabric.stiffness_weft), strict=True)
     for k, (axis, stiffness) in enumerate(axes):
-        onset = network.guard.onset[k]
+        onset = float(network.guard.onset[k])
         share = np.einsum("cij,cj->ci", gradient, np.outer(slack[:, k], axis))
         worn = np.einsum("cij,cj->ci", edges, share)
         stretch = np.sqrt(np.einsum("ij,ij->i", worn, worn))
