@@ -15,6 +15,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.flattening.progress import STEPS
 from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
+from warpflat.model.membrane import choose_model
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.grain import grain_alignments
 from warpflat.solver.minimise import relax
@@ -93,7 +94,15 @@ class _Piece:
                     break
             return self._relax()
         follows = task.follows_layout(self.state.network)
-        return self._relax(measure=self._measure if follows else None)
+        outcome = self._relax(measure=self._measure if follows else None)
+        layout = self.state.positions()
+        chosen = choose_model("auto", task.surface, task.fabric, layout, grain_angle=task.grain_angle)
+        if task.model == "springs" != chosen:
+            # Quads that ran along the grain in the development have turned away from it, as those of a strip that winds.
+            task.model = "membrane"
+            self._measure(layout, layout)
+            outcome = self._relax()
+        return outcome
 
     def _relax(self, **how: object) -> Outcome:
         task = self._task
