@@ -2,7 +2,7 @@
 
 Warp and weft lie straight in the plane, F = dX/dx maps them to the body, and per flat area of cloth the energy is
 
-    psi = W(e_warp, e_weft) + 1/2 G gamma^2 + 1/2 K_lock <|gamma| - sin 45>^2,    e = |F t| - 1,    gamma = F t_warp . F t_weft.
+    psi = W(e_warp, e_weft) + 1/2 G gamma^2 + 1/2 K_lock <|gamma| - gamma_on>^2,    e = |F t| - 1,    gamma = F t_warp . F t_weft.
 
 t is a thread's unit vector over the stretch at which it is meant to be worn (1 where none is). In an isotropic sheet
 the principal directions of each cell take the place of warp and weft, and gamma is 0.
@@ -11,8 +11,8 @@ W is that of an orthotropic sheet in plane stress. A J-shaped curve adds the dif
 Under compression cloth wrinkles: W = f W_sheet + (1 - f) W_wrinkled, with W_wrinkled the least energy of any sheet that
 may shorten freely (Pipkin 1986).
 
-The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have been sheared by
-45 degrees lock. gamma cannot exceed 1, so G alone would resist full shear with at most 1/2 G per area. Threads of soft
+The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have been sheared as far as
+the fabric lets them lie against each other and lock, from gamma_on on, the sine of that angle. gamma cannot exceed 1, so G alone would resist full shear with at most 1/2 G per area. Threads of soft
 cloth would then come to lie side by side, and a tiny face of the body would become a hand's breadth of cloth.
 """
 

@@ -22,6 +22,9 @@ Model = Literal["springs", "membrane"]
 ModelChoice = Literal["auto", "springs", "membrane"]
 MODELS: tuple[ModelChoice, ...] = ("auto", "springs", "membrane")
 
+# What locked threads add to the shear stiffness, over that. With 10, a shirt, trousers and a bodice of denim, a weave and a knit are sheared
+# to 1.0 to 1.3 times the limit at 95 % of their area, and their threads are strained by what they bear. 5 and 20 differ little.
+_LOCKING = 10.0
 # Edges of quads count as threads where they run within this angle of the grain [degrees], on average, and are spread about that by less
 # than what leaves so much of their mean of exp(4i a): 17 degrees.
 _ALIGNED, _LEAST_COMMON = 7.5, 0.5
@@ -99,8 +102,8 @@ def make_cloth(
     cloth.c_warp, cloth.c_weft, cloth.c_cross = plane_stress(fabric)
     cloth.shear = fabric.shear_stiffness
     cloth.k_warp, cloth.k_weft = fabric.stiffness_warp, fabric.stiffness_weft
-    # Half of a thread's own stiffness: then the step is no stiffer than along the threads.
-    cloth.lock = 0.0 if linear else 0.5 * min(fabric.stiffness_warp, fabric.stiffness_weft)
+    cloth.onset = float(np.sin(np.radians(fabric.shear_limit)))
+    cloth.lock = 0.0 if linear else _LOCKING * fabric.shear_stiffness
     cloth.compression = 1.0 if linear else fabric.compression_factor
     for direction in ("warp", "weft"):
         points: Curve = getattr(fabric, f"curve_{direction}") if curves and not linear else ()
