@@ -1,6 +1,6 @@
 """A piece is relaxed here: from a layout to the network that is measured in it, to the minimum of its energy.
 
-Under a stretch, and where springs of long quads run aslant, the network depends on the layout in which its directions are measured. L-BFGS
+The network of springs, and of cells under a pressure, depends on the layout in which its directions are measured. L-BFGS
 measures them anew every few iterations, so that its estimate of what is left knows what follows from them. The paper's steps alone relax
 such a piece in rounds, and its directions are updated between them.
 """
@@ -15,7 +15,6 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.flattening.progress import STEPS
 from warpflat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
-from warpflat.model.membrane import choose_model
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.grain import grain_alignments
 from warpflat.solver.minimise import relax
@@ -94,15 +93,7 @@ class _Piece:
                     break
             return self._relax()
         follows = task.follows_layout(self.state.network)
-        outcome = self._relax(measure=self._measure if follows else None)
-        layout = self.state.positions()
-        chosen = choose_model("auto", task.surface, task.fabric, layout, grain_angle=task.grain_angle)
-        if task.model == "springs" != chosen:
-            # Quads that ran along the grain in the development have turned away from it, as those of a strip that winds.
-            task.model = "membrane"
-            self._measure(layout, layout)
-            outcome = self._relax()
-        return outcome
+        return self._relax(measure=self._measure if follows else None)
 
     def _relax(self, **how: object) -> Outcome:
         task = self._task

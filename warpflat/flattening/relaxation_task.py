@@ -107,7 +107,8 @@ class RelaxationTask:
 
     def follows_layout(self, network: SpringNetwork) -> bool:
         """Return whether the energy of the piece's network depends on the layout in which it is measured."""
-        return self._is_tight or (self.model == "springs" and network.spring_arrays.long_quads > 0)
+        springs = self.model == "springs"
+        return self._is_tight or (springs and (not self.fabric.is_isotropic or network.spring_arrays.long_quads > 0))
 
     @property
     def _is_tight(self) -> bool:
