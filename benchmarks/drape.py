@@ -56,8 +56,9 @@ def show(name: str, size: str, drape: warpflat.Drape, flattened: float) -> None:
         spread = "  ".join(f"{part} {1e3 * value:.2f}" for part, value in measures[key].items())
         print(f"  {key[:-2]:<10} {spread}")
     print(f"  deepest in the body {1e3 * measures['deepest_m']:.3f}")
-    for key in ("strain_warp", "strain_weft", "strain_bias"):
-        print("  " + key + "  " + "  ".join(f"{part} {100 * value:.2f}" for part, value in measures[key].items()))
+    for key, factor in (("strain_warp", 100.0), ("strain_weft", 100.0), ("shear", 1.0)):
+        print("  " + key + "  " + "  ".join(f"{part} {factor * value:.2f}" for part, value in measures[key].items()))
+    print(f"  beyond a limit {100 * measures['outside']:.2f} %")
     print("  pressure  " + "  ".join(f"{part} {value:.3g}" for part, value in measures["pressure_pa"].items()))
     gaps = {line: 1e3 * gap for line, gap in measures["gap_m"].items() if "armhole" in line or "neck" in line}
     print("  gaps  " + "  ".join(f"{line} {gap:.1f}" for line, gap in gaps.items()))

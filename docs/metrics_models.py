@@ -33,19 +33,21 @@ class Remedy(Entry):
     cut: str
     length_m: float
     outside_after: float | None
-    """Share of the cloth beyond the strain limit with the cut."""
+    """Share of the cloth beyond its limits with the cut."""
     piece: str | None = None
     table: dict[str, Any] | None = None
     """A scene's `[[cuts]]` entry that makes the cut, where one can."""
 
 
 class PieceWear(Entry):
-    """How a piece is strained when worn; strains are shares, tensions N/m, pressures Pa."""
+    """How a piece is strained when worn; strains are shares, shear degrees, tensions N/m, pressures Pa."""
 
     fits: bool
     strain_limit: float
+    shear_limit: float | None
+    """[degrees]; none of an isotropic sheet, which has no threads: its principal strains count."""
     outside: float
-    """Share of the cloth beyond the strain limit."""
+    """Share of the cloth beyond its limits: stretched, slack or sheared; a place counts once."""
     outside_unsewn: float | None = None
     hollow: float
     """Share of the cloth over hollows, where no pressure is known."""
@@ -53,7 +55,8 @@ class PieceWear(Entry):
     """Places where it does not fit, in words."""
     strain_warp: Distribution
     strain_weft: Distribution
-    strain_bias: Distribution
+    shear: Distribution
+    """Angle by which warp and weft are off the right angle [degrees]."""
     tension_warp: Distribution
     tension_weft: Distribution
     pressure: Distribution
@@ -447,13 +450,12 @@ class Pressure(Spread):
 
 
 class DrapeStrain(Entry):
-    """Strain of the draped cloth."""
+    """Strain of the draped cloth, or its shear [degrees]."""
 
     p5: float
     p95: float
     min: float
     max: float
-    beyond_limit: float
 
 
 class Place(Entry):
@@ -499,7 +501,7 @@ class Drape(Entry):
 
     converged: bool
     fits: bool
-    """At rest, and no place that misfits the designed surface where it is meant to touch, or is strained beyond the cloth's limit."""
+    """At rest, and no place that misfits the designed surface where it is meant to touch, or is beyond the cloth's limits."""
     residual: float
     steps: int
     seconds: float
@@ -514,9 +516,13 @@ class Drape(Entry):
     deepest_m: float
     gap_m: dict[str, float]
     strain_limit: float
+    shear_limit: float | None
+    """[degrees]; none of an isotropic sheet."""
+    outside: float
+    """Share of the cloth beyond its limits."""
     strain_warp: DrapeStrain
     strain_weft: DrapeStrain
-    strain_bias: DrapeStrain
+    shear: DrapeStrain
     pressure_pa: Pressure
     places: list[Place]
     correction: Correction | None = None

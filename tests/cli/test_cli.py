@@ -408,6 +408,28 @@ def test_fabrics_as_json_and_from_a_file(command: Command):
     assert "did you mean 'stiffness_warp'" in command("fabrics", "--file", "mine.toml").refusal
 
 
+def test_a_maker_may_allow_more_or_less_shear_than_the_cloth(command: Command):
+    """Just below the largest shear of a dome the pattern does not fit everywhere, just above it does; a scene's key says the same."""
+    scene = 'fabric = "interlock"\n[surface]\nshape = "dome"\nresolution = 9\n[output]\nframes = 0\npicture = false\n'
+    Path("dome.toml").write_text(scene)
+    wear = json.loads(command("run", "dome.toml", "--json", "--shear-limit", "60")[1])["pieces"]["dome"]["wear"]
+    most = max(abs(wear["shear"]["min"]), wear["shear"]["max"])
+    assert wear["shear_limit"] == 60.0
+    assert wear["outside"] == 0.0
+    Path("strict.toml").write_text(f"shear_limit = {0.9 * most}\n{scene}")
+    for arguments in (("dome.toml", "--shear-limit", f"{0.9 * most}"), ("strict.toml",)):
+        code, out, _, _ = command("run", *arguments, "--json", "--out", "strict")
+        told = json.loads(out)["pieces"]["dome" if len(arguments) > 1 else "strict"]["wear"]
+        assert code == 0
+        assert told["outside"] > 0.0
+        assert told["where_not"][0].startswith(f"sheared {most:.1f} degrees (limit {0.9 * most:.3g} degrees)")
+    refusal = command("run", "dome.toml", "--shear-limit", "0.2").refusal
+    assert (
+        "--shear-limit = 0.2 degrees is out of range; must lie between 0.5 and 80 degrees (if that is in radians"
+        in refusal
+    )
+
+
 def test_usage_errors_are_one_line(command: Command):
     assert "Did you mean 'fabrics'" in command("fabric").refusal
     assert "Did you mean '--out'" in command("run", "--otu", "x", "y.toml").refusal

@@ -53,6 +53,10 @@ def test_seams_are_welded_and_the_rest_state_is_the_flat_pattern(bodice: warpfla
     assert (stiffness > 0.0).sum() > 0.8 * len(stiffness)
 
 
+def no_strains(faces: np.ndarray) -> dict[str, np.ndarray]:
+    return {name: np.zeros(len(faces)) for name in ("warp", "weft", "shear")}
+
+
 def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
     cloth, borders = worn.cloth, np.concatenate(border_loops(worn.cloth.faces))
     away = np.linalg.norm(cloth.designed[:, None] - cloth.designed[borders], axis=2).min(axis=1)
@@ -67,7 +71,7 @@ def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
             bridged=none,
             lift=lift,
             gap=lift,
-            strains={},
+            strains=no_strains(cloth.faces),
             gathered=near & False,
         )
         assert words in place.words
@@ -92,7 +96,7 @@ def test_cloth_without_loops_around_it_has_places_too(faces: list[list[int]], wo
     )  # fmt: skip
     (place,) = find_places(
         cloth, 0.01 * ones, misfit=0.02 * ones, meant_to_touch=ones > 0.0, bridged=0.0 * ones, lift=0.02 * ones,
-        gap=0.02 * ones, strains={}, gathered=ones < 0.0,
+        gap=0.02 * ones, strains=no_strains(faces4), gathered=ones < 0.0,
     )  # fmt: skip
     assert words in place.words
 
@@ -343,6 +347,25 @@ def test_small_folds_are_told_and_overstretched_cloth_counts(worn: warpflat.Drap
     assert fits("hang", 0.01, 1.0)
 
 
+def test_cloth_sheared_beyond_its_limit_does_not_fit(worn: warpflat.Drape):
+    """A band of the cloth a tenth below the limit is told nothing of; a tenth above it is a place of its own, and no fit."""
+    cloth, limit = worn.cloth, worn.cloth.fabric.shear_limit
+    band = np.abs(cloth.designed[cloth.faces[:, 0], 1] - np.median(cloth.designed[:, 1])) < 0.1
+    for share in (0.9, -0.9, 1.1, -1.1):
+        sheared = dataclasses.replace(worn, worn=dataclasses.replace(worn.worn, converged=True))
+        vars(sheared)["strains"] = {**no_strains(cloth.faces), "shear": np.where(band, share * limit, 0.0)}
+        vars(sheared)["_off"] = np.zeros(len(cloth.designed))
+        places = [place for place in sheared.places if place.kind == "shear"]
+        area = worn.face_areas[band].sum() / worn.face_areas.sum()
+        assert sheared.measures()["outside"] == (pytest.approx(area) if abs(share) > 1.0 else 0.0)
+        assert sheared.fits == (abs(share) < 1.0)
+        assert bool(places) == (abs(share) > 1.0)
+        for place in places:
+            assert (
+                f"is sheared by {1.1 * limit:.1f} degrees, beyond the cloth's limit of {limit:g} degrees" in place.words
+            )
+
+
 def test_what_an_elastic_gathers_is_told_and_no_strain(bodice: warpflat.Garment, worn: warpflat.Drape):
     cloth = worn.cloth
     body = Body(cloth.designed * [0.9, 1.0, 0.9], cloth.faces, device=worn.body.device)
@@ -356,7 +379,7 @@ def test_what_an_elastic_gathers_is_told_and_no_strain(bodice: warpflat.Garment,
     # The cells above the waist pressed together, half of them.
     pressed = dataclasses.replace(worn, threaded=held)
     strain = np.where(np.isin(cloth.faces, rows).any(axis=1), -0.5, 0.0)
-    vars(pressed)["strains"] = {"warp": 0.0 * strain, "weft": strain}
+    vars(pressed)["strains"] = {"warp": 0.0 * strain, "weft": strain, "shear": 0.0 * strain}
     vars(pressed)["misfit"] = np.zeros(len(cloth.designed))
     gathered = [place for place in pressed.places if "gathered by its elastic" in place.words]
     assert gathered

@@ -26,6 +26,8 @@ from warpflat.export.geometry import face_areas
 from warpflat.export.letters import all_letters
 from warpflat.export.picture import PicturePiece, draw_figure
 from warpflat.export.picture_garment import Body
+from warpflat.fabric.library import find_fabric
+from warpflat.fabric.limits import Amount, Demand
 from warpflat.flattening import fit_picture
 from warpflat.model.fit import MAPS as MAPS_OF_FIT
 from warpflat.model.fit import Misfit, WornFit
@@ -194,12 +196,15 @@ def worn(draw: st.DrawFn) -> Any:
     if draw(st.booleans()):
         misfits = (
             Misfit(
-                surface=shape, faces=np.arange(count // 2 + 1), area=1e-3, worst=0.3, limit=0.1, thread="warp", vertex=0
+                surface=shape,
+                faces=np.arange(count // 2 + 1),
+                area=1e-3,
+                worst=Amount(way="warp", value=0.3, limit=0.1),
+                vertex=0,
             ),
         )
-    fit = WornFit(
-        **{"shear": np.zeros(count), **maps}, area=area, limit=0.1, misfits=misfits, outside=0.5 * bool(misfits)
-    )
+    demand = Demand.of(find_fabric("woven"), *(maps[key] for key in ("strain_warp", "strain_weft", "shear")))
+    fit = WornFit(**maps, area=area, demand=demand, misfits=misfits)
     return SimpleNamespace(
         surface=shape,
         network=SimpleNamespace(surface=shape),
@@ -309,7 +314,7 @@ def test_drape_and_correction_of_any_pieces(worn_pieces: list[Any], fabric: str,
             flat_faces=faces,
             flat=pattern,
             piece_vertices=rows,
-            fabric=SimpleNamespace(name=fabric, strain_limit=0.1),
+            fabric=SimpleNamespace(name=fabric, strain_limit=0.1, shear_limit=12.0),
         )
         return SimpleNamespace(
             cloth=cloth,
@@ -317,7 +322,11 @@ def test_drape_and_correction_of_any_pieces(worn_pieces: list[Any], fabric: str,
             positions=space,
             gap=np.full(len(space), gap),
             pressure=np.zeros(len(space)),
-            strains={"warp": values(kind, len(faces), 0.1, 1), "weft": np.zeros(len(faces))},
+            strains={
+                "warp": values(kind, len(faces), 0.1, 1),
+                "weft": np.zeros(len(faces)),
+                "shear": values(kind, len(faces), 10.0, 2),
+            },
             face_areas=face_areas(space, faces),
             places=[],
             converged=False,

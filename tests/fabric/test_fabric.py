@@ -68,14 +68,14 @@ def test_the_library_holds_the_entries_of_the_literature_table():
 
 @pytest.mark.parametrize("fabric", load_library().values(), ids=lambda fabric: fabric.name)
 def test_every_shipped_value_says_where_it_comes_from(fabric: Fabric):
-    assert set(MEASURED) | {"strain_limit", "bending"} <= set(fabric.provenance)
+    assert set(MEASURED) | {"strain_limit", "shear_limit", "bending"} <= set(fabric.provenance)
     assert fabric.description
     for key, origin in fabric.provenance.items():
         assert origin.source not in ("", "not stated"), key
         assert origin.unit, key
         assert origin.grade in GRADES, key
         assert (origin.grade == "E") == origin.source.startswith("estimate"), key
-        if key not in ("areal_density", "strain_limit", "shear_limit", "poisson_ratio"):
+        if key not in ("areal_density", "strain_limit", "poisson_ratio"):
             assert origin.test_load, key
         if origin.spread is not None:
             assert origin.spread[0] < getattr(fabric, key) < origin.spread[1], key
@@ -110,7 +110,7 @@ def test_only_isotropic_fabrics_are_isotropic():
     assert not cloth(stiffness_warp=1010.0, shear_stiffness=500.0).is_isotropic
 
 
-def test_a_limit_of_shear_that_nobody_gave_is_an_estimate_by_kind():
+def test_a_limit_of_shear_that_nobody_gave_is_an_estimate_by_kind(tmp_path: Path):
     assert cloth().shear_limit == 15.0
     assert cloth().provenance["shear_limit"].is_estimate
     knit = cloth(strain_limit=0.15)
@@ -119,6 +119,17 @@ def test_a_limit_of_shear_that_nobody_gave_is_an_estimate_by_kind():
     assert diagonal / math.sqrt(2.0) == pytest.approx(1.15)
     assert cloth(strain_limit=1.0).shear_limit == 80.0
     assert find_fabric("paper").shear_limit < 1.0
+    file = '[a]\nbase = "interlock"\nstrain_limit = 0.25\n[b]\nbase = "denim"\nstrain_limit = 0.04\n'
+    of_base = load_library([write(tmp_path, file)])
+    assert of_base["a"].shear_limit == cloth(strain_limit=0.25).shear_limit
+    assert of_base["b"].shear_limit == find_fabric("denim").shear_limit
+    allowed = find_fabric("woven").allowing(8.0)
+    assert (allowed.shear_limit, allowed.provenance["shear_limit"].source) == (8.0, "asked for")
+    assert allowed.strain_limit == find_fabric("woven").strain_limit
+    with pytest.raises(
+        InputError, match="says nothing of paper, an isotropic sheet, which has no threads; take a cloth"
+    ):
+        find_fabric("paper").allowing(8.0)
     given = cloth(strain_limit=0.15, shear_limit=9.0)
     assert given.shear_limit == 9.0
     assert "shear_limit" not in given.provenance

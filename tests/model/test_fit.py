@@ -20,6 +20,7 @@ from warpflat.model.wear import Wear
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.curvature import curvature_tensors
+from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
 
@@ -110,7 +111,7 @@ def test_a_given_pattern_is_judged():
     tight = assess_pattern(surface, denim, flat * [0.92, 1.0])
     assert not tight.fits
     assert tight.outside == pytest.approx(1.0)
-    assert tight.misfits[0].worst == pytest.approx(1 / 0.92 - 1, rel=1e-6)
+    assert tight.misfits[0].worst.value == pytest.approx(1 / 0.92 - 1, rel=1e-6)
     assert "stretched 8.7 % along weft (limit 5 %)" in tight.misfits[0].words
     loose = assess_pattern(surface, denim, flat * [1.08, 1.0])
     assert "slack 7.4 % along weft" in loose.misfits[0].words
@@ -120,13 +121,58 @@ def test_a_given_pattern_is_judged():
         assess_pattern(surface, denim, flat[:3])
 
 
-def test_bias_and_shear():
-    """A square sheared by gamma: one diagonal is sqrt(1 + sin gamma) longer."""
-    surface = make_surface([[0, 0, 0], [0.1, 0, 0], [0.12, 0.0979795897, 0], [0.02, 0.0979795897, 0]], [[0, 1, 2, 3]])
-    fit = assess_pattern(surface, find_fabric("woven"), [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]])
-    assert fit.shear[0] == pytest.approx(math.asin(0.2), rel=1e-6)
-    assert fit.strain_bias[0] == pytest.approx(math.sqrt(1.2) - 1, rel=1e-6)
-    assert fit.strain_warp[0] == pytest.approx(0.0, abs=1e-8)
+def sheared(degrees: float, *, triangles: bool, longer: float = 0.0) -> Surface:
+    """A square of 0.1 m whose threads keep their lengths, or all grow by a share, and turn from the right angle by some degrees."""
+    angle, length = math.radians(90.0 - degrees), 0.1 * (1.0 + longer)
+    x, y = length * math.cos(angle), length * math.sin(angle)
+    faces = [[0, 1, 2], [0, 2, 3]] if triangles else [[0, 1, 2, 3]]
+    return make_surface([[0, 0, 0], [length, 0, 0], [length + x, y, 0], [x, y, 0]], faces)
+
+
+SQUARE = [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+@pytest.mark.parametrize("fabric", ["woven", "denim", "interlock", "power-net"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_cloth_fits_up_to_its_limit_of_shear_and_not_beyond(fabric: str, triangles: bool, sign: float):
+    cloth = find_fabric(fabric)
+    within = assess_pattern(sheared(sign * 0.9 * cloth.shear_limit, triangles=triangles), cloth, SQUARE)
+    assert within.fits
+    assert within.outside == 0.0
+    np.testing.assert_allclose(within.shear, sign * 0.9 * cloth.shear_limit, rtol=1e-9)
+    np.testing.assert_allclose(within.strain_warp, 0.0, atol=1e-9)
+    beyond = assess_pattern(sheared(sign * 1.1 * cloth.shear_limit, triangles=triangles), cloth, SQUARE)
+    assert beyond.outside == pytest.approx(1.0)
+    words = f"sheared {1.1 * cloth.shear_limit:.1f} degrees (limit {cloth.shear_limit:.3g} degrees), "
+    assert beyond.misfits[0].words.startswith(words)
+    # What its maker allows is the limit.
+    assert assess_pattern(
+        sheared(1.1 * cloth.shear_limit, triangles=triangles),
+        replace(cloth, shear_limit=1.2 * cloth.shear_limit),
+        SQUARE,
+    ).fits
+
+
+def test_a_place_beyond_both_limits_counts_once():
+    woven = find_fabric("woven")
+    both = assess_pattern(sheared(1.1 * woven.shear_limit, triangles=False, longer=0.06), woven, SQUARE)
+    assert both.outside == pytest.approx(1.0)
+    assert len(both.misfits) == 1
+    # The worse of both is told: the threads are 1.2 times at their limit.
+    assert both.misfits[0].words.startswith("stretched 6.0 % along w")
+
+
+@pytest.mark.parametrize("turn", [0.0, 45.0])
+def test_an_isotropic_sheet_has_no_threads_and_is_judged_by_its_principal_strains(turn: float):
+    """The same strain along the grain and across it: sheared by g, a diagonal is sqrt(1 + sin g) - 1 longer."""
+    sheet = find_fabric("isotropic")
+    for share in (0.9, 1.1):
+        shear = math.degrees(math.asin(1.0 - (1.0 - share * sheet.strain_limit) ** 2))
+        fit = assess_pattern(sheared(shear, triangles=False), sheet, SQUARE, grain_angle=turn)
+        assert fit.outside == pytest.approx(float(share > 1.0))
+        assert fit.shear_limit is None
+    assert fit.misfits[0].words.startswith("slack 5.5 % (limit 5 %), ")
 
 
 @pytest.mark.parametrize(
@@ -201,8 +247,10 @@ def worn_entry(outside: float, area: float, cut: str) -> dict[str, object]:
             "fits": fits,
             "outside": outside,
             "strain_limit": 0.05,
+            "shear_limit": 15.0,
             "strain_warp": strain,
             "strain_weft": strain,
+            "shear": {"min": -12.0, "p05": -3.0, "p95": 4.0, "max": 9.0},
             "pressure": {"p05": 0.0, "p50": 30.0, "p95": 256.0, "max": 676.0},
             "where_not": [] if fits else ["stretched 8 % along weft"],
             "would_help": [] if fits else [{"cut": cut, "length_m": 0.1, "outside_after": 0.02}],
@@ -223,8 +271,8 @@ def test_a_garment_fits_if_all_of_its_pieces_do_and_says_which_do_not():
     }
     lines = fit_lines({"pieces": pieces, "wear": found})
     assert lines[0] == (
-        "front: fits: no (warp -1.0 to +8.0 % [-2.0 to +20.3], weft -1.0 to +8.0 % [-2.0 to +20.3], limit 5 %; "
-        "pressure 0 to 256 Pa [up to 676], median 30)"
+        "front: fits: no (warp -1.0 to +8.0 % [-2.0 to +20.3], weft -1.0 to +8.0 % [-2.0 to +20.3], "
+        "shear -3.0 to +4.0 degrees [-12.0 to +9.0], limit 5 % and 15 degrees; pressure 0 to 256 Pa [up to 676], median 30)"
     )
     assert lines[-2] == "ranges: 5 to 95 % of the cloth [all of it]"
     assert "  would help: a dart from the border: 12.0 % -> 2.0 % beyond the limit" in lines

@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, RUN_FILES, ComputingCommand, output_options
+from warpflat.cli.options import (
+    DONE,
+    EXIT_CODES,
+    NOT_CONVERGED,
+    RUN_FILES,
+    ComputingCommand,
+    output_options,
+    shear_limit_option,
+)
 from warpflat.cli.run import run_and_report, start_warp_silently
 
 __all__ = ["drape"]
@@ -21,6 +29,7 @@ Of a pattern the last two and metrics.json come out alone."""
 @click.argument("scene", metavar="SCENE|DIR|PATTERN", type=click.Path(path_type=Path))
 @click.option("--body", metavar="SIZE|SCAN", help='Of a pattern: a size, such as "EU 38", or a scan\'s file.')
 @click.option("--fabric", metavar="NAME", help="Of a pattern.  [default: its own, or woven]")
+@shear_limit_option
 @click.option("--seams", type=click.Path(path_type=Path), metavar="FILE", help="Of a pattern: TOML with its [[seams]].")
 @click.option("--units", metavar="UNIT", help="Of a mesh whose texture is its sewn pattern, unless the file says.")
 @click.option("--size", metavar="SIZE", help="Of a graded pattern.  [default: its sample size]")
@@ -43,6 +52,7 @@ def drape(
     device: str | None,
     body: str | None,
     fabric: str | None,
+    shear_limit: float | None,
     seams: Path | None,
     units: str | None,
     size: str | None,
@@ -81,7 +91,9 @@ def drape(
         start_warp_silently()
         job = OutsideJob.read(scene, sewing=seams, body=body, units=units)
         folder = out if out is not None else Path("out") / f"{job.name}-draped"
-        result = drape_outside(job, folder, fabric=fabric, size=size, device=device, usd=usd, correct=correct)
+        result = drape_outside(
+            job, folder, fabric=fabric, shear_limit=shear_limit, size=size, device=device, usd=usd, correct=correct
+        )
         warnings = warnings_of(result.metrics)
         # What was left out has a line of its own at the end.
         notes = [note for note in result.notes if note not in result.metrics.get("notes", ())]
@@ -108,7 +120,7 @@ def drape(
             raise InputError(
                 f"{option}: is for a pattern's file or a run's folder; {scene} is a scene, which says it itself"
             )
-    loaded = load_scene(scene)
+    loaded = load_scene(scene).allowing(shear_limit)
     if loaded.settings.half:
         raise InputError(f"{scene}: half: a drape needs the whole garment; leave out half = true")
     table = loaded.settings.drape or DrapeTable()

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from warpflat.cli.options import DONE, EXIT_CODES, RUN_FILES, ComputingCommand, output_options
+from warpflat.cli.options import DONE, EXIT_CODES, RUN_FILES, ComputingCommand, output_options, shear_limit_option
 from warpflat.cli.run import report_run, start_warp_silently
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
@@ -66,6 +66,7 @@ _FILES = """\b
 )
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
 @click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
+@shear_limit_option
 @click.option("--bands", metavar="HOW", help="As for warpflat flatten.")
 @click.option("--name", metavar="NAME", help="Name of the files.  [default: the garment's]")
 @click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
@@ -116,7 +117,7 @@ def fit(
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(options["name"] or garment.stem)).strip("_.-") or "garment"
     folder = out if out is not None else Path("out") / f"{name}-fitted"
     tables: dict[str, Any] = {"relax": {}, "output": {"picture": not options["no_picture"]}}
-    for key in ("fabric", "bands"):
+    for key in ("fabric", "shear_limit", "bands"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from warpflat.cli.options import EXIT_CODES, RUN_FILES, ComputingCommand, output_options
+from warpflat.cli.options import EXIT_CODES, RUN_FILES, ComputingCommand, output_options, shear_limit_option
 from warpflat.cli.run import run_and_report
 from warpflat.core.errors import InputError
 from warpflat.core.text import plain_letters, quote_value
@@ -80,6 +80,7 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
 @click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
+@shear_limit_option
 @click.option(
     "--datum",
     "datums",
@@ -197,7 +198,7 @@ def flatten(
     tables["seams_cut"] = [drawn_seam(text) for text in options["cut_seams"]]
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
-    for key in ("name", "fabric", "start", "model", "bands", "bands_shorter"):
+    for key in ("name", "fabric", "shear_limit", "start", "model", "bands", "bands_shorter"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])
@@ -239,6 +240,7 @@ def flatten(
         message = (
             message.replace("command line: find_seams.body", "--body")
             .replace("command line: bands", "--bands")
+            .replace("command line: shear_limit", "--shear-limit")
             .replace("--bands_shorter", "--bands-shorter")
         )
         message = re.sub(

@@ -10,7 +10,16 @@ import click
 
 from warpflat.core.memory_limit import require_memory_for_libraries
 
-__all__ = ["BAD_INPUT", "DONE", "EXIT_CODES", "NOT_CONVERGED", "RUN_FILES", "ComputingCommand", "output_options"]
+__all__ = [
+    "BAD_INPUT",
+    "DONE",
+    "EXIT_CODES",
+    "NOT_CONVERGED",
+    "RUN_FILES",
+    "ComputingCommand",
+    "output_options",
+    "shear_limit_option",
+]
 
 
 DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
@@ -42,6 +51,24 @@ What comes out, in DIR:
 _VERBOSE = click.option(
     "--verbose", "-v", is_flag=True, help="Print the tables of pieces and seams, every note, and all advice on the fit."
 )
+
+
+def _check_shear_limit(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
+    from warpflat.fabric.fabric import check_value
+
+    if value is not None:
+        check_value("shear_limit", value, "--shear-limit")
+    return value
+
+
+shear_limit_option = click.option(
+    "--shear-limit",
+    type=float,
+    metavar="DEGREES",
+    callback=_check_shear_limit,
+    help="How far warp and weft may be off the right angle; tailors trust 5 to 8.  [default: the fabric's]",
+)
+"""The option `--shear-limit` of commands that take a fabric."""
 
 
 class ComputingCommand(click.Command):

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, RUN_FILES, ComputingCommand, output_options
+from warpflat.cli.options import (
+    DONE,
+    EXIT_CODES,
+    NOT_CONVERGED,
+    RUN_FILES,
+    ComputingCommand,
+    output_options,
+    shear_limit_option,
+)
 
 if TYPE_CHECKING:
     from warpflat.scene.load import Scene
@@ -22,8 +30,17 @@ __all__ = ["report_run", "run", "run_and_report", "start_warp_silently"]
 
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
 @click.argument("scene", type=click.Path(path_type=Path))
+@shear_limit_option
 @output_options()
-def run(scene: Path, out: Path | None, quiet: bool, verbose: bool, as_json: bool, device: str | None) -> int:
+def run(
+    scene: Path,
+    out: Path | None,
+    quiet: bool,
+    verbose: bool,
+    as_json: bool,
+    device: str | None,
+    shear_limit: float | None,
+) -> int:
     """Run a scene file.
 
     A scene is a TOML file that names a surface, its feature lines, a fabric and settings; see the folder scenes.
@@ -35,7 +52,8 @@ def run(scene: Path, out: Path | None, quiet: bool, verbose: bool, as_json: bool
     """
     from warpflat.scene.load import load_scene
 
-    return run_and_report(load_scene(scene), out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
+    loaded = load_scene(scene).allowing(shear_limit)
+    return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
 
 
 def run_and_report(

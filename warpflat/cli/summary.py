@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpflat.core.text import energy_words, format_count
-from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words, wearer_words
+from warpflat.flattening.fit_report import STRAINS, garment_wear, no_cut_words, remedy_words, wearer_words
 from warpflat.flattening.progress import relaxation_words
 from warpflat.garment.rings import rings_line
 from warpflat.garment.to_pattern import LACKING
@@ -83,12 +83,12 @@ def summary_lines(
         all_of_it = garment_wear(worn)
         beyond = f"{100 * all_of_it['outside']:.1f} % beyond the limit"
         if all_of_it["fits"]:
-            # The strains along both threads, 5 to 95 % of each piece's cloth, and the highest pressure.
+            # The strains along both threads and the shear, 5 to 95 % of each piece's cloth, and the highest pressure.
             wears, ranges = [piece["wear"] for piece in worn.values()], []
-            for thread in ("warp", "weft"):
-                low = 100 * min(wear[f"strain_{thread}"]["p05"] for wear in wears)
-                high = 100 * max(wear[f"strain_{thread}"]["p95"] for wear in wears)
-                ranges.append(f"{thread} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} %")
+            for key, word, factor, unit in STRAINS:
+                low = factor * min(wear[key]["p05"] for wear in wears)
+                high = factor * max(wear[key]["p95"] for wear in wears)
+                ranges.append(f"{word} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} {unit}")
             highest = max(wear["pressure"]["max"] for wear in wears)
             ranges += [f"at most {highest:,.0f} Pa"] if highest >= 1.0 else []
             lines.append(_clipped(f"{head}: yes; {beyond}; {', '.join(ranges)}", width))

@@ -275,7 +275,7 @@ def edit_table(edit: Mapping[str, Any]) -> str:
 
 def fabric_table(fabrics: Sequence[Fabric]) -> str:
     """Return the fabrics as text, a line each, with units and grades."""
-    head = ("fabric", "kg/m2", "K warp", "K weft", "G [N/m]", "nu", "limit", "grade", "description")
+    head = ("fabric", "kg/m2", "K warp", "K weft", "G [N/m]", "nu", "limit", "shear", "grade", "description")
     rows = []
     used: set[str] = set()
     for fabric in fabrics:
@@ -290,6 +290,7 @@ def fabric_table(fabrics: Sequence[Fabric]) -> str:
                 f"{_estimate_sign(fabric, 'shear_stiffness')}{fabric.shear_stiffness:,.0f}",
                 f"{fabric.poisson_ratio:.2g}",
                 f"{100 * fabric.strain_limit:.3g} %",
+                "-" if fabric.is_isotropic else f"{_estimate_sign(fabric, 'shear_limit')}{fabric.shear_limit:.3g} deg",
                 grades or "-",
                 fabric.description,
             )
@@ -298,11 +299,12 @@ def fabric_table(fabrics: Sequence[Fabric]) -> str:
     grades_text = ", ".join(f"{grade} {GRADES[grade]}" for grade in sorted(used))
     notes = [
         "K: secant tensile stiffness [N/m], G: shear stiffness [N/m per rad]; ~ estimate, > lower bound",
+        "limit, shear: strain, and angle off the right angle, that a pattern may ask of the cloth",
         f"grades: {grades_text}",
         *([f"also known: {', '.join(also)}"] if also else []),
         f"default: {DEFAULT_FABRIC}; test loads and sources: warpflat fabrics NAME",
     ]
-    return "\n".join([_aligned(head, rows, left=(0, 8)), "", *notes])
+    return "\n".join([_aligned(head, rows, left=(0, 9)), "", *notes])
 
 
 def fabric_sheet(fabric: Fabric) -> str:

@@ -29,7 +29,7 @@ from warpflat.surface.paths.lines import line_between
 
 __all__ = ["advise", "contact_note", "cut_between_contacts", "remedies"]
 
-# A line that passes within this distance of the worst place can take the dart for it [m].
+# A line that passes within this distance of the place can take the dart for it [m].
 _NEARBY = 0.03
 # So many cuts are tried, and so many kept.
 _MOST_TRIALS, _KEPT = 8, 3
@@ -94,9 +94,9 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
 
 
 def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
-    """Yield darts and seams along the feature lines that pass near the worst place, then darts from the border to it."""
+    """Yield darts and seams along the feature lines that pass near the place that relieves a misfit, then darts from the border to it."""
     border, points = border_of(result.surface), result.surface.vertices
-    worst = int(result.vertex_origin[misfit.vertex])
+    worst = int(result.vertex_origin[misfit.relieved_at])
     for name, line in result.surface.lines.items():
         row = np.asarray(line)
         if len(row) < 2 or np.isin(row, border).all():

@@ -1,4 +1,4 @@
-"""`drape.png`: a garment on the body from three sides, with maps of gap and strain; `compare-drape.png`: it in several cloths."""
+"""`drape.png`: a garment on the body from three sides, with maps of gap, strain and shear; `compare-drape.png`: it in several cloths."""
 
 from __future__ import annotations
 
@@ -30,32 +30,36 @@ _TALLEST, _TOP, _BOTTOM, _BAR = 8.0, 0.48, 0.05, 0.9
 
 @all_letters()
 def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
-    """Draw the gap to the body and the strain of the threads on the worn garment, each from three sides.
+    """Draw the gap to the body, the strain of the threads and the shear on the worn garment, each from three sides.
 
     Raises:
         InputError: the file cannot be written.
     """
     report_activity(f"drawing {Path(path).name}")
+    gap, strain = 1e3 * _of_faces(drape, drape.gap), _strain(drape)
+    widest = max(5.0, weighted_percentile(gap, drape.face_areas, 0.98))
+    shear, fabric = drape.strains["shear"], drape.cloth.fabric
+    most, most_sheared = (
+        min(limit, max(0.5, weighted_percentile(np.abs(values), drape.face_areas, 0.98)))
+        for values, limit in ((strain, 100.0 * fabric.strain_limit), (shear, fabric.shear_limit))
+    )
+    maps = [
+        ("gap to the body [mm]", gap, 0.0, widest, "YlOrRd"),
+        ("strain of the more strained thread [%]", strain, -most, most, "RdBu_r"),
+        ("shear [degrees]", shear, -most_sheared, most_sheared, "RdBu_r"),
+    ]
     points, facets, skin = _body_around(drape)
     views = [view_from_side(points, facets, degrees) for _, degrees in SIDES]
     room = PAGE_WIDTH - _BAR - 0.2 * (len(views) + 1)
     scale = min(room / sum(float(view.size[0]) for view in views), _TALLEST / float(views[0].size[1]))
     tall = scale * float(views[0].size[1])
-    height = 2 * (tall + _TOP) + _BOTTOM + 0.2
+    height = len(maps) * (tall + _TOP) + _BOTTOM + 0.2
     figure = new_figure(PAGE_WIDTH, height)
     pen = Pen(figure)
     pen.open_page()
     worst = next((place.words for place in drape.places if place.kind != "bridged"), "it lies as designed")
     rest = "" if drape.converged else "NOT AT REST; "
     pen.write(0.3, height - 0.2, f"{drape.cloth.fabric.name}; {rest}{worst}", 11)
-    gap, strain = 1e3 * _of_faces(drape, drape.gap), _strain(drape)
-    widest = max(5.0, weighted_percentile(gap, drape.face_areas, 0.98))
-    limit = 100.0 * drape.cloth.fabric.strain_limit
-    most = min(limit, max(0.5, weighted_percentile(np.abs(strain), drape.face_areas, 0.98)))
-    maps = [
-        ("gap to the body [mm]", gap, 0.0, widest, "YlOrRd"),
-        ("strain of the more strained thread [%]", strain, -most, most, "RdBu_r"),
-    ]
     for row, (title, values, low, high, colours) in enumerate(maps):
         bottom = height - 0.2 - (row + 1) * (tall + _TOP)
         left = 0.3 + 0.5 * (room - scale * sum(float(view.size[0]) for view in views))
@@ -72,7 +76,7 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
 
 @all_letters()
 def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Drape]) -> None:
-    """Draw gap, strain and pressure of each drape from the front, a column per cloth.
+    """Draw gap, strain, shear and pressure of each drape from the front, a column per cloth.
 
     Raises:
         InputError: the file cannot be written.
@@ -108,14 +112,16 @@ def _compared_maps(drapes: Mapping[str, Drape]) -> list[tuple[str, Mapping[str, 
     gap = {name: 1e3 * _of_faces(drape, drape.gap) for name, drape in drapes.items()}
     pressure = {name: 1e-3 * _of_faces(drape, drape.pressure) for name, drape in drapes.items()}
     strain = {name: _strain(drape) for name, drape in drapes.items()}
+    shear = {name: drape.strains["shear"] for name, drape in drapes.items()}
 
     def reach(values: Mapping[str, FloatArray], least: float) -> float:
         return max(least, *(float(np.percentile(np.abs(row), 98.0)) for row in values.values()))
 
-    most = reach(strain, 0.5)
+    most, most_sheared = reach(strain, 0.5), reach(shear, 0.5)
     return [
         ("gap to the body [mm]", gap, 0.0, reach(gap, 5.0), "YlOrRd"),
         ("strain of the more strained thread [%]", strain, -most, most, "RdBu_r"),
+        ("shear [degrees]", shear, -most_sheared, most_sheared, "RdBu_r"),
         ("pressure [kPa]", pressure, 0.0, reach(pressure, 0.1), "YlOrRd"),
     ]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.fabric.limits import Demand
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
@@ -26,9 +27,9 @@ class Place:
     """A connected place where the cloth does not lie as designed.
 
     Attributes:
-        kind: "misfit", "strain", "bridged", or "hang" where the cloth is not meant to touch the body, or is gathered.
+        kind: "misfit", "strain", "shear", "bridged", or "hang" where the cloth is not meant to touch the body, or is gathered.
         line: the feature line or edge next to its worst vertex, "piece.line".
-        worst: the largest distance from the designed surface [m], or strain.
+        worst: the largest distance from the designed surface [m], or strain, or shear [degrees].
         gap: the distance from the body there [m].
         area: flat area [m2].
         words: a sentence.
@@ -63,7 +64,7 @@ def find_places(
     strains: Mapping[str, FloatArray],
     gathered: BoolArray,
 ) -> tuple[Place, ...]:
-    """Find the connected places of misfit, bridged hollows and strain beyond the cloth's limit, the largest first.
+    """Find the connected places of misfit, bridged hollows, and strain and shear beyond the cloth's limits, the largest first.
 
     Args:
         cloth: the sewn cloth.
@@ -72,7 +73,7 @@ def find_places(
         meant_to_touch: #V, true where the cloth was designed to lie on the body; elsewhere a misfit is how it hangs.
         lift: #V, how much farther than designed the cloth is from the body [m].
         gap: #V, the distance from the body [m].
-        strains: #F along warp and weft.
+        strains: #F, along "warp" and "weft", and "shear" [degrees].
         gathered: #V, true where an elastic draws the cloth together.
     """
     found = []
@@ -111,37 +112,38 @@ def find_places(
                         vertex=worst,
                     )
                 )
-    limit = cloth.fabric.strain_limit
-    for direction, values in strains.items():
-        # The mean of the faces at each vertex.
-        used = cloth.faces >= 0
-        vertex, value = cloth.faces[used], np.broadcast_to(values[:, None], used.shape)[used]
-        count = np.bincount(vertex, minlength=len(cloth.designed))
-        at_vertices = np.bincount(vertex, value, minlength=len(cloth.designed)) / np.maximum(count, 1)
-        for part in _parts(cloth, np.abs(at_vertices) > limit):
+    # The mean of the faces at each vertex.
+    used = cloth.faces >= 0
+    vertex = cloth.faces[used]
+    count = np.maximum(np.bincount(vertex, minlength=len(cloth.designed)), 1)
+    at_vertices = [
+        np.bincount(vertex, np.broadcast_to(strains[name][:, None], used.shape)[used], minlength=len(count)) / count
+        for name in ("warp", "weft", "shear")
+    ]
+    demand = Demand.of(cloth.fabric, *at_vertices)
+    for column, beyond in enumerate(demand.beyond_by_way.T):
+        for part in _parts(cloth, beyond):
             if areas[part].sum() >= _LEAST_AREA:
-                worst = int(part[np.abs(at_vertices[part]).argmax()])
-                line, area, strain = _line_at(cloth, worst), float(areas[part].sum()), float(at_vertices[worst])
-                kind, how = "strain", "stretched" if strain > 0.0 else "pressed together"
-                beyond = f", beyond the cloth's limit of {100 * limit:g} %"
-                if strain < 0.0 and gathered[part].any():
-                    kind, how, beyond = "hang", "gathered by its elastic", ""
-                words = (
-                    f"{_called(line)} is {how} by {100 * abs(strain):.1f} % along the {direction}{beyond}, "
-                    f"over {1e4 * area:.0f} cm2"
-                )
+                worst = int(part[np.abs(demand.shares[part, column]).argmax()])
+                line, area, amount = _line_at(cloth, worst), float(areas[part].sum()), demand.amount(worst, column)
+                kind = "shear" if amount.way == "shear" else "strain"
+                how = "pressed together" if amount.state == "slack" else amount.state
+                limit = f", beyond the cloth's limit of {amount.limit_words}"
+                if amount.state != "stretched" and gathered[part].any():
+                    kind, how, limit = "hang", "gathered by its elastic", ""
+                words = f"{_called(line)} is {how} by {amount.words}{limit}, over {1e4 * area:.0f} cm2"
                 found.append(
                     Place(
                         kind=kind,
                         line=line,
-                        worst=strain,
+                        worst=amount.value,
                         gap=float(gap[worst]),
                         area=area,
                         words=words,
                         vertex=worst,
                     )
                 )
-    order = {"misfit": 0, "strain": 1, "hang": 2, "bridged": 3}
+    order = {"misfit": 0, "strain": 1, "shear": 2, "hang": 3, "bridged": 4}
     found.sort(key=lambda place: (order[place.kind], -abs(place.worst) * place.area))
     return tuple(found[:_MOST])
 

@@ -20,6 +20,8 @@ from warpflat.draping.options import DrapeOptions
 from warpflat.draping.places import Place, find_places
 from warpflat.draping.relax_drape import DrapedCloth
 from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.fabric.limits import Demand
+from warpflat.model.strain import shear_angles
 from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
 
@@ -153,20 +155,22 @@ class Drape:
 
     @cached_property
     def strains(self) -> dict[str, FloatArray]:
-        """Strain of each face along warp, weft and the more strained of the two diagonals between them ("bias"), #F each."""
+        """Strain of each face along warp and weft, and shear, the angle by which they are off the right angle [degrees], #F each."""
         corner, face, gradient, area = self.cloth.cells()
         x = self.positions[corner]
         d1, d2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
         warp = d1 * gradient[:, :1] + d2 * gradient[:, 2:3]
         weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
-        both = [np.linalg.norm(warp + sign * weft, axis=1) / np.sqrt(2.0) - 1.0 for sign in (1.0, -1.0)]
-        strains = {
-            "warp": np.linalg.norm(warp, axis=1) - 1.0,
-            "weft": np.linalg.norm(weft, axis=1) - 1.0,
-            "bias": np.where(np.abs(both[0]) > np.abs(both[1]), both[0], both[1]),
-        }
+        along = [np.linalg.norm(threads, axis=1) - 1.0 for threads in (warp, weft)]
+        shear = shear_angles(np.column_stack([*along, (warp * weft).sum(axis=1)]))
+        strains = {"warp": along[0], "weft": along[1], "shear": shear}
         total = np.bincount(face, area)
         return {name: np.bincount(face, area * values) / total for name, values in strains.items()}
+
+    @cached_property
+    def demand(self) -> Demand:
+        """What is asked of each face, as shares of the cloth's limits."""
+        return Demand.of(self.cloth.fabric, *(self.strains[name] for name in ("warp", "weft", "shear")))
 
     @cached_property
     def face_areas(self) -> FloatArray:
@@ -187,8 +191,7 @@ class Drape:
             gathered[self.cloth.lines[line]] = True
         found = find_places(
             self.cloth, self.areas, misfit=self.misfit, meant_to_touch=self.meant_to_touch, bridged=self.bridged,
-            lift=self.gap - self.designed_gap, gap=self.gap,
-            strains={name: self.strains[name] for name in ("warp", "weft")}, gathered=gathered,
+            lift=self.gap - self.designed_gap, gap=self.gap, strains=self.strains, gathered=gathered,
         )  # fmt: skip
         places = []
         for place in found:
@@ -206,12 +209,12 @@ class Drape:
 
     @property
     def fits(self) -> bool:
-        """True if the cloth is at rest and no place is strained beyond its limit, or misfits where it is meant to touch the body.
+        """True if the cloth is at rest and no place is beyond its limits, or misfits where it is meant to touch the body.
 
-        Places of less than 10 cm2 that stand off or fold are told. How it hangs elsewhere is told, too, and is no misfit. Against a
-        body alone, ease is no misfit.
+        Places of less than 10 cm2 that stand off, fold or are sheared are told. How it hangs elsewhere is told, too, and is no misfit.
+        Against a body alone, ease is no misfit.
         """
-        misfits = {"strain"} if self.designed is self.body else {"strain", "misfit"}
+        misfits = {"strain", "shear"} if self.designed is self.body else {"strain", "shear", "misfit"}
         # A misfit or a fold of a few square centimetres is told, cloth stretched beyond its limit counts.
         return self.converged and not any(
             place.kind in misfits and (place.area >= _MISFIT_AREA or (place.kind == "strain" and place.worst > 0.0))
@@ -220,7 +223,7 @@ class Drape:
 
     def measures(self) -> dict[str, Any]:
         """Return the entry `drape` of `metrics.json`."""
-        limit, areas = self.cloth.fabric.strain_limit, self.areas
+        fabric, areas = self.cloth.fabric, self.areas
         found: dict[str, Any] = {
             "converged": self.worn.converged,
             "fits": self.fits,
@@ -229,21 +232,21 @@ class Drape:
             "seconds": self.worn.seconds,
             "vertices": len(self.positions),
             "friction": self.options.friction,
-            "bending_n_m": self.cloth.fabric.bending,
+            "bending_n_m": fabric.bending,
             "compared_with": "body" if self.designed is self.body else "designed surface",
             "distance_m": _spread(self.distance, areas),
             "misfit_m": _spread(self.misfit, areas),
             "bridged_m": _spread(self.bridged, areas),
             "deepest_m": max(0.0, -float(self.gap.min())),
             "gap_m": {line: float(self.gap[ids].max()) for line, ids in self.cloth.lines.items()},
-            "strain_limit": limit,
+            "strain_limit": fabric.strain_limit,
+            "shear_limit": None if fabric.is_isotropic else fabric.shear_limit,
+            "outside": self.demand.outside(self.face_areas),
         }
         for name, values in self.strains.items():
             low, high = weighted_percentiles(values, self.face_areas, [0.05, 0.95])
-            beyond = float(self.face_areas[np.abs(values) > limit].sum() / self.face_areas.sum())
-            found[f"strain_{name}"] = {
-                "p5": low, "p95": high, "min": float(values.min()), "max": float(values.max()), "beyond_limit": beyond,
-            }  # fmt: skip
+            key = name if name == "shear" else f"strain_{name}"
+            found[key] = {"p5": low, "p95": high, "min": float(values.min()), "max": float(values.max())}
         touching = self.worn.pressing > 0.0
         pressure = (
             _spread(self.pressure[touching], areas[touching]) if touching.any() else _spread(np.zeros(1), np.ones(1))

@@ -13,7 +13,18 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, is_number, nearest
 
-__all__ = ["DEFAULT_FABRIC", "GRADES", "Curve", "Fabric", "Provenance", "fabric_called", "grain_axes", "value_names"]
+__all__ = [
+    "DEFAULT_FABRIC",
+    "GRADES",
+    "SHEAR_BY_STRAIN",
+    "Curve",
+    "Fabric",
+    "Provenance",
+    "check_value",
+    "fabric_called",
+    "grain_axes",
+    "value_names",
+]
 
 DEFAULT_FABRIC = "isotropic"
 
@@ -44,7 +55,7 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 # Cloth that may be strained by more than this is a knit.
 _WOVEN_STRAIN = 0.1
 
-# Threads of a medium woven lie side by side, and press on each other, from about this shear angle on [degrees].
+# A medium woven creases from about this shear angle on [degrees].
 _WOVEN_SHEAR = 15.0
 
 
@@ -75,6 +86,12 @@ class Provenance:
         return self.grade == "E"
 
 
+#: Of the limit of shear that nobody gave of a knit or an isotropic sheet.
+SHEAR_BY_STRAIN = Provenance(
+    source="estimate: the shear that lengthens the bias by strain_limit", grade="E", unit="degrees", test_load="none"
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Fabric:
     """A cloth as the flattening sees it: an orthotropic membrane along straight warp and weft threads.
@@ -90,9 +107,10 @@ class Fabric:
             cloth, so 0 unless a source gives one; an isotropic sheet has G = K / (2 (1 + nu)).
         areal_density: mass per area [kg/m2].
         strain_limit: strain a pattern may ask of the cloth, either sign; 0.05 is usual for wovens.
-        shear_limit: angle that warp and weft of a pattern may be off the right angle when worn [degrees], either way;
-            beyond it cloth locks or buckles. Where it is not given, it is an estimate: 15 for wovens; for knits and for
-            isotropic sheets, whose threads do not lock, the angle that lengthens the bias by `strain_limit`.
+        shear_limit: angle that warp and weft of a pattern may be off the right angle when worn [degrees], either way:
+            where creases begin in the flat cloth. From there on it resists as if it locked. Where it is not given, it
+            is an estimate: 15 for wovens; for knits and isotropic sheets, which have no straight threads to lock, the
+            angle that lengthens the bias by `strain_limit`. An isotropic sheet is judged by its principal strains.
         compression_factor: stiffness under in-plane compression over that under tension. Cloth wrinkles instead of
             being pressed together, so less than 1 is real; 1 keeps springs that act alike both ways.
         bending: bending moment per width per curvature, warp and weft averaged [N m]; only a drape needs it. A medium
@@ -127,13 +145,13 @@ class Fabric:
             object.__setattr__(self, "shear_limit", _WOVEN_SHEAR)
         self.validate()
         if estimated:
-            origin = Provenance(source="estimate for wovens", grade="E", unit="degrees")
+            origin = Provenance(source="estimate for wovens", grade="E", unit="degrees", test_load="none")
             if self.is_knit or self.is_isotropic:
                 # Threads that keep their lengths and cross at 90 degrees less g lengthen the bias to sqrt(1 + sin g).
                 limit = math.degrees(math.asin(min((1.0 + self.strain_limit) ** 2 - 1.0, 1.0)))
                 lowest, highest, _ = _RANGES["shear_limit"]
                 object.__setattr__(self, "shear_limit", min(max(limit, lowest), highest))
-                origin = replace(origin, source="estimate: shear that lengthens the bias by strain_limit")
+                origin = SHEAR_BY_STRAIN
             object.__setattr__(self, "provenance", {**self.provenance, "shear_limit": origin})
 
     def validate(self) -> None:
@@ -142,17 +160,8 @@ class Fabric:
         Raises:
             InputError: a value is missing, no number, outside its range, or contradicts another one; names the value.
         """
-        for key, (lowest, highest, unit) in _RANGES.items():
-            value = getattr(self, key)
-            if value is None:
-                raise InputError(f"fabric {self.name!r}: {key} is missing; {_range_text(lowest, highest, unit)}")
-            if not is_number(value):
-                raise InputError(f"fabric {self.name!r}: {key} = {value!r} is not a number")
-            if not lowest <= value <= highest:  # false for NaN too
-                raise InputError(
-                    f"fabric {self.name!r}: {key} = {value:g} {unit}".rstrip()
-                    + f" is out of range; {_range_text(lowest, highest, unit)}{_unit_hint(key, float(value))}"
-                )
+        for key in _RANGES:
+            check_value(key, getattr(self, key), f"fabric {self.name!r}: {key}")
         softer = min(self.stiffness_warp, self.stiffness_weft)
         if self.shear_stiffness > softer:
             raise InputError(
@@ -178,6 +187,22 @@ class Fabric:
                         f"({previous[0]:g}, {previous[1]:g}); strain and tension must both increase from (0, 0)"
                     )
                 previous = (point[0], point[1])
+
+    def allowing(self, shear_limit: float | None) -> Fabric:
+        """Return the fabric with the limit of shear that its maker allows [degrees]; itself for None.
+
+        Raises:
+            InputError: no limit can be that, or the fabric is an isotropic sheet.
+        """
+        if shear_limit is None:
+            return self
+        if self.is_isotropic:
+            raise InputError(
+                f"a limit of shear says nothing of {self.name}, an isotropic sheet, which has no threads; take a cloth, such "
+                "as woven, or leave the limit out"
+            )
+        asked = Provenance(source="asked for", unit="degrees")
+        return replace(self, shear_limit=shear_limit, provenance={**self.provenance, "shear_limit": asked})
 
     @property
     def softness(self) -> float:
@@ -245,6 +270,29 @@ def grain_axes(grain_angle: float) -> tuple[FloatArray, FloatArray]:
     return np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
 
 
+def check_value(key: str, value: object, what: str) -> None:
+    """Check one number of a fabric.
+
+    Args:
+        key: the attribute.
+        value: what it is to be.
+        what: what messages begin with.
+
+    Raises:
+        InputError: it is missing, no number, or out of its range.
+    """
+    lowest, highest, unit = _RANGES[key]
+    valid = f"must lie between {lowest:g} and {highest:g} {unit}".rstrip()
+    if value is None:
+        raise InputError(f"{what} is missing; {valid}")
+    if not is_number(value):
+        raise InputError(f"{what} = {value!r} is not a number")
+    if not lowest <= value <= highest:  # false for NaN too
+        raise InputError(
+            f"{what} = {value:g} {unit}".rstrip() + f" is out of range; {valid}{_unit_hint(key, float(value))}"
+        )
+
+
 def value_names() -> tuple[str, ...]:
     """Return the attributes of a fabric that are measured numbers or curves."""
     return tuple(f.name for f in fields(Fabric) if f.name in _RANGES or f.name.startswith("curve_"))
@@ -252,10 +300,6 @@ def value_names() -> tuple[str, ...]:
 
 def _plain(name: str) -> str:
     return "-".join(name.replace("_", " ").replace("-", " ").lower().split())
-
-
-def _range_text(lowest: float, highest: float, unit: str) -> str:
-    return f"must lie between {lowest:g} and {highest:g} {unit}".rstrip()
 
 
 def _unit_hint(key: str, value: float) -> str:

@@ -15,7 +15,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.toml_file import Table, check_table, read_toml
-from warpflat.fabric.fabric import Fabric, Provenance, fabric_called
+from warpflat.fabric.fabric import SHEAR_BY_STRAIN, Fabric, Provenance, fabric_called
 from warpflat.fabric.instruments import (
     FAST_LOADS,
     GF_PER_CM,
@@ -287,6 +287,9 @@ def fabric_from_table(
             if f"stiffness_{direction}" in given:
                 values.pop(f"curve_{direction}", None)
                 origins.pop(f"curve_{direction}", None)
+        # So would a limit of shear that goes by the base's limit of strain.
+        if "strain_limit" in given and origins.get("shear_limit") == SHEAR_BY_STRAIN:
+            del values["shear_limit"], origins["shear_limit"]
         values.update((key, value) for key, (value, _) in given.items())
         origins.update((key, origin) for key, (_, origin) in given.items())
         for key in ("stiffness_warp", "stiffness_weft", "shear_stiffness", "areal_density"):

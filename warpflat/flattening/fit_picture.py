@@ -22,7 +22,7 @@ from warpflat.core.sums import weighted_percentile
 from warpflat.export.colours import on_cloth
 from warpflat.export.figure import ColouredFaces, new_figure, write_figure
 from warpflat.export.letters import all_letters, is_drawn, titles
-from warpflat.flattening.fit_report import RANGES, pressure_words, remedy_words, strain_words
+from warpflat.flattening.fit_report import RANGES, limit_words, pressure_words, remedy_words, strain_words
 from warpflat.model.fit import MAPS, WornFit
 from warpflat.surface.half_edges import border_edges
 
@@ -36,7 +36,7 @@ OnBody = Mapping[str, FloatArray]
 
 
 # The least range of a scale: below it a map would show rounding.
-_LEAST_SCALE = {"%": 0.5, "N/m": 1.0, "Pa": 1.0}
+_LEAST_SCALE = {"%": 0.5, "degrees": 0.5, "N/m": 1.0, "Pa": 1.0}
 # Strain around the wearer is below 0 where there is ease.
 _BODY_MAPS = {
     "body_strain": ("on the wearer: strain, ease", 100.0, "%"),
@@ -47,9 +47,7 @@ _NOT_AROUND = "#c8c8c8"
 # A map whose values fill less of its scale is described in words.
 _EVEN = 0.1
 # Maps that are compared at a glance share a scale.
-_ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))
-# The fabric's strain limit applies to its threads.
-_LIMITED = _ALIKE[0]
+_ALIKE = (("strain_warp", "strain_weft"), ("shear",), ("tension_warp", "tension_weft"), ("pressure",))
 _BEYOND = "#00a000"
 _MMHG = 133.322  # [Pa]
 
@@ -78,6 +76,11 @@ def _values(fit: WornFit, body: OnBody, name: str) -> FloatArray:
     return np.asarray(_ALL_MAPS[name][1] * (body[name] if name in _BODY_MAPS else getattr(fit, name)))
 
 
+def _limit(fit: WornFit, name: str) -> float:
+    """Return the fabric's limit of a map as its attribute has it; 0 where there is none."""
+    return {"strain_warp": fit.limit, "strain_weft": fit.limit, "shear": fit.shear_limit}.get(name) or 0.0
+
+
 def _scales(
     fits: Sequence[WornFit], groups: Sequence[Sequence[str]], bodies: Sequence[OnBody] = ()
 ) -> dict[str, _Scale]:
@@ -92,7 +95,7 @@ def _scales(
         ]
         values, area = np.concatenate(shown), np.tile(all_area, len(group))
         values, area = values[np.isfinite(values)], area[np.isfinite(values)]
-        limit = 1.2 * factor * max(fit.limit for fit in fits) if group[0] in _LIMITED else 0.0
+        limit = 1.2 * factor * max(_limit(fit, group[0]) for fit in fits)
         if limit > 3.0 * float(np.abs(values).max(initial=0.0)):
             limit = 0.0
         low, high = (weighted_percentile(values, area, share) for share in (0.01, 0.99))
@@ -112,7 +115,7 @@ def _scales(
 
 @all_letters()
 def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None:
-    """Draw strains, tensions and pressure on the pattern in six maps; what lies beyond the fabric's limit is outlined.
+    """Draw strains, shear, tensions and pressure on the pattern in six maps; what lies beyond the fabric's limits is outlined.
 
     Args:
         path: the file, ``*.png``.
@@ -146,11 +149,11 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
         )
         bar.set_label(unit, fontsize=9)
         bar.ax.tick_params(labelsize=8)
-        _mark_limit(bar, name, fit.limit, scales[name])
+        _mark_limit(bar, factor * _limit(fit, name), scales[name])
     beyond = f"does not fit: {100 * fit.outside:.1f} % of the cloth beyond the limit (outlined)"
     verdict = "fits" if fit.fits else beyond
     figure.suptitle(
-        f"{result.surface.name} in {result.fabric.name}, as worn: {verdict}; limit {100 * fit.limit:.3g} %",
+        f"{result.surface.name} in {result.fabric.name}, as worn: {verdict}; limit {limit_words(fit.as_dict())}",
         fontsize=12,
     )
     figure.tight_layout(pad=0.5, h_pad=0.8, w_pad=0.8, rect=(0.0, 0.0, 1.0, 0.985))
@@ -179,7 +182,7 @@ def write_wear_sheet(
     fits = [result.fit for result in results]
     bodies = on_body or [{}] * len(results)
     scales = _scales(fits, [*([name] for name in maps if name in _BODY_MAPS), *_ALIKE], bodies)
-    limit = max(fit.limit for fit in fits)
+    limits = "; ".join(dict.fromkeys(limit_words(fit.as_dict()) for fit in fits))
     top = _TOP
     word = "lies on the form" if on_body else "fits"
     # One axis over the page, in inches: an axis for each map takes longer than all that is drawn in it.
@@ -218,7 +221,7 @@ def write_wear_sheet(
         top += height
     # Draw the title of every column, and below the rows its colour scale.
     for number, name in enumerate(drawn):
-        label, _, unit = _ALL_MAPS[name]
+        label, factor, unit = _ALL_MAPS[name]
         x = _LABEL + number * sheet.column
         figure.text(*sheet.point(x + 0.5 * sheet.column, 0.75), label, ha="center", fontsize=10)
         axis = figure.add_axes(sheet.box(x + 0.2, top + 0.25, sheet.column - 0.4, 0.13))
@@ -226,7 +229,7 @@ def write_wear_sheet(
         bar.ax.tick_params(labelsize=8)
         bar.ax.locator_params(nbins=5)
         bar.set_label(unit, fontsize=9)
-        _mark_limit(bar, name, limit, scales[name])
+        _mark_limit(bar, factor * max(_limit(fit, name) for fit in fits), scales[name])
         if unit == "Pa":
             in_mmhg = (lambda pascals: pascals / _MMHG), (lambda mmhg: mmhg * _MMHG)
             above = bar.ax.secondary_xaxis("top", functions=in_mmhg)
@@ -242,7 +245,7 @@ def write_wear_sheet(
     figure.text(*sheet.point(0.15, 0.32), f"{title} in {fabrics}, as worn: {verdict}", fontsize=13)
     figure.text(
         *sheet.point(0.15, 0.52),
-        f"outlined in green: beyond the cloth's limit of {100 * limit:.3g} %; red is stretched, blue is slack"
+        f"outlined in green: beyond the cloth's limit of {limits}; red is stretched, blue is slack"
         + ("; grey goes not around the wearer; all other maps are against the form" if on_body else ""),
         fontsize=9,
         color="#404040",
@@ -326,7 +329,7 @@ def _draw_map(
     axis.add_artist(ColouredFaces(places, result.faces, _values(result.fit, body, name), mappable))
     _draw_segments(axis, places[strokes.lines], "#808080", 0.4)
     _draw_segments(axis, places[strokes.border], "black", 0.9)
-    if name in _LIMITED:
+    if _limit(result.fit, name):
         _draw_segments(axis, places[strokes.beyond], _BEYOND, 0.7)
     return mappable
 
@@ -338,12 +341,9 @@ def _draw_segments(axis: Axes, segments: FloatArray, colour: str, width: float) 
         axis.add_artist(PathPatch(path, fill=False, edgecolor=colour, linewidth=width, zorder=2))
 
 
-def _mark_limit(bar: Any, name: str, limit: float, scale: _Scale) -> None:
-    """Mark the fabric's limit on the scale of a thread's strain."""
-    if name not in _LIMITED:
-        return
-    for sign in (-1.0, 1.0):
-        at = 100.0 * sign * limit
-        if scale.low < at < scale.high:
+def _mark_limit(bar: Any, limit: float, scale: _Scale) -> None:
+    """Mark the fabric's limit, in the scale's unit, on it; 0 is none."""
+    for at in (-limit, limit):
+        if at and scale.low < at < scale.high:
             draw = bar.ax.axvline if bar.orientation == "horizontal" else bar.ax.axhline
             draw(at, color=_BEYOND, linewidth=1.6)

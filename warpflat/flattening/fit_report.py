@@ -14,9 +14,11 @@ from warpflat.model.wear import Wear
 
 __all__ = [
     "RANGES",
+    "STRAINS",
     "Remedy",
     "fit_lines",
     "garment_wear",
+    "limit_words",
     "no_cut_words",
     "pressure_words",
     "remedy_words",
@@ -29,6 +31,13 @@ __all__ = [
 
 #: The meaning of ranges of strain and pressure.
 RANGES = "5 to 95 % of the cloth [all of it]"
+
+#: The strains of an entry `wear`: its key, the word for it, the factor to the unit shown, and that unit.
+STRAINS = (
+    ("strain_warp", "warp", 100.0, "%"),
+    ("strain_weft", "weft", 100.0, "%"),
+    ("shear", "shear", 1.0, "degrees"),
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,12 +134,18 @@ def no_cut_words(outside: float, *, sewn: bool) -> str:
 
 
 def strain_words(wear: Mapping[str, Any]) -> list[str]:
-    """Return the ranges of strain of an entry `wear`, such as "weft -0.6 to +8.6 % [-2.7 to +20.3]" (see `RANGES`)."""
+    """Return the ranges of strain and shear of an entry `wear`, such as "weft -0.6 to +8.6 % [-2.7 to +20.3]" (see `RANGES`)."""
     found = []
-    for thread in ("warp", "weft"):
-        low, least, most, high = (100 * wear[f"strain_{thread}"][at] for at in ("min", "p05", "p95", "max"))
-        found.append(f"{thread} {least:+.1f} to {most:+.1f} % [{low:+.1f} to {high:+.1f}]")
+    for key, word, factor, unit in STRAINS:
+        low, least, most, high = (factor * wear[key][at] for at in ("min", "p05", "p95", "max"))
+        found.append(f"{word} {least:+.1f} to {most:+.1f} {unit} [{low:+.1f} to {high:+.1f}]")
     return found
+
+
+def limit_words(wear: Mapping[str, Any]) -> str:
+    """Return the limits of an entry `wear`, such as "5 % and 15 degrees"."""
+    shear = "" if wear["shear_limit"] is None else f" and {wear['shear_limit']:.3g} degrees"
+    return f"{100 * wear['strain_limit']:.3g} %{shear}"
 
 
 def pressure_words(wear: Mapping[str, Any]) -> str:
@@ -152,7 +167,7 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         if wear is None:
             continue
         verdict = f"{name}: {word}: {'yes' if wear['fits'] else 'no'}"
-        ranges = f"{', '.join(strain_words(wear))}, limit {100 * wear['strain_limit']:.3g} %"
+        ranges = f"{', '.join(strain_words(wear))}, limit {limit_words(wear)}"
         if pressure := pressure_words(wear):
             ranges += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
         lines.append(f"{verdict} ({ranges})")

@@ -1,4 +1,4 @@
-"""The fit of a pattern when it is worn: strain, tension, pressure, and regions beyond the fabric's limit.
+"""The fit of a pattern when it is worn: strain, shear, tension, pressure, and regions beyond the fabric's limits.
 
 Worn, the cloth lies on the body point for point as it was flattened. Strain and tension follow from that. The pressure
 on the skin is the tension times the curvature of the body along it (Laplace's law).
@@ -19,23 +19,28 @@ from warpflat.core.short_repr import short_repr
 from warpflat.core.sorting import counting_sort
 from warpflat.core.sums import weighted_percentiles
 from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.limits import Amount, Demand
 from warpflat.model.network import SpringNetwork
-from warpflat.model.strain import worn_cell_strain
+from warpflat.model.strain import shear_angles, worn_cell_strain
 from warpflat.model.wear import SKIN_LENGTH, smooth_face_values, thread_curvatures
-from warpflat.surface.connectivity import components
-from warpflat.surface.energy_map import place_in_words
+from warpflat.surface.connectivity import border_of, components
+from warpflat.surface.curvature import curvature_tensors
+from warpflat.surface.energy_map import place_in_words, smooth_to_vertices
 from warpflat.surface.mesh import Surface
 
 __all__ = ["MAPS", "Misfit", "WornFit", "assess_fit", "assess_pattern"]
 
 
-# A pattern fits if less than this share of its cloth is strained beyond the limit: a corner's last face may be.
+# A pattern fits if less than this share of its cloth is strained or sheared beyond a limit: a corner's last face may be.
 TOLERATED = 0.01
+
+# Curvature that shears cloth is gathered over so far [m].
+_CURVED_OVER = 0.03
 
 MAPS: dict[str, tuple[str, float, str]] = {
     "strain_warp": ("worn strain along warp", 100.0, "%"),
     "strain_weft": ("worn strain along weft", 100.0, "%"),
-    "strain_bias": ("worn strain on the bias", 100.0, "%"),
+    "shear": ("shear, as worn", 1.0, "degrees"),
     "tension_warp": ("tension along warp", 1.0, "N/m"),
     "tension_weft": ("tension along weft", 1.0, "N/m"),
     "pressure": ("pressure on the skin", 1.0, "Pa"),
@@ -45,33 +50,49 @@ MAPS: dict[str, tuple[str, float, str]] = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Misfit:
-    """A connected region of cloth that is strained beyond the fabric's limit.
+    """A connected region of cloth that is beyond a limit of the fabric.
 
     Attributes:
         surface: whose cloth.
         faces: of the region.
         area: flat [m2].
-        worst: the strain furthest beyond the limit. limit: the fabric's.
-        thread: "warp" or "weft".
-        vertex: a corner of the worst face.
+        worst: what is asked of the cloth at its worst face, and the limit.
+        vertex: a corner of that face.
     """
 
     surface: Surface = field(repr=False)
     faces: IntArray
     area: float
-    worst: float
-    limit: float
-    thread: str
+    worst: Amount
     vertex: int
 
     @cached_property
     def words(self) -> str:
         """The misfit and its place in words, for a pattern maker."""
-        state = "stretched" if self.worst > 0 else "slack"
+        worst = self.worst
         return (
-            f"{state} {100 * abs(self.worst):.1f} % along {self.thread} (limit {100 * self.limit:.3g} %), "
-            f"{place_in_words(self.surface, self.vertex)}; {1e4 * self.area:.3g} cm2 beyond the limit"
+            f"{worst.state} {worst.words} (limit {worst.limit_words}), {place_in_words(self.surface, self.vertex)}; "
+            f"{1e4 * self.area:.3g} cm2 beyond the limit"
         )
+
+    @cached_property
+    def relieved_at(self) -> int:
+        """The vertex where a cut relieves it: the worst one of strained threads, and of sheared ones what is curved between them.
+
+        Threads that keep their lengths u, v are sheared by the curvature K that lies between them, d2 shear / du dv = -K
+        (Chebyshev 1878), and most of all far from it. Within twice the region's width the place of most curvature is taken.
+        """
+        if self.worst.way != "shear":
+            return self.vertex
+        points = self.surface.vertices
+        tensors = curvature_tensors(self.surface)
+        gaussian = 0.5 * np.abs(np.trace(tensors, axis1=1, axis2=2) ** 2 - (tensors**2).sum(axis=(1, 2)))
+        used = self.surface.faces >= 0
+        of_faces = np.where(used, gaussian[self.surface.faces], 0.0).sum(axis=1) / used.sum(axis=1)
+        curved = smooth_to_vertices(self.surface, of_faces, smoothing_length=_CURVED_OVER)
+        curved[np.linalg.norm(points - points[self.vertex], axis=1) > 2.0 * np.sqrt(self.area)] = 0.0
+        curved[border_of(self.surface)] = 0.0
+        return int(curved.argmax()) if curved.any() else self.vertex
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,14 +101,12 @@ class WornFit:
 
     Attributes:
         strain_warp, strain_weft: length on the body over length flat, minus 1.
-        strain_bias: the larger of those along both bisectors of warp and weft.
-        shear: angle by which warp and weft are off the right angle [rad].
+        shear: angle by which warp and weft are off the right angle [degrees].
         tension_warp, tension_weft: force along the threads per width of the cloth as worn [N/m].
         pressure: on the skin [Pa]; 0 where the body is hollow and the cloth would lift off.
         area: flat [m2].
-        limit: the fabric's.
-        misfits: regions beyond the limit, largest first.
-        outside: share of the flat area that is beyond the limit.
+        demand: what is asked of each face, as shares of the fabric's limits.
+        misfits: regions beyond a limit, largest first.
         hollow: share of the flat area where the tension would lift the cloth off.
     """
 
@@ -95,24 +114,37 @@ class WornFit:
 
     strain_warp: FloatArray
     strain_weft: FloatArray
-    strain_bias: FloatArray
     shear: FloatArray
     tension_warp: FloatArray
     tension_weft: FloatArray
     pressure: FloatArray
     area: FloatArray
-    limit: float
+    demand: Demand
     misfits: tuple[Misfit, ...] = field(default=())
-    outside: float = 0.0
     hollow: float = 0.0
 
     @property
+    def limit(self) -> float:
+        """The fabric's limit of strain."""
+        return self.demand.fabric.strain_limit
+
+    @property
+    def shear_limit(self) -> float | None:
+        """The fabric's limit of shear [degrees]; None of an isotropic sheet, which has no threads."""
+        return None if self.demand.fabric.is_isotropic else self.demand.fabric.shear_limit
+
+    @cached_property
+    def outside(self) -> float:
+        """The share of the flat area that is beyond a limit; a place counts once, whichever limit it is."""
+        return self.demand.outside(self.area)
+
+    @property
     def fits(self) -> bool:
-        """True if at most 1 % of the cloth is strained beyond the fabric's limit, stretched or slack."""
+        """True if at most 1 % of the cloth is beyond the fabric's limits: stretched, slack or sheared."""
         return self.outside <= TOLERATED
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the entries for `metrics.json`: fractions, N/m and Pa, with percentiles by area, extremes and mean."""
+        """Return the entries for `metrics.json`: fractions, degrees, N/m and Pa, with percentiles by area, extremes and mean."""
         distributions = {}
         for name in MAPS:
             values, percents = getattr(self, name), (5, 50, 95)
@@ -123,6 +155,7 @@ class WornFit:
         return {
             "fits": self.fits,
             "strain_limit": self.limit,
+            "shear_limit": self.shear_limit,
             "outside": self.outside,
             "hollow": self.hollow,
             "where_not": [misfit.words for misfit in self.misfits[:3]],
@@ -166,9 +199,6 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     spread = np.maximum(np.sqrt(np.maximum((lengths[:, 0] * lengths[:, 1]) ** 2 - strain[:, 2] ** 2, 0.0)), 1e-12)
     pull = stress[:, :2] * lengths / spread[:, None]
     load = pull[:, 0] * along_warp + pull[:, 1] * along_weft + 2.0 * stress[:, 2] * crossed / spread
-    unit = lengths[:, 0] ** 2 + lengths[:, 1] ** 2
-    bias = np.sqrt(np.maximum(0.5 * (unit + 2.0 * np.abs(strain[:, 2])), 0.0)) - 1.0
-    sine = np.clip(strain[:, 2] / np.maximum(lengths[:, 0] * lengths[:, 1], 1e-12), -1.0, 1.0)
 
     face, faces = network.cell_arrays.face, len(surface.faces)
     face_area = np.bincount(face, area, minlength=faces).astype(np.float64)
@@ -178,49 +208,42 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         return np.asarray(np.divide(total, face_area, out=np.zeros(faces), where=face_area > 0.0))
 
     weight = np.maximum(face_area, 0.0)
-    strain_warp, strain_weft = mean(strain[:, 0]), mean(strain[:, 1])
-    strain_bias, shear = mean(bias), mean(np.arcsin(sine))
+    strain_warp, strain_weft, shear = mean(strain[:, 0]), mean(strain[:, 1]), mean(shear_angles(strain))
     tension_warp, tension_weft, loaded = mean(pull[:, 0]), mean(pull[:, 1]), mean(load)
     # A million faces of them take a tenth of a gigabyte each, and the smoothing more.
-    del strain, stress, lengths, spread, pull, load, unit, bias, sine, along_warp, along_weft, crossed
+    del strain, stress, lengths, spread, pull, load, along_warp, along_weft, crossed
     pressure = smooth_face_values(surface, loaded, smoothing_length)
-    excess = np.maximum(np.abs(strain_warp), np.abs(strain_weft)) - fabric.strain_limit
+    demand = Demand.of(fabric, strain_warp, strain_weft, shear)
     total_area = max(float(weight.sum()), 1e-300)
-    # Regions that are held beyond the limit, the largest first.
-    outside, misfits = np.flatnonzero(excess > 1e-9), list[Misfit]()
+    # Regions that are held beyond a limit, the largest first.
+    outside, misfits = np.flatnonzero(demand.beyond), list[Misfit]()
     if len(outside):
         part = components(surface.faces[outside])
         count = int(part.max()) + 1
         order, begin = counting_sort(part.astype(np.int32), count)
         members = outside[order].astype(np.int32)
         regions = np.bincount(part, weight[outside], minlength=count)
-        # Of each region the face of the largest excess, and of several the first.
-        worst = outside[np.lexsort((-excess[outside], part))[begin[:-1]]]
-        on_warp = np.abs(strain_warp[worst]) >= np.abs(strain_weft[worst])
-        largest = np.where(on_warp, strain_warp[worst], strain_weft[worst])
+        # Of each region the face of which most is asked, and of several the first.
+        worst = outside[np.lexsort((-demand.most[outside], part))[begin[:-1]]]
         for k in np.argsort(-regions, kind="stable").tolist():
             misfits.append(
                 Misfit(
                     surface=surface,
                     faces=members[begin[k] : begin[k + 1]],
                     area=float(regions[k]),
-                    worst=float(largest[k]),
-                    limit=fabric.strain_limit,
-                    thread="warp" if on_warp[k] else "weft",
+                    worst=demand.amount(int(worst[k])),
                     vertex=int(surface.faces[worst[k], 0]),
                 )
             )
     return WornFit(
         strain_warp=strain_warp,
         strain_weft=strain_weft,
-        strain_bias=strain_bias,
         shear=shear,
         tension_warp=tension_warp,
         tension_weft=tension_weft,
         pressure=np.maximum(pressure, 0.0),
         area=weight,
-        limit=fabric.strain_limit,
+        demand=demand,
         misfits=tuple(misfits),
-        outside=float(weight[outside].sum()) / total_area,
         hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
     )

@@ -29,6 +29,7 @@ __all__ = [
     "WornStrain",
     "face_areas",
     "layout_errors",
+    "shear_angles",
     "strain_energy",
     "worn_cell_strain",
     "worn_strain",
@@ -44,7 +45,7 @@ class WornStrain:
     """Worn strain, stress and energy of each face, means over its cells by flat area.
 
     Attributes:
-        strain: #F by 3: along warp, along weft, shear angle [1, 1, rad].
+        strain: #F by 3: along warp, along weft, and shear, the product of the worn threads' directions [1].
         stress: #F by 3: sigma_warp, sigma_weft, tau [N/m].
         energy: #F, strain energy, paper eq. (3) [J].
         area: #F, flat area [m2].
@@ -77,6 +78,16 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
     strain, stress, energy, area = faces = _worn_arrays(len(offset) - 1, device)
     launch_each(average_over_faces, len(offset) - 1, cells, faces, device=device)
     return WornStrain(strain=strain.numpy(), stress=stress.numpy(), energy=energy.numpy(), area=area.numpy())
+
+
+def shear_angles(strain: FloatArray) -> FloatArray:
+    """Return the angles by which worn warp and weft are off the right angle, #C [degrees].
+
+    Args:
+        strain: #C by 3: along warp, along weft, and shear, the product F e_warp . F e_weft.
+    """
+    lengths = np.maximum((1.0 + strain[:, 0]) * (1.0 + strain[:, 1]), 1e-12)
+    return np.asarray(np.degrees(np.arcsin(np.clip(strain[:, 2] / lengths, -1.0, 1.0))))
 
 
 def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:

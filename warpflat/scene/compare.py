@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.cutting.remedies import advise
+from warpflat.flattening.fit_report import STRAINS
 from warpflat.flattening.progress import Progress
 from warpflat.garment.garment import Garment
 from warpflat.scene.comparison import Comparison
@@ -124,17 +126,13 @@ def comparison_table(comparison: Comparison) -> str:
         distances = list(comparison.distances(piece).values())
         measures = [comparison.results[fabric][piece].measures for fabric in comparison.fabrics]
         borders = [comparison.borders(fabric, piece) for fabric in comparison.fabrics]
-        worn = [(thread, [m["wear"][f"strain_{thread}"] for m in measures]) for thread in ("warp", "weft")]
         rows = [
             ("area [cm2]", [f"{1e4 * m['area_m2']:.1f}" for m in measures]),
             *((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]) for name in borders[0]),
             ("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]),
             ("model energy [mJ]", [f"{1e3 * m['model_energy_j']:.4g}" for m in measures]),
             ("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]),
-            *(
-                (f"strain {thread} [%]", [f"{100 * of['min']:+.1f} to {100 * of['max']:+.1f}" for of in each])
-                for thread, each in worn
-            ),
+            *_strain_rows([m["wear"] for m in measures], "min", "max"),
             ("beyond limit [%]", [f"{100 * m['wear']['outside']:.1f}" for m in measures]),
             ("fits", ["yes" if m["wear"]["fits"] else "no" for m in measures]),
             ("converged", ["yes" if m["converged"] else "NO" for m in measures]),
@@ -148,11 +146,6 @@ def comparison_table(comparison: Comparison) -> str:
         def millimetres(key: str, part: str) -> list[str]:
             return [f"{1e3 * m[key][part]:.1f}" for m in found]
 
-        def strains(thread: str) -> list[str]:
-            return [
-                f"{100 * m[f'strain_{thread}']['p5']:+.1f} to {100 * m[f'strain_{thread}']['p95']:+.1f}" for m in found
-            ]
-
         blocks.append(
             _columns(
                 "worn",
@@ -163,7 +156,8 @@ def comparison_table(comparison: Comparison) -> str:
                     ("distance, mean [mm]", millimetres("distance_m", "mean")),
                     ("misfit, mean [mm]", millimetres("misfit_m", "mean")),
                     ("misfit, most [mm]", millimetres("misfit_m", "max")),
-                    *((f"strain {thread} [%]", strains(thread)) for thread in ("warp", "weft", "bias")),
+                    *_strain_rows(found, "p5", "p95"),
+                    ("beyond limit [%]", [f"{100 * m['outside']:.1f}" for m in found]),
                     ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
                     ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
                     ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
@@ -174,6 +168,17 @@ def comparison_table(comparison: Comparison) -> str:
         )
     note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
     return "\n\n".join(blocks) + f"\n\n{note}"
+
+
+def _strain_rows(measures: Sequence[Mapping[str, Any]], low: str, high: str) -> list[tuple[str, list[str]]]:
+    """Return a row each for warp, weft and shear, from one key of an entry to another."""
+    return [
+        (
+            f"{word if unit == 'degrees' else f'strain {word}'} [{unit}]",
+            [f"{factor * each[key][low]:+.1f} to {factor * each[key][high]:+.1f}" for each in measures],
+        )
+        for key, word, factor, unit in STRAINS
+    ]
 
 
 def _columns(title: str, fabrics: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:

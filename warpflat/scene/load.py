@@ -54,6 +54,12 @@ class Scene:
     where: str
     sources: tuple[Path, ...] = ()
 
+    def allowing(self, shear_limit: float | None) -> Scene:
+        """Return the scene with a limit of shear in place of its own [degrees]; itself for None."""
+        if shear_limit is None:
+            return self
+        return replace(self, settings=self.settings.model_copy(update={"shear_limit": shear_limit}))
+
 
 def load_scene(path: str | Path) -> Scene:
     """Load the scene of a TOML file.
@@ -92,7 +98,7 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
 
 
 def scene_fabric(scene: Scene) -> Fabric:
-    """Return the scene's fabric.
+    """Return the scene's fabric, with the limit of shear that the scene allows.
 
     Raises:
         InputError: an unknown name (names the nearest), or impossible values.
@@ -102,9 +108,12 @@ def scene_fabric(scene: Scene) -> Fabric:
         files = [scene.folder / expand_variables(file) for file in settings.fabric_files]
     library = load_library(files)
     if isinstance(settings.fabric, FabricTable):
-        return fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
-    with errors_named(f"{scene.where}: fabric"):
-        return find_fabric(settings.fabric, library)
+        fabric = fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
+    else:
+        with errors_named(f"{scene.where}: fabric"):
+            fabric = find_fabric(settings.fabric, library)
+    with errors_named(f"{scene.where}: shear_limit"):
+        return fabric.allowing(settings.shear_limit)
 
 
 def scene_wear(scene: Scene) -> Wear | None:

@@ -303,6 +303,7 @@ def drape_outside(
     out: str | Path,
     *,
     fabric: str | None = None,
+    shear_limit: float | None = None,
     size: str | None = None,
     device: str | None = None,
     usd: bool = False,
@@ -317,6 +318,7 @@ def drape_outside(
         job: what is draped.
         out: folder for the files, made if need be.
         fabric: a name, before that of the sewing file and of the pattern; "woven" if none of them says one.
+        shear_limit: in place of the fabric's [degrees].
         size: of the pattern; its sample size if not given.
         device: Warp device.
         usd: whether `worn.usdc` is written, too.
@@ -339,6 +341,7 @@ def drape_outside(
 
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
+    cloth = cloth.allowing(shear_limit)
     options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
     usd = usd or table.usd
     names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc", *(["worn.usdc"] if usd else [])]

@@ -745,6 +745,7 @@ class SceneTable(Table):
         Discriminator(text_or_table),
     ] = DEFAULT_FABRIC
     fabric_files: list[str] = Field(default_factory=list)
+    shear_limit: float | None = None
     surface: (
         Annotated[
             Annotated[FileSurface, Tag("from-file")] | Annotated[ShapeSurface, Tag("by-formula")],

@@ -712,7 +712,7 @@ def _candidates(
             name = "centre front" if ahead else "centre back"
             yield _Candidate(name=name, normal=anatomy.normal, point=anatomy.offset * anatomy.normal, parts=True)
         tall = float(np.ptp(heights))
-        level = float(np.average(heights[[m.vertex for m in misfits]], weights=[m.area for m in misfits]))
+        level = float(np.average(heights[[m.relieved_at for m in misfits]], weights=[m.area for m in misfits]))
         name, waist = "waist" if tall > 0.8 * size else "yoke", options.waist_along(anatomy.up)
         if waist is not None and 0.2 * tall < waist - heights.min() < 0.8 * tall:
             # Where the body has it.
@@ -730,7 +730,7 @@ def _candidates(
             )
     if may_part and misfits:
         # Further lines of the families to which centre and side belong: through the place that is strained the most, and half way.
-        place = max(misfits, key=lambda one: one.area).vertex
+        place = max(misfits, key=lambda one: one.area).relieved_at
         at = int(piece.mesh.vertex_of[place])
         for field, name in ((LEFT, "princess"), (FACING, "panel")):
             if field not in cloth.values or (sleeve and field == LEFT):
@@ -754,8 +754,8 @@ def _candidates(
     for misfit in sorted(misfits, key=lambda one: -one.area)[:_PLACES]:
         if misfit.area < _HEARD * heard:
             continue
-        place = surface.vertices[misfit.vertex]
-        beside = (surface.faces[:, :3] == misfit.vertex).any(axis=1)
+        place = surface.vertices[misfit.relieved_at]
+        beside = (surface.faces[:, :3] == misfit.relieved_at).any(axis=1)
         normal = normals[beside].mean(axis=0)
         away = np.linalg.norm(rim - place, axis=1)
         # The nearest places of the border, each in another direction.

@@ -12,6 +12,7 @@ from warpflat.core.sums import weighted_percentile
 from warpflat.draping.result import Drape
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
 from warpflat.export.geometry import corner_average, face_areas
+from warpflat.model.strain import shear_angles
 from warpflat.studio.frame import PieceFrame
 
 __all__ = ["MAPS", "Scale", "drape_gaps", "drape_scale", "face_values", "piece_scale", "vertex_values"]
@@ -21,9 +22,10 @@ MAPS: Mapping[str, str] = {
     "energy": "strain energy [J/m²]",
     "warp": "strain along the warp, as worn [%]",
     "weft": "strain along the weft, as worn [%]",
+    "shear": "shear, as worn [degrees]",
     "drape": "drape: gap to the body [mm]",
 }
-# Strains beyond what 98 % of the cloth has get the last colour; a map of less than this shows nothing [%].
+# Strains beyond what 98 % of the cloth has get the last colour; a map of less than this shows nothing [%, degrees].
 _SHARE, _LEAST_STRAIN = 0.98, 0.01
 _LEAST_GAP = 5.0
 # Blue is cloth that is pushed together, red is cloth that is stretched (ColorBrewer's RdBu and YlOrRd).
@@ -62,7 +64,8 @@ def face_values(kind: str, frame: PieceFrame) -> FloatArray:
     """Return the values of a map of a piece, #F, in the map's unit."""
     if kind == "energy":
         return frame.worn.energy_density
-    return 100.0 * frame.worn.strain[:, 0 if kind == "warp" else 1]
+    strain = frame.worn.strain
+    return shear_angles(strain) if kind == "shear" else 100.0 * strain[:, 0 if kind == "warp" else 1]
 
 
 def piece_scale(kind: str, frames: Iterable[PieceFrame]) -> Scale:
