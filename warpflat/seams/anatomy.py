@@ -68,8 +68,8 @@ _WAISTED, _BELOW_WAIST = 0.93, 0.3
 _WAVES, _LONG = 1.25, 0.8
 # Around a neck that is no longer [m], this upper share of a poncho lies level by this (mean cosine).
 _NECKS, _SHOULDERS, _LIES = 0.62, 0.35, 0.5
-# The trunk of a newborn is so long, and so far around its widest opening [m]; what is shorter than the third ends at the thigh, where a leg's
-# girth is this share of the waist's.
+# The trunk of a newborn is so long, and so far around its widest opening [m]. What is shorter than the third ends at the thigh, where a
+# leg's girth is this share of the waist's.
 _LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
 # Openings around heads, and around wrists and ankles, are so long [m]; a hand is no thicker than this share of its width.
 _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
@@ -205,7 +205,7 @@ def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
     low, tall = float(heights.min()), max(float(np.ptp(heights)), 1e-300)
 
     def end(role: str, highest: bool) -> float:
-        """Return the girth of what ends the trunk [m]: of a circle as large as the border, or the length of the end of an opening in front."""
+        """Return the girth of the trunk's end [m]: of a circle as large as its border; of an opening in front, the length there."""
         own = anatomy.border(role)
         if own is not None:
             return own.length * float(np.sqrt(np.linalg.norm(own.normal)))

@@ -43,7 +43,7 @@ _BAND_AREA, _BAND = 0.12, 27.0
 # It runs along an opening by at least this share of its border: a panel of a leg only ends there.
 _ALONG = 0.2
 #: What a band is called, by the border along which it runs.
-BANDS = {"waist": "waistband", "neck": "neck_band", "sleeve": "cuff", "leg": "cuff"}
+BANDS = {"waist": "waistband", "neck": "neck_band", "hem": "hem_band", "sleeve": "cuff", "leg": "cuff"}
 
 # Pieces are alike if sizes, outlines and extents agree within this share.
 _ALIKE = 0.015
@@ -227,7 +227,13 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         what=describe(anatomy),
         up=axis_name(anatomy.up),
         front=axis_name(anatomy.front),
-        notes=(*notes, *turned, *([moved] if moved else []), *(() if anatomy.kind in TAILORED else _alike(pieces)), *anatomy.notes),
+        notes=(
+            *notes,
+            *turned,
+            *([moved] if moved else []),
+            *(() if anatomy.kind in TAILORED else _alike(pieces)),
+            *anatomy.notes,
+        ),
     )
 
 

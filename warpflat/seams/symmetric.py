@@ -93,7 +93,7 @@ def _nearest_on_loop(loop: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
-    """Return the left half of an averaged cloth with its seams, and its mirror image, vertex by vertex; else the cloth, and why it is left so.
+    """Return the left half of an averaged cloth with its seams, and its mirror image, vertex by vertex; else the cloth, and why.
 
     The halves meet where a harmonic field between the sides is zero, which is one line even in folds and at a crotch; it moves into the
     plane of symmetry, and the cloth beside it by less and less.
@@ -159,11 +159,12 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
     operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     lateral = cloth.vertices @ anatomy.normal - anatomy.offset
     heights = cloth.vertices @ anatomy.up
-    level = np.clip(((heights - heights.min()) / max(np.ptp(heights), 1e-300) * _LEVELS).astype(np.int64), 0, _LEVELS - 1)
+    level = np.clip(
+        ((heights - heights.min()) / max(np.ptp(heights), 1e-300) * _LEVELS).astype(np.int64), 0, _LEVELS - 1
+    )
     farthest = np.zeros(_LEVELS)
     np.maximum.at(farthest, level, np.abs(lateral))
     far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], _FADE * anatomy.size))
-    given = np.sign(lateral[far])
     edges = cloth.half_edges.edges.astype(np.int64)
     # Where edges lie in the plane but for rounding, and along seams that keep near to it.
     exact = edges[(np.abs(lateral[edges]) < 1e-6 * anatomy.size).all(axis=1)]
