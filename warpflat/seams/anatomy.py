@@ -499,12 +499,12 @@ def _kind(
     """Return the kind, the borders with their roles, and whether the front is open."""
     low, high = float(heights.min()), float(heights.max())
     tall = max(high - low, 1e-300)
-    middles = [border.length for border in borders if border.role == "middle"]
+    around = [border.length for border in borders if border.role == "middle"]
     # No arm and no leg is as thin as that; what has one more opening alone, and ends at the thigh, is as wide as a thigh.
-    thigh = _THIGH * middles[0] if len(middles) == 1 and tall < _TO_THE_THIGH else 0.0
+    thigh = _THIGH * around[0] if len(around) == 1 and tall < _TO_THE_THIGH else 0.0
     thin = max(_HANDS[0], thigh)
     limbs = [i for i, border in enumerate(borders) if border.role == "limb" and border.length > thin]
-    if tall < _LEAST_BODY[0] or (len(limbs) < 4 and max(middles, default=0.0) < _LEAST_BODY[1]):
+    if tall < _LEAST_BODY[0] or (len(limbs) < 4 and max(around, default=0.0) < _LEAST_BODY[1]):
         limbs = []
     borders = [
         replace(border, role="hole", side=0) if border.role == "limb" and i not in limbs else border

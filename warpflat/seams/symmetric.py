@@ -188,8 +188,8 @@ def _changes_sign(cloth: Cloth, field: FloatArray, line: Ids) -> bool:
     key = he.edges[:, 0] * stride + he.edges[:, 1]
     beside = np.flatnonzero(np.isin(key, own[:, 0] * stride + own[:, 1])[he.edge])
     third = cloth.faces[he.face[beside]].sum(axis=1) - he.tail[beside] - he.head[beside]
-    signs = [np.unique(he.edge[beside[chosen]]) for chosen in (field[third] > 0.0, field[third] < 0.0)]
-    return 2 * len(np.intersect1d(*signs)) > len(own)
+    left, right = (np.unique(he.edge[beside[chosen]]) for chosen in (field[third] > 0.0, field[third] < 0.0))
+    return 2 * len(np.intersect1d(left, right)) > len(own)
 
 
 def _sleeve_mates(anatomy: Anatomy) -> dict[int, int]:
