@@ -1,6 +1,6 @@
 """Is there a lower minimum? Pieces are flattened from many starts, and the least admissible energy is compared with that of `flatten`.
 
-    OMP_NUM_THREADS=1 python benchmarks/minima.py [FILES] [--only TEXT] [--fabric isotropic] [--model springs]
+    OMP_NUM_THREADS=1 python benchmarks/minima.py [FILES] [--only TEXT] [--fabric isotropic] [--model membrane]
 
 A layout is admissible if it is at rest, mirrors no face, lies nowhere over itself and keeps the chord of its datum upright. Starts: the
 development, the least-squares conformal map (with libigl), a harmonic map onto a disk, as-rigid iterations from these, and the layout of
@@ -189,7 +189,7 @@ def main() -> None:
     parser.add_argument("--units", default="m", help="of files that carry none")
     parser.add_argument("--only", default="", metavar="TEXT", help="meshes whose name contains it")
     parser.add_argument("--fabric", default="isotropic")
-    parser.add_argument("--model", choices=["springs", "membrane"], default="springs")
+    parser.add_argument("--model", choices=["auto", "springs", "membrane"], default="auto")
     parser.add_argument("--each", action="store_true", help="also print the energy from each start")
     chosen = parser.parse_args()
     wp.config.quiet = True

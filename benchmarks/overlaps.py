@@ -1,6 +1,6 @@
 """Pieces that would lie over themselves: is a pattern drawn, and what does contact cost?
 
-    OMP_NUM_THREADS=1 python benchmarks/overlaps.py [FILES] [--fabric isotropic] [--gap 0.5] [--model springs] [--picture FOLDER]
+    OMP_NUM_THREADS=1 python benchmarks/overlaps.py [FILES] [--fabric isotropic] [--gap 0.5] [--model membrane] [--picture FOLDER]
 
 Without files: a family of curled strips, spirals, horseshoes, slit disks and fronts with two legs, and `trouser_front.obj` of
 WARPFLAT_DATA (or ../shared/data). Price: the model energy with contact less that without. Least gap: between border places that have the
@@ -95,7 +95,7 @@ def main() -> None:
     parser.add_argument("files", nargs="*", metavar="FILES")
     parser.add_argument("--units", default="m", help="of files that carry none")
     parser.add_argument("--fabric", default="isotropic")
-    parser.add_argument("--model", choices=["springs", "membrane"], default="springs")
+    parser.add_argument("--model", choices=["auto", "springs", "membrane"], default="auto")
     parser.add_argument("--gap", type=float, default=0.5, metavar="MM")
     parser.add_argument("--picture", type=Path, metavar="FOLDER", help="also draw each piece")
     chosen = parser.parse_args()

@@ -43,7 +43,7 @@ def main() -> None:
     parser.add_argument("--shear", nargs="+", type=float, default=[200.0, 20.0], help="G [N/m]")
     parser.add_argument("--cells", nargs="+", choices=["quads", "triangles"], default=["quads", "triangles"])
     parser.add_argument("--resolutions", nargs="+", type=int, default=[33, 65, 129, 257])
-    parser.add_argument("--model", default="springs", choices=["springs", "membrane"])
+    parser.add_argument("--model", default="auto", choices=["auto", "springs", "membrane"])
     parser.add_argument("--residual", type=float, default=1e-4, help="where relaxations stop")
     arguments = parser.parse_args()
     steps = [f"{a}>{b}" for a, b in pairwise(arguments.resolutions)]

@@ -49,7 +49,7 @@ from warpflat.surface.triangles import triangulate
 FloatArray = NDArray[np.float64]
 
 ALLOWANCE = 1.001
-# Isotropic (G = K / 2 / (1 + nu)), so that no direction matters and springs of triangles have k = K A / L^2.
+# Isotropic (G = K / 2 / (1 + nu)), so that no direction matters.
 CLOTH = warpflat.Fabric(
     name="isotropic cloth",
     stiffness_warp=1000.0,

@@ -32,7 +32,6 @@ class Cells:
     offset: #V+1, where each vertex's entries in `slot` begin.
     slot: 4 times the face plus the corner, for every face around a vertex.
     slack: #F, along warp and weft, 1 over the intended stretch of the worn cloth; 1 where none is intended.
-    onset: #F, worn stretch along warp and weft at which the guard begins to act.
     shear: #F, a direction in the plane times the fourth root of the shear stiffness that the springs of a long quad
         lack there [N/m]; zero for any other face.
     hourglass: #F, weights of a quad's corners in its hourglass mode [(N/m)^1/2]; zero for most.
@@ -44,7 +43,6 @@ class Cells:
     offset: wp.array(dtype=wp.int32)
     slot: wp.array(dtype=wp.int32)
     slack: wp.array(dtype=wp.vec2d)
-    onset: wp.array(dtype=wp.vec2d)
     shear: wp.array(dtype=wp.vec2d)
     hourglass: wp.array(dtype=wp.vec4d)
 

@@ -46,6 +46,7 @@ class ThreadGuard:
 
     warp, weft: unit vectors in the plane.
     stiffness_warp, stiffness_weft: [N/m].
+    onset: worn strain along warp and weft at which the guard begins to act.
     isotropic: 1 for a sheet without threads, in which the principal directions of each cell take the place of warp and weft.
     """
 
@@ -53,6 +54,7 @@ class ThreadGuard:
     weft: wp.vec2d
     stiffness_warp: wp.float64
     stiffness_weft: wp.float64
+    onset: wp.vec2d
     isotropic: int
 
 
@@ -60,7 +62,7 @@ class ThreadGuard:
 class GuardedFace:
     """What all cells of a face have in common.
 
-    warp, weft: unit vectors times the slack. onset: as `Cells.onset`.
+    warp, weft: unit vectors times the slack. onset: as `ThreadGuard.onset`.
     s, t: the directions of the shear deficit on the cloth at its intended stretch, at right angles; zero without a deficit.
     """
 
@@ -344,7 +346,7 @@ def evaluate_face(
     of = GuardedFace()
     of.warp = guard.warp * slack[0]
     of.weft = guard.weft * slack[1]
-    of.onset = cells.onset[f]
+    of.onset = guard.onset
     state, height2 = check_face(position, face, cells.laid, begin, of, guard.isotropic, wanted == STEP)
     shear = cells.shear[f]
     wave = cells.hourglass[f]

@@ -125,7 +125,7 @@ def gather_forces(
     total = load[i]
     driving = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     k = spring_stiffness[i]
-    if springs.active != wp.float64(0.0):
+    if springs.active[i] != wp.int8(0):
         _energy, _tension, force = sum_springs(i, position, springs)
         total += force
         if viscous:
@@ -182,7 +182,7 @@ def gather_potential(
     i = natural(wp.tid() + first)
     stored = wp.float64(0.0)
     total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    if springs.active != wp.float64(0.0):
+    if springs.active[i] != wp.int8(0):
         stored, _tension, total = sum_springs(i, position, springs)
     of_cells, _drag, _stiffness = sum_cells(i, cells, cell_forces, False)
     of_bonds, _viscosity, _k = sum_bonds(i, bonds, bond_forces)

@@ -2,7 +2,7 @@
 
 Warp and weft lie straight in the plane, F = dX/dx maps them to the body, and per flat area of cloth the energy is
 
-    psi = W(e_warp, e_weft) + 1/2 G gamma^2 + 1/2 K_lock <|gamma| - sin 45>^2,    e = |F t| - 1,    gamma = F t_warp . F t_weft.
+    psi = W(e_warp, e_weft) + 1/2 G gamma^2 + 1/2 K_lock <|gamma| - gamma_on>^2,    e = |F t| - 1,    gamma = F t_warp . F t_weft.
 
 t is a thread's unit vector over the stretch at which it is meant to be worn (1 where none is). In an isotropic sheet
 the principal directions of each cell take the place of warp and weft, and gamma is 0.
@@ -11,8 +11,8 @@ W is that of an orthotropic sheet in plane stress. A J-shaped curve adds the dif
 Under compression cloth wrinkles: W = f W_sheet + (1 - f) W_wrinkled, with W_wrinkled the least energy of any sheet that
 may shorten freely (Pipkin 1986).
 
-The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have been sheared by
-45 degrees lock. gamma cannot exceed 1, so G alone would resist full shear with at most 1/2 G per area. Threads of soft
+The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have been sheared as far as
+the fabric lets them lie against each other and lock, from gamma_on on, the sine of that angle. gamma cannot exceed 1, so G alone would resist full shear with at most 1/2 G per area. Threads of soft
 cloth would then come to lie side by side, and a tiny face of the body would become a hand's breadth of cloth.
 """
 
@@ -35,11 +35,18 @@ from .cells import (
     count_cells,
     flat_edges,
     longest_square,
+    turned_left,
 )
 from .indices import natural
-from .membrane_cell import TINY, Cloth, membrane_forces, membrane_viscosity, pair_bound, worn_cell
+from .membrane_cell import TINY, Cloth, WornCell, membrane_forces, membrane_viscosity, pair_bound, worn_cell
 
 wp.set_module_options({"enable_backward": False})
+
+
+@wp.func
+def corner_weight(cell: WornCell, k: int):
+    """Return the gradient of the barycentric weight of a cell's corner k [1/m]."""
+    return wp.where(k == 0, cell.w0, wp.where(k == 1, cell.w1, cell.w2))
 
 
 @wp.func
@@ -187,6 +194,64 @@ def bound_membrane(
             weight[3 * c] = wp.max(-area * pair_bound(cell, cell.w0, cell.w1), none)
             weight[3 * c + 1] = wp.max(-area * pair_bound(cell, cell.w1, cell.w2), none)
             weight[3 * c + 2] = wp.max(-area * pair_bound(cell, cell.w2, cell.w0), none)
+        k += 1
+
+
+@wp.kernel
+def stiffen_membrane(
+    position: wp.array(dtype=wp.vec2d),
+    cells: Cells,
+    cloth: Cloth,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.mat22d),
+):
+    """Compute the stiffness of each cell by the places of its corners: the part of the second derivatives that is never negative.
+
+    That is J^T C J of the strains, C of the cloth in tension, and J^T sigma J of what moves a thread under tension sideways.
+
+    position: #V [m]. stiffness: 9 #C, of corners 00, 01, 02, 10, ... [N/m]; of a mirrored cell left as it was.
+    """
+    f = natural(wp.tid() + first)
+    face = cells.face[f]
+    begin = natural(cells.first[f])
+    none = wp.float64(0.0)
+    k = int(0)
+    count = count_cells(face)
+    while k < count:
+        c = natural(begin + k)
+        D = flat_edges(position, cell_corner(face, k))
+        det = wp.determinant(D)
+        if det > none:
+            cell = worn_cell(D, cells.laid[c], cloth, cells.slack[f])
+            law = cell.law
+            area = wp.float64(0.5) * det * cell_weight(face)
+            # Derivatives of the strains by a corner's place are minus these times its weight's gradient along warp and weft.
+            back = wp.transpose(cell.F)
+            unit_warp = back * cell.worn_warp / cell.length_warp
+            unit_weft = back * cell.worn_weft / cell.length_weft
+            turned_warp = back * turned_left(cell.worn_warp) / cell.length_warp
+            turned_weft = back * turned_left(cell.worn_weft) / cell.length_weft
+            pull_warp = wp.max(law.sigma[0], none) / cell.length_warp
+            pull_weft = wp.max(law.sigma[1], none) / cell.length_weft
+            shear = cloth.shear + law.locked
+            of_warp = wp.outer(unit_warp, unit_warp) * law.bound[0] + wp.outer(turned_warp, turned_warp) * pull_warp
+            of_weft = wp.outer(unit_weft, unit_weft) * law.bound[1] + wp.outer(turned_weft, turned_weft) * pull_weft
+            back_warp = unit_warp * cell.length_warp
+            back_weft = unit_weft * cell.length_weft
+            of_warp += wp.outer(back_weft, back_weft) * shear
+            of_weft += wp.outer(back_warp, back_warp) * shear
+            of_both = wp.outer(unit_warp, unit_weft) * cloth.c_cross + wp.outer(back_weft, back_warp) * shear
+            for i in range(3):
+                w_i = corner_weight(cell, i)
+                for j in range(3):
+                    w_j = corner_weight(cell, j)
+                    stiffness[natural(9 * c + 3 * i + j)] = area * (
+                        of_warp * (wp.dot(w_i, cell.warp) * wp.dot(w_j, cell.warp))
+                        + of_weft * (wp.dot(w_i, cell.weft) * wp.dot(w_j, cell.weft))
+                        + of_both * (wp.dot(w_i, cell.warp) * wp.dot(w_j, cell.weft))
+                        + wp.transpose(of_both) * (wp.dot(w_i, cell.weft) * wp.dot(w_j, cell.warp))
+                    )
         k += 1
 
 

@@ -14,8 +14,6 @@ from .indices import natural
 wp.set_module_options({"enable_backward": False})
 
 TINY = wp.constant(wp.float64(1.0e-300))
-# Warp and weft of cloth lock, thread against thread, at shear angles of 30 to 60 degrees; taken as 45.
-LOCKED = wp.constant(wp.float64(0.7071067811865476))
 
 
 @wp.struct
@@ -26,6 +24,7 @@ class Cloth:
     isotropic: 1 for a sheet without threads.
     c_warp, c_weft, c_cross, shear: plane stress [N/m].
     k_warp, k_weft: K, the stiffness of a strip along one thread [N/m].
+    onset: of gamma, from where threads lock: the sine of the angle at which they do.
     lock: K_lock, what locked threads add to G [N/m].
     compression: f, stiffness under compression over that under tension.
     strain_warp, tension_warp, strain_weft, tension_weft: points of the curves, the first at 0 [1, N/m]; beyond the last
@@ -42,6 +41,7 @@ class Cloth:
     shear: wp.float64
     k_warp: wp.float64
     k_weft: wp.float64
+    onset: wp.float64
     lock: wp.float64
     compression: wp.float64
     strain_warp: wp.array(dtype=wp.float64)
@@ -126,7 +126,7 @@ def cloth_law(e: wp.vec2d, gamma: wp.float64, cloth: Cloth):
     law.energy += warp[1] + weft[1]
     law.slope += wp.vec3d(warp[2], weft[2], none)
     law.bound = wp.vec2d(cloth.c_warp + wp.max(warp[2], none), cloth.c_weft + wp.max(weft[2], none))
-    beyond = wp.max(wp.abs(gamma) - LOCKED, none)
+    beyond = wp.max(wp.abs(gamma) - cloth.onset, none)
     law.tau = cloth.shear * gamma + wp.sign(gamma) * cloth.lock * beyond
     law.energy += half * (cloth.shear * gamma * gamma + cloth.lock * beyond * beyond)
     law.locked = wp.where(beyond > none, cloth.lock, none)

@@ -15,14 +15,14 @@ class Springs:
     neighbor: the vertex at the far end.
     rest_length: length on the surface in space [m].
     stiffness: k_ij [N/m].
-    active: 1 where the springs are the cloth; 0 with a membrane, whose step matrix consists of their k_ij.
+    active: #V, 1 where the springs are the cloth; 0 in a membrane, whose step matrix consists of their k_ij.
     """
 
     offset: wp.array(dtype=wp.int32)
     neighbor: wp.array(dtype=wp.int32)
     rest_length: wp.array(dtype=wp.float64)
     stiffness: wp.array(dtype=wp.float64)
-    active: wp.float64
+    active: wp.array(dtype=wp.int8)
 
 
 @wp.func
@@ -94,7 +94,7 @@ def compute_spring_energy(
     """
     i = natural(wp.tid() + first)
     stored, _tension, _force = sum_springs(i, position, springs)
-    energy[i] = springs.active * stored
+    energy[i] = wp.where(springs.active[i] != wp.int8(0), stored, wp.float64(0.0))
 
 
 @wp.kernel

@@ -6,7 +6,6 @@ from .indices import natural
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-TINY = wp.constant(wp.float64(2.2250738585072014e-308))
 # Hourglass stiffness of quads over that of a membrane.
 HOURGLASS_SHARE = wp.constant(wp.float64(0.25))
 
@@ -118,15 +117,14 @@ def sum_stiffness(
 class Lattice:
     """A fabric as a lattice of springs along the edges of quads.
 
-    direction: mean direction of the quads' first edges, unit vector in the plane. along, across: K of those edges and
-    of the others.
+    warp: unit vector in the plane. k_warp, k_weft: K [N/m].
     shear: G [N/m].
     least: share of K that a structural spring keeps.
     """
 
-    direction: wp.vec2d
-    along: wp.float64
-    across: wp.float64
+    warp: wp.vec2d
+    k_warp: wp.float64
+    k_weft: wp.float64
     shear: wp.float64
     least: wp.float64
 
@@ -135,8 +133,8 @@ class Lattice:
 def hourglass_stiffness(k: wp.float64, lattice: Lattice, ratio: wp.float64, inverse: wp.float64):
     """Return the stiffness that a quad should have in its hourglass mode along the sides of K = k [N/m].
 
-    It is a quarter of a membrane's, or the share that structural springs have in a square, where that is less, as off
-    the grain.
+    It is a quarter of a membrane's, or the share that structural springs have in a square, where that is less, as in cloth
+    that is stiff in shear.
     ratio: of the other sides to these, and its inverse.
     """
     in_square = wp.max(k - lattice.shear, lattice.least * k)
@@ -177,11 +175,11 @@ def weigh_quads(
     d = (position[natural(quad[1])] - position[natural(quad[0])]) + (
         position[natural(quad[2])] - position[natural(quad[3])]
     )
-    ka = lattice.along
-    kb = lattice.across
-    if wp.abs(lattice.direction[0] * d[1] - lattice.direction[1] * d[0]) > wp.abs(wp.dot(lattice.direction, d)):
-        ka = lattice.across
-        kb = lattice.along
+    ka = lattice.k_warp
+    kb = lattice.k_weft
+    if wp.abs(lattice.warp[0] * d[1] - lattice.warp[1] * d[0]) > wp.abs(wp.dot(lattice.warp, d)):
+        ka = lattice.k_weft
+        kb = lattice.k_warp
     p0 = vertices[natural(quad[0])]
     p1 = vertices[natural(quad[1])]
     p2 = vertices[natural(quad[2])]
@@ -215,76 +213,3 @@ def weigh_quads(
     stiffness[h + 2] = half_a
     stiffness[h + 3] = half_b
     diagonal[q] = half * shear * (inverse + ratio)
-
-
-@wp.kernel
-def weigh_triangles(
-    vertices: wp.array(dtype=wp.vec3d),
-    position: wp.array(dtype=wp.vec2d),
-    triangles: wp.array(dtype=wp.vec4i),
-    side: wp.array(dtype=wp.int32),
-    warp: wp.vec2d,
-    compliance: wp.vec3d,
-    first: int,
-    # outputs
-    stiffness: wp.array(dtype=wp.float64),
-):
-    """Compute the stiffness of the springs along a triangle's sides [N/m]: K area / length^2 (Van Gelder 1998).
-
-    K is that of a strip of the cloth in the side's direction.
-
-    compliance: 1/K = (c4 [0] + s4 [1] + s2 c2 [2]) / (c2 + s2)^2 of a side that goes c along and s across the warp
-    [m/N].
-    side: #T, the first of each triangle's half-edges. stiffness: #H.
-    """
-    t = natural(wp.tid() + first)
-    triangle = triangles[t]
-    p0 = vertices[triangle[0]]
-    area = wp.float64(0.5) * wp.length(wp.cross(vertices[triangle[1]] - p0, vertices[triangle[2]] - p0))
-    for k in range(3):
-        i = triangle[k]
-        j = triangle[(k + 1) % 3]
-        d = position[j] - position[i]
-        along = wp.dot(d, warp)
-        across = warp[0] * d[1] - warp[1] * d[0]
-        c2 = along * along
-        s2 = across * across
-        if c2 + s2 == wp.float64(0.0):
-            c2 = wp.float64(1.0)
-        edge = vertices[j] - vertices[i]
-        length2 = wp.dot(edge, edge)
-        if length2 == wp.float64(0.0):
-            length2 = wp.float64(1.0)
-        softness = c2 * c2 * compliance[0] + s2 * s2 * compliance[1] + s2 * c2 * compliance[2]
-        stiffness[side[t] + k] = area * (c2 + s2) * (c2 + s2) / (softness * length2)
-
-
-@wp.kernel
-def measure_shear_stiffness(
-    position: wp.array(dtype=wp.vec2d),
-    offset: wp.array(dtype=wp.int32),
-    neighbor: wp.array(dtype=wp.int32),
-    rest_length: wp.array(dtype=wp.float64),
-    stiffness: wp.array(dtype=wp.float64),
-    area: wp.array(dtype=wp.float64),
-    warp: wp.vec2d,
-    first: int,
-    # outputs
-    hold: wp.array(dtype=wp.float64),
-):
-    """Measure the shear stiffness of the springs around each vertex against warp and weft [N/m].
-
-    It is the sum of 1/2 k L^2 cos^2 sin^2 over the
-    vertex's area [m2]. rest_length, stiffness: 2 #S, as they are listed around the vertices."""
-    i = natural(wp.tid() + first)
-    held = wp.float64(0.0)
-    e = natural(offset[i])
-    end = offset[i + 1]
-    while e < end:
-        d = position[natural(neighbor[e])] - position[i]
-        along = wp.dot(d, warp)
-        across = d[0] * warp[1] - d[1] * warp[0]
-        share = along * across / wp.max(along * along + across * across, TINY)
-        held += wp.float64(0.5) * stiffness[e] * rest_length[e] * rest_length[e] * share * share
-        e += 1
-    hold[i] = held / area[i]

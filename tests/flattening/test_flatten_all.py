@@ -19,8 +19,8 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
-from warpflat.model.springs import springs_of
 from warpflat.model.wear import Wear
+from warpflat.solver.metric import stiffness_matrix
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation
 from warpflat.surface.cells import make_cells
@@ -205,8 +205,8 @@ def test_it_is_offered_beside_flatten():
 # --- joined networks
 
 
-def networks(**options: object) -> list[SpringNetwork]:
-    surfaces = [shape("dome", 9, triangles=True), shape("bodice", 7), shape("saddle", 8, triangles=True)]
+def networks(*, quads: bool = False, **options: object) -> list[SpringNetwork]:
+    surfaces = [shape("dome", 9, triangles=not quads), shape("bodice", 7), shape("saddle", 8, triangles=not quads)]
     return [
         SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device=DEVICE, **options) for surface in surfaces
     ]
@@ -217,7 +217,8 @@ def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
     joined = join_networks(parts)
     surface = join_surfaces([part.surface for part in parts])
     np.testing.assert_array_equal(joined.surface.faces, surface.faces)
-    springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), make_cells(surface)
+    whole, cells = SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device=DEVICE), make_cells(surface)
+    springs = whole.spring_arrays
     np.testing.assert_array_equal(joined.springs.offset.numpy(), springs.around.offset)
     np.testing.assert_array_equal(joined.springs.neighbor.numpy(), springs.around.neighbor)
     np.testing.assert_array_equal(joined.springs.rest_length.numpy(), springs.listed_length)
@@ -235,9 +236,11 @@ def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
 
 
 @pytest.mark.parametrize("stretched", [False, True])
-@pytest.mark.parametrize("model", ["springs", "membrane"])
-def test_a_joined_network_has_the_energies_and_forces_of_its_parts(model: str, stretched: bool):
-    parts = networks(model=model)
+@pytest.mark.parametrize("models", ["springs", "membrane", "both"])
+def test_a_joined_network_has_the_energies_and_forces_of_its_parts(models: str, stretched: bool):
+    """Quads along the grain are springs, triangles are cells, also beside each other."""
+    parts = networks(quads=models == "springs", model="membrane" if models == "membrane" else None)
+    assert [part.model for part in parts[:2]] == [models, models] if models != "both" else ["membrane", "springs"]
     if stretched:
         parts = [
             SpringNetwork.build(
@@ -245,7 +248,7 @@ def test_a_joined_network_has_the_energies_and_forces_of_its_parts(model: str, s
                 CLOTH,
                 part.surface.vertices[:, :2],
                 device=DEVICE,
-                model=model,
+                model=part.model,
                 stretch=np.full((len(part.surface.faces), 2), 1.02 + 0.01 * number),
             )
             for number, part in enumerate(parts)
@@ -260,7 +263,8 @@ def test_a_joined_network_has_the_energies_and_forces_of_its_parts(model: str, s
     each = [state.energies() for state in alone]
     assert joined.energies().spring == pytest.approx(sum(of.spring for of in each), rel=1e-12)
     assert joined.energies().guard == pytest.approx(sum(of.guard for of in each), rel=1e-12)
-    if model == "springs":
-        # Between triangles threads are held by less, by each mesh's own measure.
-        assert len({tuple(row) for row in joined.network.cells.onset.numpy().tolist()}) == 3
-        assert min(state.energies().guard for state in alone) > 0.0
+    assert [state.energies().guard > 0.0 for state in alone] == [part.model == "springs" for part in parts]
+    stiffness = stiffness_matrix(joined.network, np.concatenate(starts)).toarray()
+    for begin, end, part, start in zip(2 * first[:-1], 2 * first[1:], parts, starts, strict=True):
+        np.testing.assert_allclose(stiffness[begin:end, begin:end], stiffness_matrix(part, start).toarray(), atol=1e-9)
+        assert not stiffness[begin:end, end:].any()

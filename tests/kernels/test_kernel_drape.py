@@ -45,8 +45,8 @@ def membrane_energy(x: np.ndarray) -> float:
     if e_warp > 0.0:
         places = np.linspace(0.0, e_warp, 20001)
         energy += np.trapezoid(CLOTH.tension(places), places) - 0.5 * 1900.0 * e_warp**2
-    beyond = max(abs(gamma) - np.sqrt(0.5), 0.0)
-    return AREA * (energy + 0.5 * 26.0 * gamma**2 + 0.5 * 600.0 * beyond**2)
+    beyond = max(abs(gamma) - np.sin(np.radians(CLOTH.shear_limit)), 0.0)
+    return AREA * (energy + 0.5 * 26.0 * gamma**2 + 0.5 * 260.0 * beyond**2)
 
 
 @pytest.mark.parametrize("stretch", [(1.03, 1.01, 0.1), (0.97, 1.03, 0.0), (0.95, 0.98, 0.2), (1.1, 0.9, 0.9)])

@@ -293,21 +293,25 @@ def test_a_strip_pulled_along_a_curve_contracts_by_poisson():
     assert stress[0] == pytest.approx(float(fabric.tension(e, "warp")), rel=1e-9)
 
 
-def test_threads_lock_once_they_are_sheared_by_45_degrees():
+@pytest.mark.parametrize("limit", [8.0, 15.0, 40.0])
+def test_threads_lock_once_they_are_sheared_by_the_fabrics_limit(limit: float):
+    fabric, onset = replace(CLOTH, shear_limit=limit), np.sin(np.radians(limit))
+
     def sheared(degrees: float) -> FloatArray:
         angle = np.radians(degrees)
         return np.array([[1.0, np.sin(angle)], [0.0, np.cos(angle)]])
 
-    below, stress = one_cell(sheared(44.0), CLOTH)
-    assert below == pytest.approx(0.5 * CLOTH.shear_stiffness * np.sin(np.radians(44.0)) ** 2, rel=1e-9)
-    assert stress[2] == pytest.approx(CLOTH.shear_stiffness * np.sin(np.radians(44.0)), rel=1e-9)
-    # Threads side by side would cost 1/2 G = 25 J/m2; half of the softer thread's stiffness holds them apart.
-    beyond = np.sin(np.radians(80.0)) - np.sqrt(0.5)
-    locked, stress = one_cell(sheared(80.0), CLOTH)
-    free = 0.5 * CLOTH.shear_stiffness * np.sin(np.radians(80.0)) ** 2
-    assert locked == pytest.approx(free + 0.5 * 300.0 * beyond**2, rel=1e-9)
-    assert stress[2] == pytest.approx(CLOTH.shear_stiffness * np.sin(np.radians(80.0)) + 300.0 * beyond, rel=1e-9)
-    other, back = one_cell(sheared(-80.0), CLOTH)
+    gamma = np.sin(np.radians(limit - 0.5))
+    below, stress = one_cell(sheared(limit - 0.5), fabric)
+    assert below == pytest.approx(0.5 * CLOTH.shear_stiffness * gamma**2, rel=1e-9)
+    assert stress[2] == pytest.approx(CLOTH.shear_stiffness * gamma, rel=1e-9)
+    # From there on it is eleven times as stiff, and nothing jumps.
+    gamma = np.sin(np.radians(limit + 20.0))
+    locked, stress = one_cell(sheared(limit + 20.0), fabric)
+    energy = 0.5 * CLOTH.shear_stiffness * (gamma**2 + 10.0 * (gamma - onset) ** 2)
+    assert locked == pytest.approx(energy, rel=1e-9)
+    assert stress[2] == pytest.approx(CLOTH.shear_stiffness * (gamma + 10.0 * (gamma - onset)), rel=1e-9)
+    other, back = one_cell(sheared(-limit - 20.0), fabric)
     np.testing.assert_allclose([*other, back[2]], [*locked, -stress[2]], rtol=1e-9)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -52,8 +53,7 @@ def differences(forces: Any, positions: FloatArray, step: float = 1e-7) -> Float
 
 
 def test_the_matrix_is_the_stiffness_of_stretched_springs():
-    surface = triangles("dome", 6)
-    network, start = developed(surface, SOFT)
+    network, start = developed(make_shape("dome", resolution=6), SOFT)
     rng = np.random.default_rng(1)
     positions = 1.6 * start + rng.normal(scale=1e-3, size=start.shape)
     s = network.spring_arrays
@@ -69,7 +69,7 @@ def test_the_matrix_is_the_stiffness_of_stretched_springs():
 def test_the_matrix_holds_worn_threads_along_and_across():
     surface = make_surface([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.03, 0.08, 0.0]], [[0, 1, 2]])
     flat = surface.vertices[:, :2]
-    network = network_of(surface, flat)
+    network = replace(network_of(surface, flat), model="springs", held_stiffness=None)
     # Pressed along both threads, and sheared.
     positions = flat @ np.array([[0.8, 0.05], [0.0, 0.7]])
     rest = (flat[1:] - flat[0]).T
@@ -79,7 +79,7 @@ def test_the_matrix_holds_worn_threads_along_and_across():
 
     area = 0.5 * np.linalg.det((positions[1:] - positions[0]).T)
     expected = np.zeros((6, 6))
-    onsets = network.cells.onset.numpy()[0]
+    onsets = map(float, network.guard.onset)
     for thread, stiffness, onset in zip(np.eye(2)[::-1], (1000.0, 700.0), onsets, strict=True):
         by_place = -differences(lambda at, e=thread: worn(at, e), positions)
         here = worn(positions, thread)
@@ -98,6 +98,25 @@ def test_the_matrix_holds_worn_threads_along_and_across():
         expected += k * np.outer(row, row)
     found = stiffness_matrix(network, positions).toarray()
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("kind", ["triangles", "quads"])
+def test_the_matrix_is_the_stiffness_of_cells_at_rest(kind: str):
+    """At rest nothing is negative, whichever way the grain runs."""
+    surface = make_shape("dome", resolution=6, triangles=kind == "triangles")
+    random, fabric = np.random.default_rng(4), replace(SOFT, poisson_ratio=0.2)
+    flat = surface.vertices[:, :2] + random.normal(scale=3e-3, size=(36, 2))
+    surface = make_surface(np.column_stack([flat, np.zeros(36)]), surface.faces)
+    network = SpringNetwork.build(surface, fabric, flat, grain_angle=25.0, model="membrane", device=DEVICE)
+
+    def forces(at: FloatArray) -> FloatArray:
+        return Relaxation(network, RelaxOptions(), start=at).forces()
+
+    found = stiffness_matrix(network, flat).toarray()
+    np.testing.assert_allclose(found, differences(forces, flat), atol=1e-5 * np.abs(found).max())
+    strained = stiffness_matrix(network, flat * [1.1, 0.85]).toarray()
+    values = np.linalg.eigvalsh(strained)
+    assert values.min() > -1e-9 * values.max()
 
 
 @pytest.mark.parametrize(("name", "fabric"), [("bodice", "satin"), ("bodice", "denim"), ("dome", "cotton")])

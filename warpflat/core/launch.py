@@ -106,6 +106,7 @@ def record(
     dim: int,
     inputs: SequenceOf[Any],
     outputs: SequenceOf[Any] = (),
+    first: int = 0,
     device: str | wp.Device | None = None,
     threads: int | None = None,
     least: int | None = None,
@@ -118,6 +119,7 @@ def record(
         dim: number of its threads.
         inputs: all but `first`.
         outputs: arrays it writes.
+        first: index of its first thread.
         device: Warp device.
         threads: of the CPU that share it; `thread_count()` if not given.
         least: shortest range worth a thread of its own.
@@ -140,7 +142,7 @@ def record(
             compile_common_modules(kernel.module, where)
             _known.add(kernel)
         for begin, end in ranges:
-            given = {"inputs": [*inputs, begin], "outputs": list(outputs)}
+            given = {"inputs": [*inputs, first + begin], "outputs": list(outputs)}
             commands.append(wp.launch(kernel, dim=end - begin, **given, device=where, record_cmd=True).launch)
     if len(commands) > threads:
         commands = [partial(_run_all, commands[i::threads]) for i in range(threads)]

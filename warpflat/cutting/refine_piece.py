@@ -77,6 +77,6 @@ def network_on_faces(
         positions,
         grain_angle=result.grain_angle,
         device=result.network.device,
-        model=result.network.model,
+        model="membrane" if result.network.model == "membrane" else None,
         stretch=None if stretch is None else stretch[face_origin],
     )

@@ -193,10 +193,10 @@ def correct_pattern(
         if history[-1].misfit <= wanted:
             reason = "the misfit is as wanted"
             break
-        step = _gauss_newton_step(drape, seams, difference, bridging)
-        best, share = None, largest_share(drape.cloth, step)
+        mend, step = _gauss_newton_step(drape, seams, difference, bridging)
+        best, share = None, largest_share(drape.cloth, mend + step)
         for _ in range(_HALVINGS + 1):
-            trial = wear(replace(drape.cloth, flat=drape.cloth.flat + share * step))
+            trial = wear(replace(drape.cloth, flat=drape.cloth.flat + mend + share * step))
             now = _round(trial, share, bridging)
             if (
                 trial.converged
@@ -261,9 +261,9 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
         # Half the squared length of a thread over that of one at its limit.
         over = _lengths(drape.positions[corner], gradient)
         over -= 0.5 * (1.0 + _EASED * limit) ** 2
-        step = _follow(drape.cloth, np.maximum(over, 0.0) * [1.0, 1.0, 0.0], seams, difference)
-        share = largest_share(drape.cloth, step)
-        cloth = replace(drape.cloth, flat=drape.cloth.flat + share * step, designed=drape.positions)
+        mend, step = _follow(drape.cloth, np.maximum(over, 0.0) * [1.0, 1.0, 0.0], seams, difference)
+        share = largest_share(drape.cloth, mend + step)
+        cloth = replace(drape.cloth, flat=drape.cloth.flat + mend + share * step, designed=drape.positions)
         worn = relax_drape(cloth, drape.body, options=drape.options, held=held)
         cloth = replace(cloth, designed=drape.body.nearest(worn.positions)[0])
         trial = replace(drape, cloth=cloth, worn=worn)
@@ -276,8 +276,10 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
     return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
 
 
-def _gauss_newton_step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool) -> FloatArray:
-    """Return the displacement of the flat vertices (#P by 2 [m]) that follows best what the cells ask for.
+def _gauss_newton_step(
+    drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return the displacements of the flat vertices (#P by 2 [m]) that mend the seams, and that follow best what the cells ask for.
 
     Args:
         drape: of the present pattern.
@@ -294,8 +296,13 @@ def _gauss_newton_step(drape: Drape, seams: IntArray, difference: FloatArray, br
     return _follow(cloth, wanted, seams, difference)
 
 
-def _follow(cloth: SewnCloth, wanted: FloatArray, seams: IntArray, difference: FloatArray) -> FloatArray:
-    """Return the displacement of the flat vertices (#P by 2 [m]) nearest to what cells want to be longer along warp and weft, and sheared.
+def _follow(
+    cloth: SewnCloth, wanted: FloatArray, seams: IntArray, difference: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return two displacements of the flat vertices, #P by 2 [m] each.
+
+    The first gives the sides of seams their wanted difference; whatever share of the second is taken, it is taken in full. The second
+    is nearest to what cells want to be longer along warp and weft, and sheared, and leaves the seams alone.
 
     Args:
         cloth: with the present pattern.
@@ -315,7 +322,7 @@ def _follow(cloth: SewnCloth, wanted: FloatArray, seams: IntArray, difference: F
     count, cells = 2 * len(cloth.flat), len(corner)
     columns = (2 * corner_flat[:, :, None] + np.arange(2)).reshape(cells, 6)
     matrix = csc_array((count, count))
-    right = np.zeros(count)
+    right, mending = np.zeros(count), np.zeros(count)
     for values, target, stiffness in zip(
         rows, wanted.T, (fabric.stiffness_warp, fabric.stiffness_weft, shear), strict=True
     ):
@@ -329,9 +336,10 @@ def _follow(cloth: SewnCloth, wanted: FloatArray, seams: IntArray, difference: F
         now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
         weight = _SEAM * threads
         matrix = matrix + weight * (b.T @ b)
-        right += weight * (b.T @ (difference - now))
+        mending = weight * (b.T @ (difference - now))
     matrix = csc_array(matrix + diags_array(np.full(count, _HOLD * threads)))
-    return factor_symmetric(matrix)(right).reshape(-1, 2)
+    solve = factor_symmetric(matrix)
+    return solve(mending).reshape(-1, 2), solve(right).reshape(-1, 2)
 
 
 def _lengths(x: FloatArray, gradient: FloatArray) -> FloatArray:

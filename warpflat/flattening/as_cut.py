@@ -64,7 +64,7 @@ def laid_as_cut(surface: Surface, cut: FloatArray, *, fabric: Fabric, device: st
     """
     begun = time.perf_counter()
     line, title, _ = resolve_datum(surface, None)
-    settings = check_settings(fabric, grain_angle=0.0, model="springs", wear=None, relax=None, device=device)
+    settings = check_settings(fabric, grain_angle=0.0, model="auto", wear=None, relax=None, device=device)
     network = SpringNetwork.build(surface, settings.fabric, cut, device=settings.device)
     energies = Relaxation(network, RelaxOptions(), start=cut).energies()
     stage = Stage(

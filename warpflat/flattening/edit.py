@@ -23,6 +23,7 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.relax_piece import relax_piece
 from warpflat.flattening.relaxation_task import RelaxationTask
 from warpflat.flattening.result import Flattening
+from warpflat.model.membrane import choose_model
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.cells import inherit_cells
 from warpflat.surface.mesh import Surface
@@ -222,6 +223,9 @@ def _continuation_task(
     require_unsewn(result)
     expect_callback(callback)
     device, model = result.network.device, result.network.model
+    if model == "springs" and fabric is not result.fabric:
+        # Quads across the grain of the new cloth, where the one before was isotropic.
+        model = choose_model("auto", surface, fabric, result.positions, grain_angle=result.grain_angle)
     return RelaxationTask(
         surface,
         fabric,
@@ -230,8 +234,8 @@ def _continuation_task(
         options,
         callback,
         result.datum,
+        model,
         stage,
-        model=model,
         wear=result.wear,
     )
 

@@ -14,7 +14,7 @@ from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.flatten_piece import DevelopedPiece, as_surface, check_settings, develop_piece, relax_developed
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
-from warpflat.model.membrane import Model
+from warpflat.model.membrane import ModelChoice
 from warpflat.model.wear import Wear
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.mesh import Surface
@@ -29,7 +29,7 @@ def flatten_all(
     datum: str | Sequence[str | ArrayLike | None] | None = None,
     grain_angle: float | Sequence[float] = 0.0,
     units: str | None = None,
-    model: Model = "springs",
+    model: ModelChoice = "auto",
     wear: Wear | None = None,
     relax: RelaxOptions | None = None,
     callback: Callable[[int, Progress], bool | None] | None = None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -27,7 +27,7 @@ from warpflat.flattening.relax_piece import relax_piece
 from warpflat.flattening.relaxation_task import RelaxationTask
 from warpflat.flattening.result import Flattening
 from warpflat.flattening.start import choose_start, given_start
-from warpflat.model.membrane import Model, check_model
+from warpflat.model.membrane import ModelChoice, check_model, choose_model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, unused_stretch
@@ -57,7 +57,7 @@ def flatten(
     datum: str | ArrayLike | None = None,
     grain_angle: float = 0.0,
     units: str | None = None,
-    model: Model = "springs",
+    model: ModelChoice = "auto",
     wear: Wear | None = None,
     start: ArrayLike | None = None,
     relax: RelaxOptions | None = None,
@@ -78,8 +78,8 @@ def flatten(
             indices along mesh edges; if not given, the line along the long axis through the middle.
         grain_angle: of the warp against the datum, degrees; 45 cuts on the bias.
         units: of a mesh file that carries none: "m", "dm", "cm", "mm", "in", "ft".
-        model: "springs", the paper's, or "membrane", the cloth measured as worn (see `warpflat.model.network`); what is
-            minimised is reported as `model_energy_j` for both.
+        model: "springs", the paper's, exact on quads along the grain, or "membrane", the cloth measured cell by cell, exact on any mesh;
+            "auto" takes springs where they are exact. What is minimised is reported as `model_energy_j` for both.
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
         start: a layout of one's own to be relaxed from, #V by 2 in any unit; no face of it may be mirrored.
         relax: options of the relaxation.
@@ -120,7 +120,7 @@ class FlattenSettings:
 
     fabric: Fabric
     grain_angle: float
-    model: Model
+    model: ModelChoice
     wear: Wear | None
     options: RelaxOptions
     device: wp.Device
@@ -130,7 +130,7 @@ def check_settings(
     fabric: Fabric | str,
     *,
     grain_angle: float,
-    model: Model,
+    model: ModelChoice,
     wear: Wear | None,
     relax: RelaxOptions | None,
     device: str | None,
@@ -196,6 +196,8 @@ def develop_piece(
     """
     line, line_name, notes = resolve_datum(surface, datum)
     begun = time.perf_counter()
+    coarse = None if start is not None else _flatten_coarser(surface, line, settings)
+    given = coarse or (choose_start(surface, line) if start is None else given_start(surface, line, start))
     task = RelaxationTask(
         surface,
         settings.fabric,
@@ -204,13 +206,10 @@ def develop_piece(
         settings.options,
         callback,
         line,
-        model=settings.model,
+        choose_model(settings.model, surface, settings.fabric, given.positions, grain_angle=settings.grain_angle),
         wear=settings.wear,
     )
-    development = None if start is not None else _flatten_coarser(surface, line, settings)
-    if development is None:
-        development = choose_start(surface, line) if start is None else given_start(surface, line, start)
-        development = task.shrink_to_rest(development)
+    development = coarse or task.shrink_to_rest(given)
     network = task.build_network(development.positions)
     return DevelopedPiece(
         task=task,
@@ -245,6 +244,8 @@ def _flatten_coarser(surface: Surface, line: IntArray, settings: FlattenSettings
         if vertex in coarse_line:
             del coarse_line[coarse_line.index(vertex) :]
         coarse_line.append(vertex)
+    # Springs would be another cloth on the coarser mesh, which is of triangles.
+    settings = replace(settings, model="membrane" if settings.model == "membrane" else "auto")
     try:
         flat = relax_developed(develop_piece(step.surface, coarse_line, settings, None))
     except InputError:

@@ -87,9 +87,7 @@ class Gradient:
     def _springs(self) -> tuple[FloatArray, FloatArray]:
         """Return the length of each spring, and its vector times the difference of the adjoint at its ends, #S."""
         if self.network.model == "membrane":
-            raise InputError(
-                'a membrane has no springs: differentiate by its vertices, or flatten with model="springs"'
-            )
+            raise InputError("a piece that is measured cell by cell has no springs: differentiate by its vertices")
         near, far = self.network.spring_arrays.ends.T
         edge, adjoint = self.positions[far] - self.positions[near], self.adjoint[far] - self.adjoint[near]
         return np.linalg.norm(edge, axis=1), np.einsum("ij,ij->i", edge, adjoint)

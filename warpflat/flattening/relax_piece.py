@@ -1,8 +1,8 @@
 """A piece is relaxed here: from a layout to the network that is measured in it, to the minimum of its energy.
 
-On triangles and under a stretch the network depends on the layout in which its directions are measured. L-BFGS measures them anew every
-few iterations, so that its estimate of what is left knows what follows from them. The paper's steps alone relax such a piece in rounds,
-and its directions are updated between them.
+The network of springs, and of cells under a pressure, depends on the layout in which its directions are measured. L-BFGS
+measures them anew every few iterations, so that its estimate of what is left knows what follows from them. The paper's steps alone relax
+such a piece in rounds, and its directions are updated between them.
 """
 
 from __future__ import annotations
@@ -32,8 +32,6 @@ _ROUND_GAIN = 3e-3
 _ROUND_STRAIN = 1e-6
 # Directions are final once a round has moved the piece by no more than this share of its size, on average.
 _SETTLED_SHIFT = 2e-4
-# Quads across the grain get a note where they are this many times as stiff in shear as the cloth.
-_NOTED_EXCESS = 3.0
 
 
 class _Stopped(Exception):
@@ -67,12 +65,6 @@ def relax_piece(
     outcome = replace(outcome, seconds=time.perf_counter() - started - before)
     state = piece.state
     task.notes += [note for note in outcome.notes if note not in task.notes]
-    excess = state.network.spring_arrays.shear_excess
-    if state.network.model == "springs" and excess >= _NOTED_EXCESS:
-        task.notes.append(
-            f"the grain runs aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
-            f'{state.network.fabric.name}; model = "membrane" measures that exactly'
-        )
     return RelaxedPiece(network=state.network, positions=state.positions(), begin=begin, outcome=outcome)
 
 

@@ -24,7 +24,7 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["RelaxationTask", "RelaxedPiece"]
 
-# Each round leaves about a fifth of the error of the directions before it, so that more rounds than this would change little.
+# Each round leaves about a fifth of the error of the lengths before it, so that more rounds than this would change little.
 _MAX_UPDATES = 6
 
 
@@ -50,8 +50,8 @@ class RelaxationTask:
     options: RelaxOptions
     callback: Callable[[Progress], bool | None] | None
     datum: IntArray
+    model: Model
     stage_name: str = "relax"
-    model: Model = "springs"
     wear: Wear | None = None
 
     history: list[tuple[float, float, float, float]] = field(default_factory=list)
@@ -116,16 +116,8 @@ class RelaxationTask:
         return self.wear is not None and self.wear.is_tight and (self.model == "springs" or bool(self.wear.pressure))
 
     def max_direction_updates(self, *, mended: bool = False) -> int:
-        """Return how many times directions are updated at most.
-
-        That is several times where springs, or the lengths for a stretch, depend on the layout; once where only the steps of a
-        membrane do, or where the development was repaired; and not at all otherwise.
-
-        Args:
-            mended: whether folds of the development were repaired.
-        """
-        alike = self.fabric.is_isotropic or bool(self.surface.is_quad.all())
-        return _MAX_UPDATES if self._is_tight or (self.model == "springs" and not alike) else int(mended or not alike)
+        """Return how many times the network is measured anew at most: once where the development was mended, and often for a stretch."""
+        return _MAX_UPDATES if self._is_tight else int(mended)
 
     def report_progress(self, stage: str, state: Relaxation) -> None:
         """Call the callback with the state at the last convergence check; it may stop the relaxation."""

@@ -179,7 +179,7 @@ class Flattening:
     def messages(self) -> tuple[str, ...]:
         """The notes, and a warning about faces that the pattern has stretched."""
         stretched = self.stretched_faces
-        return self.notes if stretched is None else (*self.notes, stretched.message(self.network.model))
+        return self.notes if stretched is None else (*self.notes, stretched.message())
 
     @cached_property
     def layout_measures(self) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.flatten_piece import as_surface, check_settings, develop_piece
-from warpflat.model.membrane import Model
+from warpflat.model.membrane import ModelChoice
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import worn_strain
 from warpflat.solver.grain import GrainAlignment, remove_rotation
@@ -61,7 +61,7 @@ def relaxation(
     datum: str | ArrayLike | None = None,
     grain_angle: float = 0.0,
     units: str | None = None,
-    model: Model = "springs",
+    model: ModelChoice = "auto",
     relax: RelaxOptions | None = None,
     device: str | None = None,
     energy_every: int = 1,

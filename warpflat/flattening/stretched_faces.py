@@ -42,19 +42,14 @@ class StretchedFaces:
     at: tuple[float, float, float]
     in_pattern: tuple[float, float]
 
-    def message(self, model: str) -> str:
-        """Return a warning about the faces, with what may help.
-
-        Args:
-            model: the mechanical model of the piece, "springs" or "membrane".
-        """
+    def message(self) -> str:
+        """Return a warning about the faces, with what may help."""
         body, flat = ", ".join(f"{100 * x:.1f}" for x in self.at), ", ".join(f"{1e3 * x:.0f}" for x in self.in_pattern)
-        springs = 'model = "springs" or ' if model == "membrane" else ""
         return (
             f"{format_count(self.faces, 'face')} of {1e4 * self.area_m2:.3g} cm2 on the body take up "
             f"{1e4 * self.flat_area_m2:.3g} cm2 of the pattern: face {self.face} around ({body}) cm, "
             f"in the pattern ({flat}) mm, {self.times:.3g} times its area; the cloth would have to shear so far "
-            f"there: make a dart or a seam, or take {springs}a fabric that shears less"
+            f"there: make a dart or a seam, or take a fabric that shears less"
         )
 
     def as_dict(self) -> dict[str, Any]:

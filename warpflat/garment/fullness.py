@@ -27,17 +27,10 @@ from warpflat.solver.equations import relax_under_equations
 from warpflat.solver.grain import GrainAlignment
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.steps import Relaxation
-from warpflat.surface.cells import first_of_faces
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.falloff import falloff_weights
-from warpflat.surface.half_edges import half_edges_of
 
 __all__ = ["FullEdge", "give_fullness", "measure_fullness"]
-
-
-# The energy that a gathered piece's springs miss is worth a note if it exceeds what this strain along the softer thread
-# stores everywhere, and this many times what they missed before the gathers.
-_NOTICEABLE_STRAIN, _NOTICEABLE_RATIO = 0.01, 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,8 +63,10 @@ def give_fullness(
     options = given_options(options)
     full = measure_fullness(piece, edges, plain)
     warp, weft = axes = grain_axes(piece.grain_angle)
+    # Gathers slant the mesh's edges off the grain, and springs along them would be another cloth.
+    is_membrane = piece.network.model == "membrane" or any(edge.gathered for edge in edges)
     # The network at rest where the layout is wider by its fullness.
-    springs = _wider_springs(piece.network, piece.positions, axes, full)
+    springs = _wider_springs(piece.network, piece.positions, axes, full, weighed=not is_membrane)
     # Cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S.
     cells = piece.network.cell_arrays
     here = full[cells.corner].mean(axis=1)
@@ -83,12 +78,18 @@ def give_fullness(
     length = np.maximum(np.linalg.norm(a, axis=1), np.finfo(np.float64).tiny)
     across = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / length
     cells = replace(cells, laid=np.column_stack([length, np.einsum("ij,ij->i", a, b) / length, across]))
-    network = replace(piece.network, spring_arrays=springs, cell_arrays=cells)
-    if network.model == "membrane":
-        stretch = network.stretch
+    held, stretch = None, piece.network.stretch
+    if is_membrane:
         meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
-        weights, held = step_matrix(network.fabric, axes, cells.corner, cells.edges, cells.area, piece.positions, meant)
-        network = replace(network, spring_arrays=with_stiffness(springs, cells, weights), held_stiffness=held)
+        weights, held = step_matrix(piece.fabric, axes, cells.corner, cells.edges, cells.area, piece.positions, meant)
+        springs = with_stiffness(springs, cells, weights)
+    network = replace(
+        piece.network,
+        spring_arrays=springs,
+        cell_arrays=cells,
+        model="membrane" if is_membrane else "springs",
+        held_stiffness=held,
+    )
     mean = full.mean(axis=0)
     widening = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
     alignment = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
@@ -114,7 +115,7 @@ def give_fullness(
     ]
     most = max(edge.factor for edge in edges)
     note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
-    notes = (*piece.notes, note, *_slant_note(network, piece.stages[-1], stages[-1]))
+    notes = (*piece.notes, note)
     return replace(
         piece,
         network=network,
@@ -123,31 +124,6 @@ def give_fullness(
         notes=notes,
         unsewn=piece.unsewn or piece,
     )
-
-
-def _slant_note(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
-    """Return a note if springs no longer measure the cloth.
-
-    Gathers slant the mesh's edges, along which springs run, off the threads.
-    """
-    # Cloth that is worn under tension stores energy that springs never measure.
-    if network.model != "springs" or network.stretch is not None:
-        return []
-    missed, missed_before = _missed_energy(stage), _missed_energy(before)
-    thread = min(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
-    noticeable = 0.5 * thread * _NOTICEABLE_STRAIN**2 * float(network.cell_arrays.area.sum())
-    if missed < max(noticeable, _NOTICEABLE_RATIO * missed_before):
-        return []
-    stored = 1e3 * stage.strain_energy_j
-    return [
-        f"its gathers slant the mesh's edges off the grain, and springs along them tell of {stored - 1e3 * missed:.3g} mJ where "
-        f'{network.fabric.name} stores {stored:.3g}; model = "membrane" measures that exactly'
-    ]
-
-
-def _missed_energy(stage: Stage) -> float:
-    """Return the energy that the cloth stores and springs do not measure [J]."""
-    return stage.strain_energy_j - stage.model_energy_j
 
 
 def measure_fullness(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:
@@ -187,36 +163,25 @@ def _runs_along(positions: FloatArray, line: IntArray, axes: tuple[FloatArray, F
 
 
 def _wider_springs(
-    network: SpringNetwork, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+    network: SpringNetwork,
+    positions: FloatArray,
+    axes: tuple[FloatArray, FloatArray],
+    full: FloatArray,
+    *,
+    weighed: bool,
 ) -> SpringArrays:
-    """Return longer springs, of the stiffness that cells of the new sides have: along a triangle's side a, K b/a."""
+    """Return longer springs; `weighed` with the stiffness that quads of the new sides have, else with the one that they had."""
     springs, surface = network.spring_arrays, network.surface
     before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
     here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
-    longer = _stretch_factor(before, here)
-    stiffness = springs.stiffness * _stretch_factor(before[:, ::-1], here) / longer
-    shear_deficit = hourglass = None
-    if surface.is_quad.any():
-        # By what factors a quad's first edges and its others become longer; 1 for triangles.
-        wider = np.ones((len(surface.faces), 2))
-        corners = surface.faces[surface.is_quad]
-        of_quad, q = full[corners].mean(axis=1), positions[corners] @ np.column_stack(axes)
-        for k, sides in enumerate((q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0])):
-            wider[surface.is_quad, k] = _stretch_factor(sides, of_quad)
-        made = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
-        # Sides and diagonals of quads.
-        beside = np.arange(springs.count) >= springs.edge_count
-        halves, first = half_edges_of(surface), first_of_faces(surface, 4, 3)[surface.is_quad]
-        beside[halves.edge[first[:, None] + np.arange(4)]] = True
-        stiffness[beside] = made.stiffness[beside]
-        shear_deficit, hourglass = made.shear_deficit, made.hourglass
-    return replace(
-        springs,
-        listed_length=springs.listed(springs.rest_length * longer),
-        listed_stiffness=springs.listed(stiffness),
-        shear_deficit=shear_deficit,
-        hourglass=hourglass,
-    )
+    longer = springs.listed(springs.rest_length * _stretch_factor(before, here))
+    if weighed:
+        # By what factors a quad's first edges and its others become longer.
+        of_quad, q = full[surface.faces].mean(axis=1), positions[surface.faces] @ np.column_stack(axes)
+        sides = q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0]
+        wider = np.column_stack([_stretch_factor(side, of_quad) for side in sides])
+        springs = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
+    return replace(springs, listed_length=longer)
 
 
 def _stretch_factor(vector: FloatArray, full: FloatArray) -> FloatArray:

@@ -38,16 +38,15 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
     A single network is returned as it is.
 
     Args:
-        networks: of one fabric, grain, model and device; all or none with an intended stretch. Nothing is sewn or fixed
-            yet.
+        networks: of one fabric, grain and device; all or none with an intended stretch. Nothing is sewn or fixed yet.
     """
     first = networks[0]
     if len(networks) == 1:
         return first
     vertex = range_offsets([net.vertex_count for net in networks])
     stretches = [net.stretch for net in networks if net.stretch is not None]
-    held = [net.held_stiffness for net in networks if net.held_stiffness is not None]
-    buckling = np.concatenate([np.broadcast_to(net.buckling_stiffness, net.face_count) for net in networks])
+    held = [np.zeros((net.cell_count, 3)) if net.held_stiffness is None else net.held_stiffness for net in networks]
+    is_membrane = any(net.model == "membrane" for net in networks)
     # Springs are numbered mesh edges first, then diagonals, as in each network.
     springs = [net.spring_arrays for net in networks]
     edge = range_offsets([s.edge_count for s in springs])
@@ -89,10 +88,10 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
         spring_arrays=spring_arrays,
         cell_arrays=cell_arrays,
         device=first.device,
-        model=first.model,
+        model="membrane" if is_membrane else "springs",
         stretch=np.concatenate(stretches) if stretches else None,
-        held_stiffness=np.concatenate(held) if held else None,
-        buckling_stiffness=float(buckling[0]) if (buckling == buckling[0]).all() else buckling,
+        held_stiffness=np.concatenate(held) if is_membrane else None,
+        parts=tuple((net.model, net.face_count) for net in networks),
     )
 
 

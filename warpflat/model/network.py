@@ -1,7 +1,11 @@
 """SpringNetwork: a surface and a fabric as the arrays of a mass-spring model on a device.
 
-**Springs** (`warpflat.model.springs`) have their rest lengths from the surface in space and their stiffnesses from the
-fabric. **Cells** (`warpflat.surface.cells`) have their shape from the surface.
+**Cells** (`warpflat.surface.cells`) have their shape from the surface, and the cloth is measured in them as worn
+(`warpflat.kernels.membrane`): exact on any mesh. The springs along their sides then have no force. Their k_ij bound the
+membrane's stiffness, and are the matrix of the approximate implicit step.
+
+**Springs** (`warpflat.model.springs`) are the cloth of quads along the grain. They have their rest lengths from the
+surface in space and their stiffnesses from the fabric.
 
 **Threads stay straight.** Edge springs alone have minima that no cloth has. A compressed spring pushes its ends
 sideways, k (1 - L/l) < 0, so a thread compressed by more than G/K kinks between its neighbours at the scale of the
@@ -22,17 +26,13 @@ than the fabric, and would hold no vertex against its four neighbours. Theirs ar
 and their cells add a 1/2 G' (F s . F t)^2 for the deficit G', s along the quad and t across; it counts among the
 guard's energy. Where the structural springs left are too weak to hold a vertex against its four neighbours, quads have
 hourglass stiffness (`SpringArrays.hourglass`).
-
-**Membrane.** With `model = "membrane"` the cloth is measured as worn, cell by cell (`warpflat.kernels.membrane`): exact
-on any mesh, and without a guard. The springs then have no force. Their k_ij bound the membrane's stiffness, and are
-still the matrix of the approximate implicit step.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -50,19 +50,12 @@ from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.membrane_cell import Cloth
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
-from warpflat.model.membrane import Model, check_model, make_cloth, step_matrix
-from warpflat.model.springs import (
-    SpringArrays,
-    isotropic_buckling_stiffness,
-    measure_buckling_stiffness,
-    shorten_springs,
-    springs_of,
-    with_stiffness,
-)
+from warpflat.model.membrane import Model, choose_model, make_cloth, step_matrix
+from warpflat.model.springs import SpringArrays, shorten_springs, spring_geometry, springs_of, with_stiffness
 from warpflat.surface.cells import CellArrays, make_cells
 from warpflat.surface.mesh import Surface
 
-__all__ = ["SpringNetwork"]
+__all__ = ["CellModel", "SpringNetwork"]
 
 
 # Eq. (10) truncates a Neumann series after its second term. Where one spring outweighs all others (the short side of a
@@ -71,9 +64,16 @@ __all__ = ["SpringNetwork"]
 _PAIR_SHARE = 0.5
 
 
-class CellModel(NamedTuple):
-    """The kernels of a network's cells: what a step takes, the energy, and energy and forces at once; and their parameters."""
+@dataclass(frozen=True)
+class CellModel:
+    """What acts in the cells of some faces, from the first on, so many: the guard of springs, or the membrane.
 
+    Kernels: what a step takes, the energy, and energy and forces at once; and their parameters.
+    """
+
+    model: Model
+    first: int
+    count: int
     step: wp.Kernel
     energy: wp.Kernel
     potential: wp.Kernel
@@ -88,11 +88,10 @@ class SpringNetwork:
         surface, fabric, grain_angle: what it was made from.
         spring_arrays, cell_arrays: the springs and cells on the host.
         device: Warp device.
-        model: "springs", with their guard, or "membrane".
+        model: "springs", with their guard, or "membrane"; of pieces beside each other "membrane" where any is one.
         stretch: #F by 2, intended length worn over length flat along warp and weft; None if none is intended.
         held_stiffness: #C by 3, stiffness of the k_ij at each cell's corners [N/m], for a membrane.
-        buckling_stiffness: shear stiffness with which the springs keep threads straight [N/m], one for all or #F; the
-            fabric's where that is less.
+        parts: of pieces beside each other the model and the number of faces of each; of one piece its own.
         springs, cells, guard, cloth, seams, bonds: the structs that the kernels take.
     """
 
@@ -105,7 +104,7 @@ class SpringNetwork:
     model: Model = "springs"
     stretch: FloatArray | None = None
     held_stiffness: FloatArray | None = None
-    buckling_stiffness: float | FloatArray = np.inf
+    parts: tuple[tuple[Model, int], ...] = ()
     springs: Springs = field(init=False)
     cells: Cells = field(init=False)
     guard: ThreadGuard = field(init=False)
@@ -127,7 +126,7 @@ class SpringNetwork:
         *,
         grain_angle: float = 0.0,
         device: str | wp.Device | None = None,
-        model: Model = "springs",
+        model: Model | None = None,
         stretch: FloatArray | None = None,
     ) -> SpringNetwork:
         """Make the network of a surface.
@@ -137,28 +136,20 @@ class SpringNetwork:
             positions: #V by 2, the layout in which the directions of springs are measured [m].
             grain_angle: of the warp against +y, degrees.
             device: Warp device.
-            model: "springs" or "membrane".
+            model: "springs", of quads only, or "membrane"; if not given, by mesh and grain (`choose_model`).
             stretch: #F by 2, intended length worn over length flat along warp and weft. Springs and cells are then at
                 rest in a pattern that is smaller by this factor.
-
-        Raises:
-            InputError: an unknown model.
         """
-        check_model(model)
-        springs, cells = springs_of(surface, fabric, positions, grain_angle=grain_angle), make_cells(surface)
-        if stretch is not None:
-            springs = shorten_springs(springs, surface, positions, grain_axes(grain_angle), stretch)
-        held = None
+        model = model or choose_model("auto", surface, fabric, positions, grain_angle=grain_angle)
+        cells, axes, held = make_cells(surface), grain_axes(grain_angle), None
         if model == "membrane":
             intended = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
-            weights, held = step_matrix(
-                fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, intended
-            )
-            springs, buckling = with_stiffness(springs, cells, weights), np.inf
-        elif fabric.is_isotropic:
-            buckling = isotropic_buckling_stiffness(surface, fabric)
+            weights, held = step_matrix(fabric, axes, cells.corner, cells.edges, cells.area, positions, intended)
+            springs = with_stiffness(spring_geometry(surface), cells, weights)
         else:
-            buckling = measure_buckling_stiffness(surface, springs, positions, grain_axes(grain_angle)[0])
+            springs = springs_of(surface, fabric, positions, grain_angle=grain_angle)
+        if stretch is not None:
+            springs = shorten_springs(springs, surface, positions, axes, stretch)
         return cls(
             surface=surface,
             fabric=fabric,
@@ -169,7 +160,6 @@ class SpringNetwork:
             model=model,
             stretch=stretch,
             held_stiffness=held,
-            buckling_stiffness=buckling,
         )
 
     def __post_init__(self) -> None:
@@ -179,7 +169,7 @@ class SpringNetwork:
         springs.offset = _on(device, at.offset, wp.int32)
         springs.neighbor = _on(device, at.neighbor, wp.int32)
         springs.rest_length = _on(device, s.listed_length, wp.float64)
-        springs.active = 1.0 if self.model == "springs" else 0.0
+        springs.active = _on(device, self._active(), wp.int8)
         self.springs = springs
         # Those of a membrane change with its layout.
         k_ij = s.listed_stiffness if self.model == "springs" else s.listed_stiffness.copy()
@@ -192,9 +182,6 @@ class SpringNetwork:
         cells.offset = _on(device, corners.offset, wp.int32)
         cells.slot = _on(device, corners.entry, wp.int32)
         fabric, faces = self.fabric, self.face_count
-        buckling = np.minimum(fabric.shear_stiffness, self.buckling_stiffness)
-        onset = np.stack([buckling / fabric.stiffness_warp, buckling / fabric.stiffness_weft], axis=-1)
-        cells.onset = _on(device, np.broadcast_to(onset, (faces, 2)), wp.vec2d)
         same = partial(_constant, device.alias)
         cells.slack = same(wp.vec2d, 1.0, faces) if self.stretch is None else _on(device, 1.0 / self.stretch, wp.vec2d)
         cells.shear = same(wp.vec2d, 0.0, faces) if s.shear_deficit is None else _on(device, s.shear_deficit, wp.vec2d)
@@ -209,6 +196,9 @@ class SpringNetwork:
         guard = ThreadGuard()
         guard.warp, guard.weft = wp.vec2d(*warp), wp.vec2d(*weft)
         guard.stiffness_warp, guard.stiffness_weft = fabric.stiffness_warp, fabric.stiffness_weft
+        guard.onset = wp.vec2d(
+            fabric.shear_stiffness / fabric.stiffness_warp, fabric.shear_stiffness / fabric.stiffness_weft
+        )
         guard.isotropic = int(fabric.is_isotropic)
         self.guard = guard
         if self.held_stiffness is not None:
@@ -240,12 +230,31 @@ class SpringNetwork:
         self._sum_stiffness(around)
         return around
 
-    @property
-    def cell_model(self) -> CellModel:
-        """The kernels of the cells, and their parameters."""
-        if self.cloth is None:
-            return CellModel(evaluate_guard, compute_guard_energy, evaluate_guard_potential, self.guard)
-        return CellModel(evaluate_membrane, compute_membrane_energy, evaluate_membrane_potential, self.cloth)
+    @cached_property
+    def cell_models(self) -> tuple[CellModel, ...]:
+        """What acts in the cells, one for each run of faces of one model."""
+        found, first = list[CellModel](), 0
+        for model, count in self.parts or ((self.model, self.face_count),):
+            if found and found[-1].model == model:
+                found[-1] = replace(found[-1], count=found[-1].count + count)
+            elif model == "springs":
+                kernels = evaluate_guard, compute_guard_energy, evaluate_guard_potential
+                found.append(CellModel(model, first, count, *kernels, self.guard))
+            else:
+                assert self.cloth is not None
+                kernels = evaluate_membrane, compute_membrane_energy, evaluate_membrane_potential
+                found.append(CellModel(model, first, count, *kernels, self.cloth))
+            first += count
+        return tuple(found)
+
+    def _active(self) -> NDArray[np.int8]:
+        """Return 1 at the vertices whose springs are the cloth, #V."""
+        if len({model for model, _ in self.parts}) < 2:
+            return np.broadcast_to(np.int8(self.model == "springs"), self.vertex_count)
+        active, models = np.zeros(self.vertex_count, dtype=np.int8), [model == "springs" for model, _ in self.parts]
+        corners = self.cell_arrays.faces[np.repeat(models, [count for _, count in self.parts])]
+        active[corners[corners >= 0]] = 1
+        return active
 
     @property
     def vertex_count(self) -> int:

@@ -1,13 +1,13 @@
-"""The springs of a surface: rest lengths measured on it in space, stiffnesses in N/m from the fabric.
+"""The springs of a surface: rest lengths measured on it in space, stiffnesses in N/m.
 
-Each quad has four structural edges and two diagonals; a triangle has its edges (Van Gelder 1998).
+Quads along the grain are springs: each has four structural edges and two diagonals, with stiffnesses from the fabric. Other cloth is
+measured cell by cell; the springs along the sides of its cells are the matrix of the paper's step.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -21,20 +21,18 @@ from warpflat.kernels.stiffness import (
     find_sides,
     list_springs,
     measure_edges,
-    measure_shear_stiffness,
     weigh_quads,
-    weigh_triangles,
 )
-from warpflat.surface.cells import CellArrays, face_creases, first_of_faces, make_cells
+from warpflat.surface.cells import CellArrays, face_creases, first_of_faces
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
 from warpflat.surface.triangles import selected_rows, unfold_quad_diagonals
 
 __all__ = [
     "SpringArrays",
+    "SpringGeometry",
     "SpringsAround",
-    "isotropic_buckling_stiffness",
-    "measure_buckling_stiffness",
+    "fourfold_direction",
     "shorten_springs",
     "spring_geometry",
     "springs_along_cells",
@@ -47,14 +45,6 @@ __all__ = [
 # spring keeps this share of its stiffness, the shear springs are weaker, and the cell is sheared as a whole against
 # their deficit.
 _LEAST_STRUCTURAL_SHARE = 0.05
-# On triangles the guard begins at this share of the buckling stiffness: exactly at buckling threads would waver at no
-# cost, and a relaxation would creep for ever.
-_BUCKLING_SHARE = 0.75
-# Edges of quads within the first of these angles of the grain count as threads, beyond the second at their true angle,
-# and in between at a growing share of it, so that sizes of one pattern on both sides behave alike. Line relaxation may
-# follow edges up to the second angle.
-_ALIGNED, _OFF_GRAIN = np.deg2rad([7.5, 15.0])
-_QUARTER = np.pi / 2
 # A quad whose middle lines enclose an angle with less than this squared sine has no shape to keep.
 _LEAST_SINE_SQUARED = 1e-12
 
@@ -84,38 +74,34 @@ class SpringsAround:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _SpringGeometry:
-    """The springs of a surface as in SpringArrays, without what depends on the fabric."""
-
-    edge_count: int
-    around: SpringsAround
-    listed_length: FloatArray
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpringArrays:
-    """The springs as the kernels take them, each listed at both of its ends.
+class SpringGeometry:
+    """The springs of a surface, each listed at both of its ends, without what depends on the fabric.
 
     Attributes:
         around: the springs around each vertex.
-        listed_length, listed_stiffness: 2 #S, rest length [m] and stiffness [N/m] of each entry.
+        listed_length: 2 #S, rest length of each entry [m].
         edge_count: #E; the first springs are the mesh edges.
-        shear_deficit: #F by 2, shear stiffness that the springs of long quads lack, as `kernels.cells.Cells.shear`;
-            None without such quads.
-        hourglass: #F by 4, hourglass weights of quads, as `kernels.cells.Cells.hourglass`; None if no quad needs any.
-        aligned: whether there are quads whose edges run along the threads.
-        shear_excess: shear stiffness of the quads over the fabric's, above 1 where their edges run across the threads;
-            1 without quads.
     """
 
     around: SpringsAround
     listed_length: FloatArray
-    listed_stiffness: FloatArray
     edge_count: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringArrays(SpringGeometry):
+    """The springs as the kernels take them.
+
+    Attributes:
+        listed_stiffness: 2 #S, stiffness of each entry [N/m].
+        shear_deficit: #F by 2, shear stiffness that the springs of long quads lack, as `kernels.cells.Cells.shear`;
+            None without such quads.
+        hourglass: #F by 4, hourglass weights of quads, as `kernels.cells.Cells.hourglass`; None if no quad needs any.
+    """
+
+    listed_stiffness: FloatArray
     shear_deficit: FloatArray | None = None
     hourglass: FloatArray | None = None
-    aligned: bool = False
-    shear_excess: float = 1.0
 
     # A relaxation needs the lists alone, so the arrays with one entry a spring are made at their first use.
 
@@ -167,78 +153,45 @@ def springs_of(
     grain_angle: float = 0.0,
     wider: FloatArray | None = None,
 ) -> SpringArrays:
-    """Return springs with rest lengths from space and stiffnesses from the fabric.
+    """Return the springs of quads along the grain, with rest lengths from space and stiffnesses from the fabric.
 
     Args:
-        surface: of quads and/or triangles.
+        surface: of quads.
         fabric: stiffnesses [N/m].
-        positions: #V by 2, a layout [m]: directions are measured in the plane against the grain, since threads are
-            straight in the cloth and not on the body.
+        positions: #V by 2, a layout [m], in which the edges nearer to the warp are found.
         grain_angle: of the warp against +y, degrees.
         wider: #F by 2, intended length of a quad's first edges, and of its others, over that on the body. It determines
             the stiffnesses; rest lengths are still the body's.
     """
-    own, faces, is_quad = spring_geometry(surface), surface.faces, surface.is_quad
-    warp, _ = grain_axes(grain_angle)
-    of_side, diagonal = np.empty(3 * len(faces) + np.count_nonzero(is_quad)), np.empty(0)
+    own, quads = spring_geometry(surface), surface.faces
+    lattice = Lattice()
+    lattice.warp = wp.vec2d(*grain_axes(grain_angle)[0])
+    lattice.k_warp, lattice.k_weft = fabric.stiffness_warp, fabric.stiffness_weft
+    lattice.shear, lattice.least = fabric.shear_stiffness, _LEAST_STRUCTURAL_SHARE
+    halves = half_edges_of(surface)
+    of_side, diagonal, deficit, unheld = (
+        np.empty(shape) for shape in (halves.edge.shape, len(quads), (len(quads), 2), len(quads))
+    )
+    # Ones broadcast to all quads, where they are as long as on the body.
+    times = np.broadcast_to(np.ones(2), (len(quads), 2)) if wider is None else wider
+    times = wp.array(times, dtype=wp.vec2d, device="cpu", copy=False)
     position = np.ascontiguousarray(positions, dtype=np.float64)
-    quads: dict[str, Any] = {}
-    if not is_quad.all():
-        triangles, first = selected_rows(faces, ~is_quad), selected_rows(first_of_faces(surface, 4, 3), ~is_quad)
-        # 1/K(theta) of a strip cut at the angle theta from the warp and pulled along itself [m/N] has these coefficients of
-        # cos^4, sin^4 and sin^2 cos^2: 1/K_warp, 1/K_weft and 1/G - 2 nu/K_warp.
-        cross = 1.0 / fabric.shear_stiffness - 2.0 * fabric.poisson_ratio / fabric.stiffness_warp
-        compliance = wp.vec3d(1.0 / fabric.stiffness_warp, 1.0 / fabric.stiffness_weft, cross)
-        given = [surface.vertices, position, triangles, first, wp.vec2d(*warp), compliance]
-        launch_each(weigh_triangles, len(triangles), given, [of_side])
-    if is_quad.any():
-        lattice, angle = _lattice(fabric, selected_rows(faces, is_quad), position, warp)
-        diagonal, shear_deficit, hourglass = _weigh_quads(surface, position, lattice, wider, of_side)
-        quads = {
-            "shear_deficit": shear_deficit,
-            "hourglass": hourglass,
-            "aligned": _off_threads(angle) <= _OFF_GRAIN,
-            "shear_excess": lattice.shear / fabric.shear_stiffness,
-        }
+    given = [surface.vertices, position, quads, first_of_faces(surface, 4, 3), times, lattice]
+    launch_each(weigh_quads, len(quads), given, [of_side, diagonal, deficit, unheld])
+    hourglass, unstable = None, np.flatnonzero(unheld)
+    if len(unstable):
+        hourglass = np.zeros((len(quads), 4))
+        hourglass[unstable] = hourglass_weights(surface.vertices[quads[unstable]], unheld[unstable])
     # Every face that a mesh edge has adds to its stiffness.
-    at_edges = np.bincount(half_edges_of(surface).edge, of_side, minlength=own.edge_count)
+    at_edges = np.bincount(halves.edge, of_side, minlength=own.edge_count)
     return SpringArrays(
         around=own.around,
         listed_length=own.listed_length,
         listed_stiffness=own.around.listed(np.concatenate([at_edges, diagonal, diagonal])),
         edge_count=own.edge_count,
-        **quads,
+        shear_deficit=deficit if deficit.any() else None,
+        hourglass=hourglass,
     )
-
-
-def _weigh_quads(
-    surface: Surface, position: FloatArray, lattice: Lattice, wider: FloatArray | None, of_side: FloatArray
-) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-    """Compute the stiffnesses that quads give to their springs; those along their sides are written to `of_side`.
-
-    Returns:
-        #Q, stiffness of the diagonals [N/m]; #F by 2, shear deficits, and #F by 4, hourglass weights, as in
-        `SpringArrays`.
-    """
-    faces, is_quad, shear_deficit, hourglass = surface.faces, surface.is_quad, None, None
-    quads, first = selected_rows(faces, is_quad), selected_rows(first_of_faces(surface, 4, 3), is_quad)
-    diagonal, deficit, stabilisation = np.empty(len(quads)), np.empty((len(quads), 2)), np.empty(len(quads))
-    # Ones broadcast to all quads, where they are as long as on the body.
-    times = np.broadcast_to(np.ones(2), (len(quads), 2)) if wider is None else selected_rows(wider, is_quad)
-    times = wp.array(times, dtype=wp.vec2d, device="cpu", copy=False)
-    given = [surface.vertices, position, quads, first, times, lattice]
-    launch_each(weigh_quads, len(quads), given, [of_side, diagonal, deficit, stabilisation])
-    # Most quads have none: pages that are not written to take no memory.
-    if deficit.any():
-        lacking, shear_deficit = deficit.any(axis=1), np.zeros((len(faces), 2))
-        shear_deficit[np.flatnonzero(is_quad)[lacking]] = deficit[lacking]
-    unstable = np.flatnonzero(stabilisation)
-    if len(unstable):
-        hourglass = np.zeros((len(faces), 4))
-        hourglass[np.flatnonzero(is_quad)[unstable]] = hourglass_weights(
-            surface.vertices[quads[unstable]], stabilisation[unstable]
-        )
-    return diagonal, shear_deficit, hourglass
 
 
 def hourglass_weights(corners: FloatArray, stiffness: FloatArray) -> FloatArray:
@@ -266,59 +219,22 @@ def hourglass_weights(corners: FloatArray, stiffness: FloatArray) -> FloatArray:
     return np.asarray(mode * np.where(has_shape, np.sqrt(stiffness), 0.0)[:, None])
 
 
-def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
-    """Return K along a quad's first and second edges, and G [N/m], for first edges at `angle` [rad] from the warp.
+def fourfold_direction(quads: IntArray, positions: FloatArray, grain_angle: float) -> complex:
+    """Return the mean of exp(4i a) over quads (#Q by 4) in a layout (#V by 2 [m]), a the angle of their edges to the grain.
 
-    Within 7.5 degrees of warp or weft the edges are the threads. From 15 degrees on the crossed lattice gets the
-    rotated elasticity. This is an approximation: a crossed lattice has C12 = C66 = G, and no coupling of shear with
-    tension. In between it is rotated by a growing share of the angle. An isotropic fabric is not rotated, since C12 =
-    C66 = G is not isotropic itself, and a rotation would change the result.
+    A grid has this fourfold symmetry. A fourth of its angle is the mean of a; its modulus is 1 where all quads run alike.
     """
-    nearest = np.round(angle / _QUARTER) * _QUARTER
-    off = 0.0 if fabric.is_isotropic else _off_threads(angle)
-    share = np.clip((off - _ALIGNED) / (_OFF_GRAIN - _ALIGNED), 0.0, 1.0)
-    if share == 0.0:
-        if int(np.round(angle / _QUARTER)) % 2:
-            return fabric.stiffness_weft, fabric.stiffness_warp, fabric.shear_stiffness
-        return fabric.stiffness_warp, fabric.stiffness_weft, fabric.shear_stiffness
-    turned_by = nearest + share**2 * (3.0 - 2.0 * share) * (angle - nearest)
-    c, s = np.cos(turned_by), np.sin(turned_by)
-    warp, weft, shear = fabric.stiffness_warp, fabric.stiffness_weft, fabric.shear_stiffness
-    both = 6.0 * shear * s**2 * c**2
-    along = warp * c**4 + weft * s**4 + both
-    across = warp * s**4 + weft * c**4 + both
-    turned = (warp + weft - 2.0 * shear) * s**2 * c**2 + shear * (c**2 - s**2) ** 2
-    return float(along), float(across), float(turned)
-
-
-def _off_threads(angle: float) -> float:
-    """Return the angle between a direction at `angle` [rad] from the warp and the nearer of warp and weft [rad]."""
-    return float(abs(angle - np.round(angle / _QUARTER) * _QUARTER))
-
-
-def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: FloatArray) -> tuple[Lattice, float]:
-    """Return the fabric along the quads' edges, and the angle from the warp to their first edges [rad].
-
-    The angle between cells and grain is that of the whole piece (the mean over its cells, taken with the fourfold
-    symmetry of a grid).
-    """
+    warp, _ = grain_axes(grain_angle)
     # Vectors as complex numbers: a row of these is summed many times as fast as two columns of reals.
-    p = positions.view(np.complex128)[:, 0]
+    p = np.ascontiguousarray(positions, dtype=np.float64).view(np.complex128)[:, 0]
     along = ((p[quads[:, 1]] - p[quads[:, 0]]) + (p[quads[:, 2]] - p[quads[:, 3]])) * complex(warp[0], -warp[1])
     length = np.abs(along)
     twofold = (np.where(length > 0.0, along, 1.0) / np.where(length > 0.0, length, 1.0)) ** 2
-    mean = complex((twofold * twofold).sum())
-    angle = float(np.angle(mean)) / 4.0
-    across = np.array([-warp[1], warp[0]])
-    lattice = Lattice()
-    lattice.direction = wp.vec2d(*(np.cos(angle) * warp + np.sin(angle) * across))
-    lattice.along, lattice.across, lattice.shear = quad_stiffness(fabric, angle)
-    lattice.least = _LEAST_STRUCTURAL_SHARE
-    return lattice, angle
+    return complex((twofold * twofold).mean())
 
 
 @once_per_surface
-def spring_geometry(surface: Surface) -> _SpringGeometry:
+def spring_geometry(surface: Surface) -> SpringGeometry:
     """Return the springs of a surface without what depends on the fabric; made once for each surface."""
     vertices, around = surface.vertices, _springs_around(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=face_creases(surface))
@@ -326,7 +242,7 @@ def spring_geometry(surface: Surface) -> _SpringGeometry:
     rest_length = np.empty(around.count)
     rest_length[len(edges) :] = diagonal.T.ravel()
     launch_each(measure_edges, len(edges), [vertices, edges], [rest_length])
-    return read_only(_SpringGeometry(edge_count=len(edges), around=around, listed_length=around.listed(rest_length)))
+    return read_only(SpringGeometry(edge_count=len(edges), around=around, listed_length=around.listed(rest_length)))
 
 
 @once_per_faces
@@ -375,7 +291,7 @@ def shorten_springs(
     return replace(springs, listed_length=springs.listed(springs.rest_length / np.where(worn > 0.0, worn, 1.0)))
 
 
-def springs_along_cells(springs: SpringArrays, cells: CellArrays) -> IntArray:
+def springs_along_cells(springs: SpringGeometry, cells: CellArrays) -> IntArray:
     """Return the springs along each cell's edges 0-1, 1-2, 2-0, 3 #C."""
     around = springs.around
     side = np.empty_like(cells.corner)
@@ -384,44 +300,13 @@ def springs_along_cells(springs: SpringArrays, cells: CellArrays) -> IntArray:
     return side.ravel()
 
 
-def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
+def with_stiffness(springs: SpringGeometry, cells: CellArrays, weights: FloatArray) -> SpringArrays:
     """Return the springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
     side = springs_along_cells(springs, cells)
-    stiffness = np.bincount(side, weights.ravel(), minlength=springs.count).astype(np.float64)
-    return replace(springs, listed_stiffness=springs.listed(stiffness), shear_deficit=None, hourglass=None)
-
-
-def isotropic_buckling_stiffness(surface: Surface, fabric: Fabric) -> float:
-    """Return the result of `measure_buckling_stiffness` for an isotropic sheet, in which any direction may buckle.
-
-    The mean of cos^2 sin^2 over all directions is 1/8, and each triangle gives its three springs k L^2 = K A: 3 K / 8
-    on any mesh.
-    """
-    return np.inf if surface.is_quad.all() else _BUCKLING_SHARE * 3.0 / 8.0 * fabric.stiffness_warp
-
-
-def measure_buckling_stiffness(
-    surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray
-) -> float:
-    """Return the shear stiffness with which springs on triangles resist the buckling of threads [N/m].
-
-    It depends on the directions of the edges: split squares have K(45 degrees)/4, so threads kink at that over K, not
-    at G/K. Per vertex it is the sum of 1/2 k L^2 cos^2 sin^2 over the vertex's area, infinite beside a quad. The result
-    is three quarters of the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
-
-    Args:
-        surface, springs: of the piece.
-        positions: #V by 2, a layout [m].
-        warp: unit vector in the plane.
-    """
-    is_quad = surface.is_quad
-    if is_quad.all():
-        return np.inf
-    around, count = springs.around, len(surface.vertices)
-    hold = np.empty(count)
-    layout = np.ascontiguousarray(positions, dtype=np.float64)
-    lists = [around.offset, around.neighbor, springs.listed_length, springs.listed_stiffness]
-    given = [layout, *lists, make_cells(surface).vertex_areas, wp.vec2d(*warp)]
-    launch_each(measure_shear_stiffness, count, given, [hold])
-    hold[surface.faces[is_quad].ravel()] = np.inf
-    return _BUCKLING_SHARE * float(np.partition(hold, count // 4)[count // 4])
+    stiffness = np.bincount(side, weights.ravel(), minlength=springs.around.count).astype(np.float64)
+    return SpringArrays(
+        around=springs.around,
+        listed_length=springs.listed_length,
+        listed_stiffness=springs.around.listed(stiffness),
+        edge_count=springs.edge_count,
+    )

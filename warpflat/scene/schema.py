@@ -792,7 +792,7 @@ class SceneTable(Table):
     rings that are sewn along one side, as a neck band, "straight" all, "as worn" none."""
     bands_shorter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     """Share by which straight bands are cut shorter still, as rib is."""
-    model: Literal["springs", "membrane"] = "springs"
+    model: Literal["auto", "springs", "membrane"] = "auto"
     wear: WearTable | None = None
     drape: DrapeTable | None = None
     device: str | None = None

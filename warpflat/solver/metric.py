@@ -4,7 +4,7 @@ A metric A stands for the second derivative of the energy; the direction of desc
 `LaplacianFactor`: the Laplacian of the surface times the cloth's stiffness, the same for all layouts (Liu et al. 2017). On surfaces too
 large to factor its solution is a V-cycle: damped Jacobi before and after a correction by the Laplacian of the coarser mesh, down to one
 that is factored (Briggs, Henson and McCormick, A Multigrid Tutorial); L-BFGS takes as many iterations with it.
-`StiffnessFactor`: the Gauss-Newton stiffness J^T J of springs, guard and equations in one layout, in which stiff seams cost no more
+`StiffnessFactor`: the Gauss-Newton stiffness J^T J of cloth and equations in one layout, in which stiff seams cost no more
 iterations than soft ones.
 
 Rows R are added to it exactly, (A + R^T R)^-1 = A^-1 - A^-1 R^T (I + R A^-1 R^T)^-1 R A^-1: contacts, and the chords of the grain,
@@ -18,13 +18,16 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array, vstack
+import warp as wp
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array, vstack
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.launch import record
 from warpflat.core.sparse import factor_symmetric
 from warpflat.fabric.fabric import grain_axes
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
-from warpflat.model.network import SpringNetwork
+from warpflat.kernels.membrane import stiffen_membrane
+from warpflat.model.network import CellModel, SpringNetwork
 from warpflat.solver.collapse import iterate_coarsenings
 from warpflat.solver.grain import GrainAlignment
 from warpflat.surface.laplacian import factor_pays, held_laplacian, laplacian_solver
@@ -237,13 +240,39 @@ class Metric:
 
 
 def stiffness_matrix(network: SpringNetwork, positions: FloatArray) -> csc_array:
-    """Return the Gauss-Newton stiffness J^T J of springs and guard in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m].
+    """Return the Gauss-Newton stiffness J^T J of a network in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m].
 
-    It leaves out the negative stiffness across compressed springs, so that each direction is one of descent.
+    It leaves out the negative stiffness across compressed springs and threads, so that each direction is one of descent.
     """
-    free = diags_array(network.bonds.freedom.numpy().ravel())
-    rows = vstack([*_spring_rows(network, positions), *_cell_rows(network, positions)]) @ free
-    return csc_array(rows.T @ rows)
+    cells, size = network.cell_arrays, 2 * network.vertex_count
+    free, matrix = diags_array(network.bonds.freedom.numpy().ravel()), csc_array((size, size))
+    for part in network.cell_models:
+        begin, end = cells.of_face[[part.first, part.first + part.count]]
+        if part.model == "springs":
+            rows = (
+                vstack([*_spring_rows(network, positions, part), *_guard_rows(network, positions, slice(begin, end))])
+                @ free
+            )
+            matrix = matrix + rows.T @ rows
+        else:
+            matrix = matrix + free @ _membrane_stiffness(network, positions, part, slice(begin, end)) @ free
+    return csc_array(matrix)
+
+
+def _membrane_stiffness(network: SpringNetwork, positions: FloatArray, part: CellModel, cells: slice) -> csc_array:
+    """Return the stiffness of the cells of a part that is a membrane."""
+    device, size = network.device, 2 * network.vertex_count
+    blocks = wp.zeros(9 * network.cell_count, dtype=wp.mat22d, device=device)
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    given = [at, network.cells, part.parameters]
+    record(stiffen_membrane, dim=part.count, first=part.first, inputs=given, outputs=[blocks], device=device).launch()
+    corner, values = network.cell_arrays.corner[cells], blocks.numpy().reshape(-1, 3, 3, 2, 2)[cells]
+    place = 2 * corner[:, :, None] + np.arange(2, dtype=np.int32)
+    shape = values.transpose(0, 1, 3, 2, 4).shape
+    rows = np.broadcast_to(place[:, :, :, None, None], shape)
+    columns = np.broadcast_to(place[:, None, None], shape)
+    entries = values.transpose(0, 1, 3, 2, 4).ravel(), (rows.ravel(), columns.ravel())
+    return csc_array(coo_array(entries, shape=(size, size)))
 
 
 def _rows(count: int, vertices: IntArray, gradient: FloatArray) -> csr_array:
@@ -253,10 +282,15 @@ def _rows(count: int, vertices: IntArray, gradient: FloatArray) -> csr_array:
     return csr_array((gradient.ravel(), columns.ravel(), offset), shape=(len(vertices), 2 * count))
 
 
-def _spring_rows(network: SpringNetwork, positions: FloatArray) -> list[csr_array]:
-    """Return the rows along each spring, and across those that are stretched."""
+def _spring_rows(network: SpringNetwork, positions: FloatArray, part: CellModel) -> list[csr_array]:
+    """Return the rows along each spring of a part, and across those that are stretched."""
     springs, count = network.spring_arrays, network.vertex_count
     ends, rest, stiffness = springs.ends, springs.rest_length, springs.stiffness
+    if part.count < network.face_count:
+        inside = np.zeros(count, dtype=bool)
+        inside[network.cell_arrays.faces[part.first : part.first + part.count].ravel()] = True
+        own = inside[ends[:, 0]]
+        ends, rest, stiffness = ends[own], rest[own], stiffness[own]
     d = positions[ends[:, 1]] - positions[ends[:, 0]]
     length = np.sqrt(np.einsum("ij,ij->i", d, d))
     along = d * (np.sqrt(stiffness) / length)[:, None]
@@ -268,11 +302,12 @@ def _spring_rows(network: SpringNetwork, positions: FloatArray) -> list[csr_arra
     ]
 
 
-def _cell_rows(network: SpringNetwork, positions: FloatArray) -> list[csr_array]:
-    """Return the rows along and across each worn thread, in the cells in which the guard acts on it."""
-    cells, fabric, count = network.cell_arrays, network.fabric, network.vertex_count
-    slack, onsets = (array.numpy()[cells.face] for array in (network.cells.slack, network.cells.onset))
-    p0, p1, p2 = positions[cells.corner].transpose(1, 0, 2)
+def _guard_rows(network: SpringNetwork, positions: FloatArray, part: slice) -> list[csr_array]:
+    """Return the rows along and across each worn thread, in those cells of a part in which the guard acts on it."""
+    fabric, count = network.fabric, network.vertex_count
+    slack = network.cells.slack.numpy()[network.cell_arrays.face[part]]
+    corners, edges = network.cell_arrays.corner[part], network.cell_arrays.edges[part]
+    p0, p1, p2 = positions[corners].transpose(1, 0, 2)
     a, b = p1 - p0, p2 - p0
     det = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     # Rows: the gradients of the barycentric weights of corners 1 and 2.
@@ -280,20 +315,20 @@ def _cell_rows(network: SpringNetwork, positions: FloatArray) -> list[csr_array]
     rows = []
     axes = zip(grain_axes(network.grain_angle), (fabric.stiffness_warp, fabric.stiffness_weft), strict=True)
     for k, (axis, stiffness) in enumerate(axes):
-        onset = onsets[:, k]
+        onset = float(network.guard.onset[k])
         share = np.einsum("cij,cj->ci", gradient, np.outer(slack[:, k], axis))
-        worn = np.einsum("cij,cj->ci", cells.edges, share)
+        worn = np.einsum("cij,cj->ci", edges, share)
         stretch = np.sqrt(np.einsum("ij,ij->i", worn, worn))
         acts = np.flatnonzero(stretch > 1.0 + onset)
-        corner, share, stretch = cells.corner[acts], share[acts], stretch[acts]
+        corner, share, stretch = corners[acts], share[acts], stretch[acts]
         # F e changes by -F u (grad w . e) where a corner moves by u, w its weight.
-        deformation = cells.edges[acts] @ gradient[acts]
+        deformation = edges[acts] @ gradient[acts]
         of_corner = np.column_stack([share.sum(axis=1), -share])
         # Of a face of no size that is a NaN, which no factor takes.
         with np.errstate(invalid="ignore"):
             root = np.sqrt(stiffness * 0.5 * det[acts])
         unit = worn[acts] / stretch[:, None]
-        excess = np.sqrt(1.0 - (1.0 + onset[acts]) / stretch)
+        excess = np.sqrt(1.0 - (1.0 + onset) / stretch)
         for direction, size in ((unit, root), (_turned(unit), root * excess)):
             back = np.einsum("cji,cj->ci", deformation, direction) * size[:, None]
             rows.append(_rows(count, corner, of_corner[:, :, None] * back[:, None, :]))

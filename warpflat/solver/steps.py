@@ -180,14 +180,18 @@ class Relaxation:
 
     def _evaluation(self, scope: int) -> LaunchSequence:
         net, x, v = self.network, self.position, self.velocity
-        cells = record(
-            net.cell_model.step,
-            dim=net.face_count,
-            inputs=[x, v, net.cells, net.cell_model.parameters, self.time_step, self._coefficients, scope],
-            outputs=[self._cell_forces],
-            device=net.device,
-            turns=_TURNS,
-        )
+        cells = [
+            record(
+                each.step,
+                dim=each.count,
+                first=each.first,
+                inputs=[x, v, net.cells, each.parameters, self.time_step, self._coefficients, scope],
+                outputs=[self._cell_forces],
+                device=net.device,
+                turns=_TURNS,
+            )
+            for each in net.cell_models
+        ]
         own = [x, v, net.mass, net.spring_stiffness, net.springs, net.cells, self._cell_forces]
         of_seams = [net.bonds, self._seam_forces, self.load, self.time_step, self._coefficients, scope]
         gather = record(
@@ -198,7 +202,7 @@ class Relaxation:
             device=net.device,
             turns=_TURNS,
         )
-        return LaunchSequence([cells, *self._evaluate_seams, gather])
+        return LaunchSequence([*cells, *self._evaluate_seams, gather])
 
     @cached_property
     def _evaluate_seams(self) -> list[Launch]:
@@ -242,11 +246,12 @@ class Relaxation:
                 self._views[id(array)] = view
         return view
 
-    def _total(self, values: wp.array) -> float:
-        """Return the sum of an array on the device."""
+    def _total(self, values: wp.array, first: int = 0, count: int | None = None) -> float:
+        """Return the sum of an array on the device, or of so many entries from the first on."""
+        end = len(values) if count is None else first + count
         if self.network.device.is_cpu:
-            return float(self._on_host(values).sum())
-        return float(wp.utils.array_sum(values))
+            return float(self._on_host(values)[first:end].sum())
+        return float(wp.utils.array_sum(values[first:end]))
 
     def positions(self) -> FloatArray:
         """Return a copy of the layout, #V by 2 [m]."""
@@ -263,8 +268,11 @@ class Relaxation:
     def energies(self) -> Energies:
         """Return the energies of the present layout [J]."""
         self._measure_potential.launch()
-        springs, cells = self._total(self._vertex_energy), self._total(self._face_energy)
-        return Energies(springs, cells) if self.network.model == "springs" else Energies(cells, 0.0)
+        spring, guard = self._total(self._vertex_energy), 0.0
+        for each in self.network.cell_models:
+            stored = self._total(self._face_energy, each.first, each.count)
+            spring, guard = (spring, guard + stored) if each.model == "springs" else (spring + stored, guard)
+        return Energies(spring, guard)
 
     def evaluate(self) -> tuple[float, FloatArray]:
         """Return the energy of the cloth in the present layout [J], and the forces of cloth and seams, #V by 2 [N]; no step may follow."""
@@ -308,26 +316,34 @@ class Relaxation:
             outputs=[self._vertex_energy],
             device=net.device,
         )
-        cells = record(
-            net.cell_model.energy,
-            dim=net.face_count,
-            inputs=[self.position, net.cells, net.cell_model.parameters],
-            outputs=[self._face_energy],
-            device=net.device,
-        )
-        return LaunchSequence([springs, cells])
+        cells = [
+            record(
+                each.energy,
+                dim=each.count,
+                first=each.first,
+                inputs=[self.position, net.cells, each.parameters],
+                outputs=[self._face_energy],
+                device=net.device,
+            )
+            for each in net.cell_models
+        ]
+        return LaunchSequence([springs, *cells])
 
     @cached_property
     def _evaluate_potential(self) -> LaunchSequence:
         net = self.network
-        cells = record(
-            net.cell_model.potential,
-            dim=net.face_count,
-            inputs=[self.position, net.cells, net.cell_model.parameters],
-            outputs=[self._face_energy, self._cell_forces],
-            device=net.device,
-            turns=_TURNS,
-        )
+        cells = [
+            record(
+                each.potential,
+                dim=each.count,
+                first=each.first,
+                inputs=[self.position, net.cells, each.parameters],
+                outputs=[self._face_energy, self._cell_forces],
+                device=net.device,
+                turns=_TURNS,
+            )
+            for each in net.cell_models
+        ]
         gather = record(
             gather_potential,
             dim=net.vertex_count,
@@ -336,7 +352,7 @@ class Relaxation:
             device=net.device,
             turns=_TURNS,
         )
-        return LaunchSequence([cells, *self._evaluate_seams, gather])
+        return LaunchSequence([*cells, *self._evaluate_seams, gather])
 
     # --- convergence
 
@@ -483,7 +499,7 @@ def relax_by_steps(state: Relaxation, *, watch: Watch | None = None, each_step: 
 
 
 class TangentMatrix:
-    """The k_ij of a network whose model is the membrane.
+    """The k_ij of a network with pieces whose model is the membrane.
 
     A network is built with the k_ij of a cloth at rest. A cell whose shape in the plane differs much from that on the
     body, such as a sliver that the development has opened, is much softer. With the stiffness at rest its corners would
@@ -493,7 +509,14 @@ class TangentMatrix:
     def __init__(self, network: SpringNetwork) -> None:
         """Prepare updates of this network; nothing is changed before `update` is called."""
         self._network = network
-        self._side = springs_along_cells(network.spring_arrays, network.cell_arrays)
+        cells = network.cell_arrays
+        self._is_measured = np.zeros(network.cell_count, dtype=bool)
+        for each in network.cell_models:
+            if each.model == "membrane":
+                begin, end = cells.of_face[[each.first, each.first + each.count]]
+                self._is_measured[begin:end] = True
+        side = springs_along_cells(network.spring_arrays, cells).reshape(-1, 3)
+        self._side = side[self._is_measured].ravel()
         self._weight = wp.zeros(3 * network.cell_count, dtype=wp.float64, device=network.device)
 
     def update(self, position: wp.array) -> None:
@@ -507,7 +530,9 @@ class TangentMatrix:
             outputs=[self._weight],
             device=network.device,
         )
-        weight = np.array(self._weight.numpy())
-        stiffness = np.bincount(self._side, weight, minlength=network.spring_count).astype(np.float64)
+        weight = np.where(self._is_measured[:, None], self._weight.numpy().reshape(-1, 3), 0.0)
+        stiffness = network.spring_arrays.stiffness.copy()
+        sums = np.bincount(self._side, weight[self._is_measured].ravel(), minlength=network.spring_count)
+        stiffness[self._side] = sums[self._side]
         network.update_stiffness(stiffness)
-        network.cloth.held.assign(corner_sums(weight.reshape(-1, 3)).ravel())
+        network.cloth.held.assign(corner_sums(weight).ravel())
