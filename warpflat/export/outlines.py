@@ -15,7 +15,17 @@ from warpflat.core.text import format_count, quote_value
 from warpflat.pattern.piece_parts import FOLD_STRAIGHT
 from warpflat.surface.connectivity import join_labels
 
-__all__ = ["MEET", "DrawnLine", "Outlines", "check_closed", "close_lines", "counted", "find_outlines", "simple_ring"]
+__all__ = [
+    "MEET",
+    "DrawnLine",
+    "Outlines",
+    "check_closed",
+    "close_lines",
+    "counted",
+    "find_outlines",
+    "left_out",
+    "simple_ring",
+]
 
 #: Ends of lines that are nearer to each other than this [m] meet.
 MEET = 5e-5
@@ -58,11 +68,11 @@ class Outlines:
 
     Attributes:
         rings: closed lines, the largest first; a ring that several lines form has its group's name, or the first name of these.
-        chains: #P by 2 [m] each, the lines that do not close, joined where their ends meet.
+        chains: the lines that do not close, joined where their ends meet, named likewise.
     """
 
     rings: list[DrawnLine]
-    chains: list[FloatArray]
+    chains: list[DrawnLine]
 
 
 def close_lines(lines: Sequence[DrawnLine], fold: FloatArray | None = None) -> Outlines:
@@ -88,33 +98,30 @@ def close_lines(lines: Sequence[DrawnLine], fold: FloatArray | None = None) -> O
     merged = shapely.get_parts(shapely.line_merge(shapely.MultiLineString(unique)))
     closed = shapely.is_closed(merged)
     # Where more than two lines meet, the areas between them are outlines.
-    areas, cuts, dangles, _ = shapely.polygonize_full(merged[~closed])
-    found = [*merged[closed], *(area.exterior for area in shapely.get_parts(areas))]
-    # The lines of a ring all belong to one net; its name is that of the ring.
+    areas, *rest = shapely.polygonize_full(merged[~closed])
+    # The lines of a ring or a chain all belong to one net, which names it.
     net = join_labels(int(node.max()) + 1, *node.reshape(-1, 2).T)
     at_place = {tuple(point): net[number] for point, number in zip(place.reshape(-1, 2).tolist(), node, strict=True)}
     of_net: dict[int, list[DrawnLine]] = {}
     for line, number in zip(open_lines, node[::2], strict=True):
         of_net.setdefault(int(net[number]), []).append(line)
-    chains = [
-        np.asarray(line.coords) for part in (cuts, dangles) for line in shapely.get_parts(shapely.line_merge(part))
-    ]
-    folded = [
-        fold is not None and len(one) > 2 and (off_line(one[[0, -1]], fold) <= FOLD_STRAIGHT).all() for one in chains
-    ]
-    for points in [
-        *(np.asarray(ring.coords)[:-1] for ring in found),
-        *(one for one, closes in zip(chains, folded, strict=True) if closes),
-    ]:
+
+    def drawn(string: Any, *, closed: bool) -> DrawnLine:
+        points = np.asarray(string.coords)[:-1] if closed and string.is_closed else np.asarray(string.coords)
         own = next(of_net[int(at_place[key])] for point in points.tolist() if (key := tuple(point)) in at_place)
         groups = {line.group for line in own}
         named = next((line for line in own if line.name), own[0])
         group = groups.pop() if len(groups) == 1 else ""
-        rings.append(
-            DrawnLine(points=points, closed=True, name=group or named.name, by_hand=bool(group) or named.by_hand)
-        )
-    rest = [one for one, closes in zip(chains, folded, strict=True) if not closes]
-    return Outlines(rings=_largest_first([ring for ring in rings if len(ring.points) > 2]), chains=rest)
+        return DrawnLine(points=points, closed=closed, name=group or named.name, by_hand=bool(group) or named.by_hand)
+
+    rings += [drawn(ring, closed=True) for ring in merged[closed]]
+    rings += [drawn(area.exterior, closed=True) for area in shapely.get_parts(areas)]
+    chains = list[DrawnLine]()
+    for string in (each for part in rest for each in shapely.get_parts(shapely.line_merge(part))):
+        ends_on = fold is not None and (off_line(np.asarray(string.coords)[[0, -1]], fold) <= FOLD_STRAIGHT).all()
+        closes = bool(ends_on and len(string.coords) > 2)
+        (rings if closes else chains).append(drawn(string, closed=closes))
+    return Outlines(rings=_largest_first([ring for ring in rings if len(ring.points) > 2]), chains=chains)
 
 
 def simple_ring(points: FloatArray, where: str) -> FloatArray:
@@ -152,6 +159,13 @@ def counted(names: Sequence[str]) -> str:
     return ", ".join(f"{number} {name}" if number > 1 else name for name, number in count.items())
 
 
+def left_out(names: Sequence[str], what: str, where: str = "") -> str:
+    """Return the sentence that some lines were left out, with the names that they have: "2 open lines were left out: 'yoke'"."""
+    known = ", ".join(quote_value(name) for name in dict.fromkeys(names) if name)
+    verb = "was" if len(names) == 1 else "were"
+    return f"{format_count(len(names), what)}{where} {verb} left out" + (f": {known}" if known else "")
+
+
 def find_outlines(
     lines: Sequence[DrawnLine],
     where: str,
@@ -185,7 +199,7 @@ def find_outlines(
         frames = frames if len(frames) < len(rings) else []
         notes += [f"{_called(rings[k])} has the page's size and was taken for its frame" for k in frames]
     rings = [ring for k, ring in enumerate(rings) if k not in frames]
-    whole = [simple_ring(ring.points, f"{where}: {_called(ring)}") for ring in rings]
+    whole = [simple_ring(ring.points, f"{where}: {ring.name}" if ring.name else where) for ring in rings]
     polygons = np.array([shapely.Polygon(ring) for ring in whole])
     tree, taken = shapely.STRtree(polygons), np.zeros(len(rings), dtype=bool)
     wide: dict[int, Any] = {}
@@ -203,17 +217,10 @@ def find_outlines(
         if not taken[number]:
             within.append(ring.name)
     if within:
-        names = ", ".join(quote_value(name) for name in within if name)
-        notes.append(
-            f"{format_count(len(within), 'closed line')} within pieces {'was' if len(within) == 1 else 'were'} left out"
-            + (f": {names}" if names else "")
-        )
-    check_closed(found.chains, list(polygons[taken]), where)
+        notes.append(left_out(within, "closed line", " within pieces"))
+    check_closed([chain.points for chain in found.chains], list(polygons[taken]), where)
     if found.chains:
-        notes.append(
-            f"{format_count(len(found.chains), 'open line')} {'was' if len(found.chains) == 1 else 'were'} left out: "
-            "what is no closed line is no piece"
-        )
+        notes.append(left_out([chain.name for chain in found.chains], "open line"))
     pieces = [
         DrawnLine(points=points, closed=True, name=ring.name)
         for ring, points, kept in zip(rings, whole, taken.tolist(), strict=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -20,10 +20,10 @@ from warpflat.core.text import find_unused_name, format_count, quote_value
 from warpflat.export.outlines import (
     MEET,
     DrawnLine,
-    check_closed,
     close_lines,
     counted,
     find_outlines,
+    left_out,
     simple_ring,
 )
 from warpflat.pattern.corners import find_corners
@@ -45,7 +45,7 @@ _METRES_OF_HEADER = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0}
 # Layers of AAMA and ASTM; what is drawn on the others belongs to a piece, or checks it.
 _BOUNDARY, _FOLD, _GRAIN, _INNER, _SEWING = "1", "6", "7", "8", "14"
 # The layers of a piece that are not read, and what lies on them.
-_NOT_READ = {"4": "notch", "8": "inner line", "11": "inner cut", "13": "drill hole"}
+_NOT_READ = {"4": "notch mark", "8": "inner line", "11": "inner cut", "13": "drill hole"}
 _LINES = ("POLYLINE", "LWPOLYLINE", "LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE")
 _WORDS = ("TEXT", "MTEXT", "ATTRIB", "ATTDEF", "POINT")
 
@@ -120,7 +120,7 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         named = [block for block in blocks if block.drawn]
         for block in named or [block for block in blocks if block.name in inserted and block.all_lines]:
             pieces += _pieces(block, allowance, words, str(path), taken, notes)
-        if not named or style.drawn:
+        if style.all_lines:
             pieces += _loose_pieces(style, allowance, str(path), taken, notes)
         if not pieces:
             raise InputError(f"{path}: has no closed line; a piece is a closed line on layer 1 of a block")
@@ -177,8 +177,8 @@ def _read_block(name: str, entities: Iterable[Any], insert: Any, metres: float, 
         turn = metres * np.array([list(axes.ux)[:2], list(axes.uy)[:2]], dtype=np.float64)
         if not np.isfinite(turn).all() or abs(np.linalg.det(turn)) < 1e-18:
             raise InputError(f"block {quote_value(name)} is inserted without a size")
-    whole = recursive_decompose(entities) if name else (each for each in entities if each.dxftype() != "INSERT")
-    for entity in whole:
+    own = entities if name else (each for each in entities if each.dxftype() != "INSERT")
+    for entity in recursive_decompose(own):
         kind, layer = entity.dxftype(), str(entity.dxf.get("layer", "0"))
         layer = layer.lstrip("0") or "0" if layer.isdigit() else layer
         place.at = f"{kind} on layer {quote_value(layer)}"
@@ -300,13 +300,9 @@ def _pieces(
     else:
         outlines, lost = _outlines(block, where)
         notes += [f"{block.name}: {note}" for note in lost]
-        found = [_edges_without_names(block, ring, allowance, where) for ring in outlines]
+        found = [_edges_without_names(block, ring, allowance, where, notes) for ring in outlines]
         unread = {layer: block.points.get(layer, []) or block.lines.get(layer, []) for layer in _NOT_READ}
-        some = [
-            format_count(len(row), _NOT_READ[layer]).replace("notchs", "notches")
-            for layer, row in unread.items()
-            if row
-        ]
+        some = [format_count(len(row), _NOT_READ[layer]) for layer, row in unread.items() if row]
         notes += [f"{block.name}: not read: {', '.join(some)}"] if some else []
     pieces = list[Piece]()
     for edges in found:
@@ -337,7 +333,7 @@ def _loose_pieces(
     found, lost = find_outlines(lines, path)
     notes += lost
     if taken and not style.drawn:
-        notes += [f"{format_count(len(found), 'closed line')} beside the blocks were left out"] if found else []
+        notes += [left_out([ring.name for ring in found], "closed line", " beside the blocks")] if found else []
         return []
     pieces = list[Piece]()
     for number, ring in enumerate(found, start=1):
@@ -362,17 +358,26 @@ def _outlines(block: _Block, where: str) -> tuple[list[FloatArray], list[str]]:
     lines = block.lines.get(_BOUNDARY) or block.lines.get(_SEWING) if block.drawn else block.all_lines
     found, lost = find_outlines(lines or [], where, fold=_fold(block))
     if not found:
-        chains = close_lines(lines or []).chains
-        gap = max((float(np.linalg.norm(chain[-1] - chain[0])) for chain in chains), default=0.0)
         raise InputError(
-            f"{where}: its outline is open by {1e3 * gap:.1f} mm; a boundary is a closed line on layer 1, or closed by a line of "
-            "symmetry on layer 6"
+            f"{where}: its outline is open{_gap(close_lines(lines or []).chains)}; a boundary is a closed line on layer 1, or "
+            "closed by a line of symmetry on layer 6"
         )
     return [ring.points for ring in found], lost
 
 
-def _edges_without_names(block: _Block, ring: FloatArray, allowance: float | None, where: str) -> list[Edge]:
-    """Return the edges of a piece whose file names none, within an outer line (#P by 2 [m]): of its sewing line, if it has one."""
+def _gap(chains: Sequence[DrawnLine]) -> str:
+    """Return in words by how much the longest of open lines does not close; "" without any."""
+    gaps = [float(np.linalg.norm(chain.points[-1] - chain.points[0])) for chain in chains]
+    return f" by {1e3 * max(gaps):.1f} mm" if gaps else ""
+
+
+def _edges_without_names(
+    block: _Block, ring: FloatArray, allowance: float | None, where: str, notes: list[str]
+) -> list[Edge]:
+    """Return the edges of a piece whose file names none, within an outer line (#P by 2 [m]): of its sewing line, if it has one.
+
+    A sewing line that does not close is named in the notes.
+    """
     import shapely
 
     fold, outer = _fold(block), shapely.Polygon(ring).buffer(MEET)
@@ -388,7 +393,10 @@ def _edges_without_names(block: _Block, ring: FloatArray, allowance: float | Non
         ends = [line.points[[0, -1]] for line in sewing if not line.closed and len(line.points) > 2]
         corners = np.concatenate([sewn[sorted(find_corners(sewn, CORNER))], *ends])
         return with_drawn_allowances(split_outline(sewn, corners, fold), [np.concatenate([ring, ring[:1]])])
-    check_closed(joined.chains, [], where)
+    if joined.chains:
+        notes.append(
+            f"{block.name}: its sewing line on layer 14 is open{_gap(joined.chains)} and was left out: the outline is its boundary"
+        )
     if not block.lines.get(_BOUNDARY):
         return split_outline(ring, None, fold)
     corners = np.array(block.points.get("2", [])).reshape(-1, 2)
