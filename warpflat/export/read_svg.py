@@ -30,7 +30,8 @@ __all__ = ["read_svg"]
 _MILLIMETRES = {"": 25.4 / 96, "px": 25.4 / 96, "mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6}
 _LENGTH = re.compile(r"\s*([0-9.eE+-]*[0-9.])\s*([a-z]*)\s*")
 _TRANSFORM = re.compile(r"(\w+)\s*\(([^)]*)\)")
-_SAMPLES = cubic_weights(np.linspace(0.0, 1.0, 25)[1:])
+# Chords lie so near to their curve [m], and are at most so many.
+_FLAT, _MOST_CHORDS = 2e-5, 1000
 _KINDS = {"sew": "seam", "hem": "hem", "fold": "fold", "dart": "dart"}
 # Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
 _DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
@@ -120,7 +121,7 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
                 pieces.append(Piece(name=name, edges=boundary_edges(ring.points, allowance, f"{path}: {name}")))
         if not pieces:
             raise InputError(f"{path}: has no closed path; a piece is a closed path")
-        if drawing.unread:
+        if drawing.unread and not groups:
             notes.append(f"what is no line, or is hidden, was left out: {counted(drawing.unread)}")
         sizes: dict[str, list[Piece]] = {}
         for piece in pieces:
@@ -276,7 +277,8 @@ class _Drawing:
             InputError: a coordinate is no number or far off, or the drawing has too many points.
         """
         text = _path_data(element)
-        found = list(_flatten(text)) if text.strip() else []
+        scale = float(np.linalg.norm(matrix[:, :2], 2))
+        found = list(_flatten(text, scale)) if text.strip() else []
         lines, alone = list[DrawnLine](), len(found) == 1
         for points, closed in found:
             points = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])]
@@ -427,8 +429,8 @@ def _path_data(element: ET.Element) -> str:
     return ""
 
 
-def _flatten(text: str) -> Iterator[tuple[FloatArray, bool]]:
-    """Yield the lines of path data."""
+def _flatten(text: str, scale: float) -> Iterator[tuple[FloatArray, bool]]:
+    """Yield the lines of path data, whose unit is so long [m], curves within `_FLAT` of their chords."""
     from fontTools.pens.recordingPen import RecordingPen  # type: ignore[import-untyped]
     from fontTools.svgLib.path import parse_path  # type: ignore[import-untyped]
 
@@ -438,16 +440,21 @@ def _flatten(text: str) -> Iterator[tuple[FloatArray, bool]]:
     points: list[FloatArray] = []
     count = 0
     for command, args in pen.value:
-        count += len(_SAMPLES) if command in ("curveTo", "qCurveTo") else 1
+        control = [np.array(point, dtype=np.float64) for point in args]
+        pieces = 1
+        if command in ("curveTo", "qCurveTo"):
+            curve = as_cubic(np.array([points[-1][-1], *control]))
+            bend = scale * float(np.linalg.norm(np.diff(curve, n=2, axis=0), axis=1).max())
+            pieces = int(np.clip(np.ceil(np.sqrt(0.75 * bend / _FLAT)), 1, _MOST_CHORDS)) if bend < FARTHEST else 1
+        count += pieces
         if count > MOST_POINTS:
             raise InputError(_TOO_MANY)
-        control = [np.array(point, dtype=np.float64) for point in args]
         if command == "moveTo":
             points = [control[0][None]]
         elif command == "lineTo":
             points.append(control[0][None])
         elif command in ("curveTo", "qCurveTo"):
-            points.append(_SAMPLES @ as_cubic(np.array([points[-1][-1], *control])))
+            points.append(cubic_weights(np.linspace(0.0, 1.0, pieces + 1)[1:]) @ curve)
         else:
             line = np.concatenate(points)
             ends_meet = bool(np.linalg.norm(line[0] - line[-1]) < 1e-6)

@@ -104,7 +104,7 @@ def split_outline(ring: FloatArray, corners: FloatArray | None = None, fold: Flo
     return [
         Edge(name=f"edge_{n}", points=around[[a, b]], kind="fold")
         if a == on_fold
-        else Edge(name=f"edge_{n}", points=around[a : b + 1])
+        else Edge(name=f"edge_{n}", points=around[a : b + 1], as_drawn=True)
         for n, (a, b) in enumerate(zip(marks, ends, strict=True), 1)
     ]
 

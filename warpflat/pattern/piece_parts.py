@@ -50,6 +50,7 @@ class Edge:
         kind: "seam", "hem", "fold" (lies on the fold of the cloth), "cut" (raw, no allowance) or "dart" (a dart's leg).
         allowance: [m]; None for the default of the kind.
         vertices: #P, the mesh vertex of each point, where the edge comes from a mesh.
+        as_drawn: whether the points are the line as a file has it, straight between them, not samples of a curve.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Edge:
     kind: str = "seam"
     allowance: float | None = None
     vertices: IntArray | None = None
+    as_drawn: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in EDGE_KINDS:

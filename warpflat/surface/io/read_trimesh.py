@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.input_files import noting_resolver
+from warpflat.surface.io.gltf import plain_gltf
 from warpflat.surface.io.usd_stage import numbered
 
 __all__ = ["GLTF", "read_with_trimesh"]
 
 
-GLTF = (".glb", ".gltf")
+#: Kinds of glTF; an avatar in VRM is one with more in it.
+GLTF = (".glb", ".gltf", ".vrm")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,13 +116,14 @@ def _load_scene(file: Path) -> tuple[Any, dict[str, str]]:
             warnings.simplefilter("ignore")
             if suffix not in GLTF:
                 return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options), {}
-            data = file.read_bytes()
-            first, last = (20, 20 + int.from_bytes(data[12:16], "little")) if suffix == ".glb" else (0, len(data))
+            data = plain_gltf(file.read_bytes(), noting_resolver(file))
+            binary = data[:4] == b"glTF"
+            first, last = (20, 20 + int.from_bytes(data[12:16], "little")) if binary else (0, len(data))
             # Trimesh reads texture coordinates together with the pictures only; under this name they are an attribute like any other.
             head = data[first:last].replace(b'"TEXCOORD_0"', b'"_EXCOORD_0"')
             scene = trimesh.load_scene(
                 io.BytesIO(data[:first] + head + data[last:]),
-                file_type=suffix[1:],
+                file_type="glb" if binary else "gltf",
                 process=False,
                 resolver=noting_resolver(file),
                 **options,
