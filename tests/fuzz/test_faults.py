@@ -1,6 +1,6 @@
 """The table of WARPFLAT_DATA/faults again: small files that once lost something without a word, each row as its README has it.
 
-`pytest tests/regressions/test_faults.py -v` prints the table.
+`pytest tests/fuzz/test_faults.py -v` prints the table.
 """
 
 from __future__ import annotations
