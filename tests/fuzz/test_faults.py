@@ -134,6 +134,25 @@ def test_11_pieces_belong_to_sizes(row: Path, command: Command) -> None:
     assert ended.err == "warpflat: piece 'YOKE' is in size 42 only\n"
 
 
+def test_13_slits_in_line_are_one_seam(row: Path, command: Command) -> None:
+    ended = flattened(command, "back.obj", "--units", "m", "--seams", "uv")
+    assert ended.code == 0
+    assert "2 pieces, 1 seam of 61 cm" in ended.err
+
+
+def test_14_islands_may_be_stacked(row: Path, command: Command) -> None:
+    for file in ("apart.obj", "stacked.obj"):
+        ended = flattened(command, file, "--units", "mm", "--pattern", "uv")
+        assert ended.code == 0
+        assert "pieces: 2" in ended.out
+
+
+def test_15_what_the_seams_lose_with_the_inner_shell_is_dropped(row: Path, command: Command) -> None:
+    ended = flattened(command, "back.obj", "--units", "m")
+    assert ended.code == 0
+    assert "its outer sheet was taken" in ended.err
+
+
 def test_20_sparse_accessors_are_read(row: Path, command: Command) -> None:
     assert "(0.834 x 0.5 x 0.3 m)" in flattened(command, "m.gltf").out
 

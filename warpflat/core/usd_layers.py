@@ -6,6 +6,7 @@ The process that reads a file calls this: see :mod:`warpflat.core.usd_process`.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +29,13 @@ def check_layers(path: Path) -> None:
     Raises:
         InputError: one is not, is missing, or cannot be told: names the layer that refers to it.
     """
-    from pxr import Ar, Sdf
+    from pxr import Ar, Sdf, Tf
 
     folder, total = os.path.realpath(path.parent), path.stat().st_size
-    first = Sdf.Layer.FindOrOpen(str(path))
-    if not first:
-        return  # whoever opens it says so
-    todo, seen = [first], {str(path)}
+    todo, seen = list[Any](), {str(path)}
+    # Whoever opens the file itself says what is wrong with it.
+    with suppress(Tf.ErrorException):
+        todo = list(filter(None, [Sdf.Layer.FindOrOpen(str(path))]))
     while todo:
         layer = todo.pop()
         name = os.path.basename(layer.realPath) or path.name
@@ -65,7 +66,9 @@ def check_layers(path: Path) -> None:
                 raise InputError(f"{where}, which {error}") from None
             total += 0 if within else os.path.getsize(file)
             allow_size(total)
-            found = Sdf.Layer.FindOrOpen(full) if Ar.GetResolver().Resolve(full) else None
+            found = None
+            with suppress(Tf.ErrorException):
+                found = Sdf.Layer.FindOrOpen(full) if Ar.GetResolver().Resolve(full) else None
             if not found:
                 raise InputError(f"{where}, which is no readable USD file; put all parts beside it, or {_FLATTEN}")
             todo.append(found)

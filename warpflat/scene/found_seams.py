@@ -181,7 +181,10 @@ def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
 
 
 def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface], file: str) -> list[SeamCut]:
-    """Return a cut for each two islands that meet, along the edges that the layers still have after their repair."""
+    """Return a cut for each two islands that meet, along the edges that the layers still have within them after their repair.
+
+    What ran along an inner shell, or to it across a thickness, is gone with that, or lies on the border.
+    """
     from warpflat.seams.options import SeamCut
 
     place = weld_map(read.raw.vertices).astype(np.int64)
@@ -190,7 +193,11 @@ def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface]
         ends = np.sort(place[edges], axis=1)
         return ends[:, 0] * len(place) + ends[:, 1]
 
-    there = [layer.input_index[half_edges(layer.faces).edges].astype(np.int64) for layer in layers]
+    sides = [half_edges(layer.faces) for layer in layers]
+    there = [
+        layer.input_index[each.edges[each.count > 1]].astype(np.int64)
+        for layer, each in zip(layers, sides, strict=True)
+    ]
     edges = seams.edges[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))]
     beside = np.sort(seams.beside[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))], axis=1)
     return [
