@@ -148,7 +148,7 @@ def test_14_islands_may_be_stacked(row: Path, command: Command) -> None:
 
 
 def test_15_what_the_seams_lose_with_the_inner_shell_is_dropped(row: Path, command: Command) -> None:
-    ended = flattened(command, "back.obj", "--units", "m")
+    ended = flattened(command, "back.obj", "--units", "m", "-v")
     assert ended.code == 0
     assert "its outer sheet was taken" in ended.err
 

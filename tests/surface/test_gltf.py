@@ -127,6 +127,18 @@ def test_an_extension_of_looks_is_passed_over(tmp_path: Path) -> None:
     assert extents(scene.write(tmp_path / "a.glb")) == pytest.approx([1.0, 1.0, 0.1])
 
 
+def test_what_the_scene_does_not_show_is_named(tmp_path: Path) -> None:
+    scene = Scene()
+    scene.table["nodes"] = [{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "b", "translation": [3, 0, 0]}]
+    scene.mesh["targets"], scene.table["meshes"][0]["weights"] = [{"POSITION": 0}], [0.5]
+    surface = read_surface(scene.write(tmp_path / "a.glb"))
+    assert len(surface.faces) == 4
+    assert [note for note in surface.notes if "left out" in note] == [
+        "1 node with a mesh not in the scene that the file shows, left out: 'b'",
+        "weights of morph targets were left out: meshes are read as they are without",
+    ]
+
+
 def test_instances_are_named(tmp_path: Path) -> None:
     scene = Scene()
     scene.table["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {}}

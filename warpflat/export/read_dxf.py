@@ -15,6 +15,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.file_names import plain_label
 from warpflat.core.input_files import FARTHEST, Place, reading
 from warpflat.core.text import find_unused_name, format_count, quote_value
 from warpflat.export.outlines import (
@@ -259,8 +260,8 @@ def _pieces(
         InputError: an outline does not close.
     """
     where = f"{path}: {block.name}"
-    size, quantity = block.value("SIZE"), read_quantity(block.value("QUANTITY").split(",")[0])
-    title = block.value("PIECE NAME") or block.name
+    size, quantity = plain_label(block.value("SIZE")), read_quantity(block.value("QUANTITY").split(",")[0])
+    title = plain_label(block.value("PIECE NAME") or block.name)
     # The lines beside which a name stands, with their kind, and what is sewn to them.
     lines = [
         (layer, line.points)
@@ -316,7 +317,7 @@ def _pieces(
                 darts=darts,
                 quantity=quantity,
                 grain=grain,
-                fabric=block.value("FABRIC"),
+                fabric=plain_label(block.value("FABRIC")),
             )
         )
     return pieces

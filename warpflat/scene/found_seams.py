@@ -134,7 +134,13 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             notes.append(
                 f"{format_count(taken.joined, 'island')} of less than a thousandth of the cloth joined to a neighbour"
             )
-        cuts = [*by_hand, *_cuts_of_file(taken, read, layers, f"{path}")]
+        of_islands = _cuts_of_file(taken, read, layers, f"{path}")
+        cuts = [*by_hand, *of_islands]
+        if not of_islands and not of_file:
+            # They parted the inner shell from the outer one.
+            taken, given["find"] = None, "auto" if looked_for else "none"
+            if asked is None and not drawn and not by_itself:
+                return None
     waist = None
     if asked is not None and asked.body is not None:
         with errors_named(f"{scene.where}: find_seams.body"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Mapping
 from typing import Any
 from urllib.parse import unquote
 
@@ -11,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError
-from warpflat.core.text import quote_value
+from warpflat.core.text import format_count, quote_value
 
-__all__ = ["gltf_table", "plain_gltf"]
+__all__ = ["gltf_notes", "gltf_table", "plain_gltf"]
 
 _MAGIC, _BIN = b"glTF", b"BIN\x00"
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -45,6 +46,28 @@ def gltf_table(data: bytes) -> dict[str, Any]:
     if not isinstance(table, dict):
         raise ValueError("no table")
     return table
+
+
+def gltf_notes(table: Mapping[str, Any]) -> list[str]:
+    """Return what a file has beside the scene that it shows, in which meshes are as they are modelled: a sentence each."""
+    nodes, scenes, notes = table.get("nodes", []), table.get("scenes", []), list[str]()
+    if scenes:
+        todo = list(scenes[table.get("scene", 0)].get("nodes", []))
+        shown = set[int]()
+        while todo:
+            if (node := todo.pop()) not in shown:
+                shown.add(node)
+                todo += nodes[node].get("children", [])
+        others = [each for k, each in enumerate(nodes) if "mesh" in each and k not in shown]
+        if others:
+            names = ", ".join(quote_value(each.get("name", "")) for each in others)
+            notes.append(
+                f"{format_count(len(others), 'node')} with a mesh not in the scene that the file shows, left out: {names}"
+            )
+    weights = [*nodes, *table.get("meshes", [])]
+    if any(any(each.get("weights", [])) for each in weights):
+        notes.append("weights of morph targets were left out: meshes are read as they are without")
+    return notes
 
 
 def plain_gltf(data: bytes, resolver: Any) -> bytes:

@@ -304,6 +304,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         scale=scale,
         split_corners=mesh.split_corners,
         objects=_in_turn(mesh.groups, mesh.faces) if mesh.groups else None,
+        notes=mesh.notes,
         marked=list(mesh.edges),
         texture=mesh.corner_texture,
         face_material=mesh.face_material,
