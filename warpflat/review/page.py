@@ -198,7 +198,7 @@ def _page(
         "picture.png": f"{name} in space beside its pattern, coloured by strain energy",
         "drape.png": f"{name} worn: gap to the body and strain, from the front, the side and the back",
         "wear.png": "Strain of each piece when worn, along the warp and the weft",
-        "walked.png": "The two sides of every seam laid upon each other",
+        "walked.png": "The two sides of every seam laid along each other",
         "corrected.png": "Outlines before and after the correction",
     }
     images = []
