@@ -142,7 +142,7 @@ def test_every_block_is_a_piece_or_is_named(tmp_path: Path) -> None:
     found = drawing.read(tmp_path)
     assert [piece.name for piece in found.pieces[""]] == ["two", "two 2", "sleeve", "sleeve 2", "notched"]
     said = "\n".join(found.notes)
-    for words in ("notched: not read: 1 notch mark", "blocks without a boundary on layer 1 were left out: 'inner'",
+    for words in ("what belongs to pieces and is not read: notch", "blocks without a boundary on layer 1 were left out: 'inner'",
                   "1 closed line beside the blocks was left out"):  # fmt: skip
         assert words in said
     line(drawing.block("lost"), HALF[:3], "1")

@@ -154,9 +154,9 @@ def off_line(points: FloatArray, line: FloatArray) -> FloatArray:
 
 
 def counted(names: Sequence[str]) -> str:
-    """Return names in their order, those that occur more than once with their number: "3 HATCH, IMAGE"."""
+    """Return names in their order, those that occur more than once with their number: "HATCH (3), IMAGE"."""
     count = {name: names.count(name) for name in dict.fromkeys(names)}
-    return ", ".join(f"{number} {name}" if number > 1 else name for name, number in count.items())
+    return ", ".join(f"{name} ({number})" if number > 1 else name for name, number in count.items())
 
 
 def left_out(names: Sequence[str], what: str, where: str = "") -> str:

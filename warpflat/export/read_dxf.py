@@ -17,7 +17,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import plain_label
 from warpflat.core.input_files import FARTHEST, Place, reading
-from warpflat.core.text import find_unused_name, format_count, quote_value
+from warpflat.core.text import find_unused_name, quote_value
 from warpflat.export.outlines import (
     MEET,
     DrawnLine,
@@ -46,7 +46,7 @@ _METRES_OF_HEADER = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0}
 # Layers of AAMA and ASTM; what is drawn on the others belongs to a piece, or checks it.
 _BOUNDARY, _FOLD, _GRAIN, _INNER, _SEWING = "1", "6", "7", "8", "14"
 # The layers of a piece that are not read, and what lies on them.
-_NOT_READ = {"4": "notch mark", "8": "inner line", "11": "inner cut", "13": "drill hole"}
+_NOT_READ = {"4": "notch", "8": "inner line", "11": "inner cut", "13": "drill hole"}
 _LINES = ("POLYLINE", "LWPOLYLINE", "LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE")
 _WORDS = ("TEXT", "MTEXT", "ATTRIB", "ATTDEF", "POINT")
 
@@ -115,12 +115,12 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
             blocks.append(block)
         place.at = ""
         style, blocks = blocks[0], blocks[1:]
-        pieces, notes, taken = list[Piece](), list[str](), set[tuple[str, str]]()
+        pieces, notes, unread, taken = list[Piece](), list[str](), list[str](), set[tuple[str, str]]()
         words = dict[tuple[str, str], list[tuple[str, str, str]]]()
         # Other programs draw on layers of their own; a block that is not in the drawing, such as an arrow, is no piece then.
         named = [block for block in blocks if block.drawn]
         for block in named or [block for block in blocks if block.name in inserted and block.all_lines]:
-            pieces += _pieces(block, allowance, words, str(path), taken, notes)
+            pieces += _pieces(block, allowance, words, str(path), taken, notes, unread)
         if style.all_lines:
             pieces += _loose_pieces(style, allowance, str(path), taken, notes)
         if not pieces:
@@ -132,9 +132,10 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         ]
         if others:
             notes.append(f"blocks without a boundary on layer 1 were left out: {', '.join(map(quote_value, others))}")
-        unread = [kind for block in (style, *blocks) for kind in block.unread]
         if unread:
-            notes.append(f"what is no line was left out: {counted(unread)}")
+            notes.append(f"what belongs to pieces and is not read: {counted(unread)}")
+        if kinds := [kind for block in (style, *blocks) for kind in block.unread]:
+            notes.append(f"what is no line was left out: {counted(kinds)}")
         sizes: dict[str, list[Piece]] = {}
         for piece in pieces:
             sizes.setdefault(piece.size, []).append(piece)
@@ -245,6 +246,7 @@ def _pieces(
     path: str,
     taken: set[tuple[str, str]],
     notes: list[str],
+    unread: list[str],
 ) -> list[Piece]:
     """Return the pieces of a block, one but where it has more outlines.
 
@@ -255,6 +257,7 @@ def _pieces(
         path: what messages begin with.
         taken: sizes and names of pieces before it; its own are added.
         notes: what was left out is added.
+        unread: kinds of what belongs to the piece but is not read are added.
 
     Raises:
         InputError: an outline does not close.
@@ -302,9 +305,8 @@ def _pieces(
         outlines, lost = _outlines(block, where)
         notes += [f"{block.name}: {note}" for note in lost]
         found = [_edges_without_names(block, ring, allowance, where, notes) for ring in outlines]
-        unread = {layer: block.points.get(layer, []) or block.lines.get(layer, []) for layer in _NOT_READ}
-        some = [format_count(len(row), _NOT_READ[layer]) for layer, row in unread.items() if row]
-        notes += [f"{block.name}: not read: {', '.join(some)}"] if some else []
+        for layer, what in _NOT_READ.items():
+            unread += [what] * len(block.points.get(layer, []) or block.lines.get(layer, []))
     pieces = list[Piece]()
     for edges in found:
         name = find_unused_name(title, {other for of, other in taken if of == size})
