@@ -22,7 +22,8 @@ def test_rounding_noise_is_small_repeats_and_leaves_whole_numbers(dtype: type[np
     values = np.random.default_rng(0).normal(size=(100, 20)).astype(dtype)
     once, again, other = (RoundingNoise(seed).of_array(values) for seed in (1, 1, 2))
     np.testing.assert_array_equal(once, again)
-    assert once.dtype == dtype and (once != other).any(axis=1).all()
+    assert once.dtype == dtype
+    assert (once != other).any(axis=1).all()
     size = np.std((once / values - 1.0).astype(np.float64)) * np.finfo(np.float64).eps / np.finfo(dtype).eps
     assert size == pytest.approx(NOISE, rel=0.1)
     whole = np.array([-3.0, 0.0, 7.0, np.inf], dtype=dtype)

@@ -178,9 +178,9 @@ def test_a_name_that_no_file_can_have_is_one_line(studio: Studio, name: str) -> 
 
 def test_what_a_page_says_is_obeyed(studio: Studio) -> None:
     assert not studio.say([change("cloth", "denim")])
-    assert studio.page.session.scene.settings.fabric == "denim"
+    studio.wait(lambda: studio.page.session.scene.settings.fabric == "denim")
     assert not studio.say([change("do", "Undo")])
-    assert studio.page.session.scene.settings.fabric != "denim"
+    studio.wait(lambda: studio.page.session.scene.settings.fabric != "denim")
 
 
 def test_a_fault_of_the_program_is_one_line_and_the_studio_goes_on(
