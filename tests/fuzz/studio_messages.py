@@ -194,7 +194,7 @@ class Studio:
         """What no refused act may change."""
         session = self.page.session
         files = {path: path.read_bytes() for path in self.folder.rglob("*") if path.is_file()}
-        parts = {uuid: part.value for uuid, part in self._parts().items()}
+        parts = {uuid: part.value for uuid, part in self.parts().items()}
         return session.scene.settings, session.can_undo, session.can_redo, session.preview, session.saved, parts, files
 
     def ask(self, request: str) -> bool:
@@ -303,7 +303,8 @@ class Studio:
             assert time.monotonic() < end, "the studio does not go on"
             time.sleep(0.002)
 
-    def _parts(self) -> dict[str, Any]:
+    def parts(self) -> dict[str, Any]:
+        """Return the parts of the panel."""
         return dict(self.page.server.gui._gui_input_handle_from_uuid)
 
     def _filled(self, text: str) -> str:
@@ -316,7 +317,7 @@ class Studio:
             ("protocol", f"viser-v{viser.__version__}"),
         ):
             text = text.replace(f"@{word}@", value)
-        uuids = {part.label: uuid for uuid, part in self._parts().items()}
+        uuids = {part.label: uuid for uuid, part in self.parts().items()}
         return re.sub(r"@part:([^@]*)@", lambda found: uuids.get(found[1], found[1]), text)
 
     def _encoded(self, message: Any) -> bytes:
