@@ -181,6 +181,17 @@ def test_pieces_belong_to_sizes(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_a_piece_without_a_size_is_in_all(tmp_path: Path) -> None:
+    drawing = Drawing()
+    for name, size in (("front", "42"), ("front", "44"), ("pocket", "")):
+        line(drawing.block(name, size=size), HALF, "1", close=True)
+    found = drawing.read(tmp_path)
+    assert {size: [piece.name for piece in row] for size, row in found.pieces.items()} == {
+        "42": ["front", "pocket"], "44": ["front", "pocket"],
+    }  # fmt: skip
+    assert found.notes == []
+
+
 def test_a_line_of_a_file_stays_as_it_is_drawn(tmp_path: Path) -> None:
     """A corner of 33 degrees is no sample of a curve."""
     drawing = Drawing()

@@ -139,6 +139,12 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         sizes: dict[str, list[Piece]] = {}
         for piece in pieces:
             sizes.setdefault(piece.size, []).append(piece)
+        if "" in sizes and len(sizes) > 1:
+            # A piece without a size is cut for all.
+            for piece in sizes.pop(""):
+                for size, row in sizes.items():
+                    name = find_unused_name(piece.name, {other.name for other in row})
+                    row.append(replace(piece, name=name, size=size))
         first = next(iter(sizes))
         seams = seams_of_words(entry for (size, _), rows in words.items() if size == first for entry in rows)
         sample = style.value("SAMPLE SIZE")

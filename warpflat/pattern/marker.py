@@ -249,7 +249,8 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
         angles = [0.0] if cloth.one_way else [0.0, 180.0]
         # A polygon with few corners that contains the cut line.
         exact = shapely.Polygon(cut)
-        simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
+        with np.errstate(invalid="ignore"):  # a flag of GEOS's tries; what comes out is checked
+            simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
         simple = simple if simple.contains(exact) else exact
         corners = np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
         items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in corners.tolist()], 1, angles))
