@@ -25,14 +25,14 @@ from warpflat.cli.flatten import flatten
 from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.new import new
-from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
+from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES, NOT_CONVERGED
 from warpflat.cli.review import review
 from warpflat.cli.run import run
 from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.cli.studio import studio
 from warpflat.core.errors import InputError, system_reason
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
-from warpflat.core.output import listening_to_left_out
+from warpflat.core.output import LeftOut, listening_to_left_out
 from warpflat.core.source_date import source_date
 from warpflat.core.text import one_line
 
@@ -45,19 +45,17 @@ class _Interrupted(Exception):
 
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
-        left_out: dict[str, None] = {}
+        left_out = list[LeftOut]()
         try:
-            with (
-                stop_on_signals(),
-                listening_to_left_out(lambda path, note: left_out.setdefault(f"{path.parent}: {note}")),
-            ):
+            with stop_on_signals(), listening_to_left_out(left_out.append):
                 code = super().invoke(ctx)
         except KeyboardInterrupt as error:
             # Click would print an empty line of its own.
             raise _Interrupted(error.code if isinstance(error, Stopped) else INTERRUPTED) from None
-        for note in left_out:
-            click.echo(one_line(f"warpflat: note: {note}"), err=True)
-        return code
+        for step in dict.fromkeys(left_out):
+            where = "" if step.folder is None else f"{step.folder}: "
+            click.echo(one_line(f"warpflat: {'' if step.is_needed else 'note: '}{where}{step.note}"), err=True)
+        return code or (NOT_CONVERGED if any(step.is_needed for step in left_out) else DONE)
 
 
 @click.group(

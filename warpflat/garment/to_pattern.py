@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.output import optional_step
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import find_unused_name, quote_value
 from warpflat.cutting.separate_pieces import separate
@@ -238,8 +240,12 @@ def pattern_of_garment(
             head = garment.mannequin.extremity("head")
             girths[size] |= {} if head is None else {"head": head}
     rises = hem_rises(pattern, sample.finishing)
-    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width)
-    pattern = add_pockets(pattern, sample.pockets)
+    with optional_step("the pattern has no finishing"):
+        pattern = finish_edges(
+            pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width
+        )
+    with optional_step("the pattern has no pockets"):
+        pattern = add_pockets(pattern, sample.pockets)
     if not rises:
         # Godets of one size are equal, unless a slanted hem cuts them.
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
@@ -514,12 +520,19 @@ def pattern_of_surface(
     """
     rules = rules or EdgeRules()
     ends = ends or {}
-    pieces = [_mesh_piece(result, size, ends.get(result.surface.name, ())) for result in results]
+    drawn = dict[str, Piece]()
+    for result in results:
+        with optional_step(f"{result.surface.name} was left out of the pattern") if len(results) > 1 else nullcontext():
+            drawn[result.surface.name] = _mesh_piece(result, size, ends.get(result.surface.name, ()))
+    if not drawn:
+        raise InputError("none of the pieces can be drawn")
+    results, pieces = [result for result in results if result.surface.name in drawn], list(drawn.values())
     named = []
     for seam in seams:
-        first, second = (_edges_along(line, results, pieces) for line in seam.sides)
-        back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
-        named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
+        with optional_step(f"seam {seam.name!r} was left out of the pattern"):
+            first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+            back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
+            named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
     names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
     rules, notes = rules.known(names)
     notes += tuple(

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, StepError
+from warpflat.core.output import optional_step
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.remedies import advise
 from warpflat.cutting.separate_pieces import cut_surfaces
@@ -50,6 +51,8 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
 
+# How a note begins on pieces that cannot be sewn.
+_UNSEWN = "the pieces are not sewn, and their seams do not match: each lies as it does on its own"
 # Work units that a piece takes alone at most before it is sewn to others.
 _ALONE = 4000
 
@@ -148,10 +151,14 @@ class MeshPlan:
             constraints = scene_constraints(settings.constraints, lines)
             # Where nobody has said what meets what, a seam is eased as a tailor does it.
             eased = self.found is not None or bool(self.panels)
-            garment = sew_pieces(
-                pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased, bands=settings.bands,
+            sewing = partial(
+                sew_pieces, pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased, bands=settings.bands,
                 shorter=settings.bands_shorter,
             )  # fmt: skip
+            with optional_step(_UNSEWN, of=StepError) as unsewn:
+                garment = sewing()
+            if unsewn:
+                garment = sewing(relaxed=False)
             if self.panels:
                 garment = garment_as_cut(
                     self.panels, self.surfaces, fabric=scene_fabric(scene), name=scene.name, flattened=garment,
@@ -213,7 +220,8 @@ class GarmentPlan:
             InputError: as :func:`warpflat.flatten_form`.
         """
         with errors_named(self.scene.where):
-            garment = flatten_form(
+            flattened = partial(
+                flatten_form,
                 self.mannequin,
                 self.form,
                 callback=callback,
@@ -222,6 +230,10 @@ class GarmentPlan:
                 constraints=self.constraints,
                 **self.settings,
             )
+            with optional_step(_UNSEWN, of=StepError) as unsewn:
+                garment = flattened()
+            if unsewn:
+                garment = flattened(sewn=False)
             finishing = scene_finishing(self.scene.settings.finishing)
             pockets = scene_pockets(self.scene.settings.pockets)
         for name, recorder in (recorders or {}).items():
