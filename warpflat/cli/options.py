@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpflat.core.environment import require_environment
 from warpflat.core.memory_limit import require_memory_for_libraries
 
 __all__ = ["BAD_INPUT", "DONE", "EXIT_CODES", "NOT_CONVERGED", "RUN_FILES", "ComputingCommand", "output_options"]
@@ -45,14 +46,15 @@ _VERBOSE = click.option(
 
 
 class ComputingCommand(click.Command):
-    """A command that loads the numerical libraries, if there is memory for them."""
+    """A command that loads the numerical libraries, if they can run here."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command.
 
         Raises:
-            InputError: the memory limit leaves no room for the libraries.
+            InputError: the memory limit leaves no room for the libraries, or what surrounds the process would make them crash.
         """
+        require_environment()
         require_memory_for_libraries()
         return super().invoke(ctx)
 

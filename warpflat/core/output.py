@@ -10,9 +10,9 @@ since, is the user's: it is neither replaced nor removed, and nor is a file from
 
 What is made is kept. Once pieces are flattened, a step that cannot be taken (:func:`optional_step`), such as sewing, a hole, a half on
 the fold, a file of the pattern or a picture, is left out: the rest is made, and a note names it, one sentence on the console and under
-`notes` in `metrics.json`. Under `left_out` stands there, too, what a pattern needs: the run then ends with exit code 1. A note that names an
-error of Python is a fault of the program. What the user must see to ends a run as ever: a place that cannot be written, or a file of the
-user's there. So do an interruption and a want of memory.
+`notes` in `metrics.json`. Under `left_out` stands there, too, what a pattern needs: the run then ends with exit code 1. A note that
+names an error of Python is a fault of the program. What the user must see to ends a run as ever: a place that cannot be written, or a
+file of the user's there. So do an interruption and a want of memory.
 """
 
 from __future__ import annotations
@@ -72,6 +72,7 @@ __all__ = [
     "write_json",
     "write_report",
     "write_sealed",
+    "written_folders",
 ]
 
 # .NAME-warpflat-MACHINE-PROCESS-RANDOM.SUFFIX
@@ -198,10 +199,13 @@ class _Run:
             raise _cannot_write(self.folder / name, error) from error
         # From here on the new files are those of the folder, whatever happens to what is hidden.
         (self.hidden / _FRESH).unlink()
+        _written.append(self.folder)
 
 
 _runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
 _listeners: ContextVar[tuple[Listener, ...]] = ContextVar("left_out", default=())
+# The folders into which this process has written.
+_written: list[Path] = []
 # Hidden files and folders that this process has made or is about to make, and the folders that go with each if nothing is left in them.
 _unfinished: dict[Path, Sequence[Path]] = {}
 
@@ -266,7 +270,7 @@ def output_folder(
 def prepare_folder(path: str | os.PathLike[str]) -> Path:
     """Create the output folder, parents included.
 
-    What killed runs have left half-written there is removed (see :func:`remove_unfinished`).
+    What killed runs have left half-written there, and in the folders beside it, is removed (see :func:`remove_unfinished`).
 
     Raises:
         InputError: it is a file, lies below a file, or cannot be created, or its name is no text.
@@ -285,7 +289,16 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise _no_output_folder(folder, error) from error
     remove_unfinished(folder)
+    with suppress(OSError):
+        for beside in {path.parent for path in folder.absolute().parent.glob("*/.run-warpflat-*")}:
+            if not beside.is_symlink():
+                remove_unfinished(beside)
     return folder
+
+
+def written_folders() -> tuple[Path, ...]:
+    """Return the folders into which the runs of this process have written their files, in order."""
+    return tuple(_written)
 
 
 def expect_files(folder: Path, files: Iterable[str]) -> None:

@@ -132,8 +132,14 @@ def pattern_of_garment(
                 f"{' and '.join(dict.fromkeys(pair.pieces))} about ({place}) cm: no edges of them fit each other there",
             )
         # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
+        eased = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
         stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
-        pattern = replace(pattern, seams=[_eased(seam, pattern, stretched) for seam in pattern.seams])
+        pattern = replace(
+            pattern,
+            seams=[
+                replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in eased) for seam in pattern.seams
+            ],
+        )
         if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
             pattern = _named_by_pieces(pattern)
             return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
@@ -290,9 +296,14 @@ def _named_by_pieces(pattern: Pattern) -> Pattern:
     return replace(pattern, seams=seams)
 
 
+def _pieces_of(seam: Seam) -> frozenset[str]:
+    """Return the names of the pieces that a seam joins."""
+    return frozenset(side.piece for row in seam.sides for side in row)
+
+
 def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
     """Return a seam of pieces that are stretched to each other with its longer side last, eased to the other."""
-    if frozenset(side.piece for row in seam.sides for side in row) not in stretched:
+    if _pieces_of(seam) not in stretched:
         return seam
     first, second = sorted(
         seam.sides,

@@ -235,16 +235,18 @@ def as_in_layout(
     """
     found = {key: (curve, 0.0) for key, curve in curves.items()}
     flat = {key: (chords(line), 0.0) for key, line in lines.items()}
-    unchecked: list[tuple[Sides, Eased]] = [(seam.sides, (seam.ease, seam.eased)) for seam in seams]
+    unchecked = list(seams)
 
-    def strays(seam: tuple[Sides, Eased]) -> bool:
-        drawn, laid = (_differences(*_both(seam, lines, each)) for each in (found, flat))
-        return any(one > max(1.0, _NO_WORSE * other) for one, other in zip(drawn, laid, strict=True))
+    def strays(seam: Seam) -> bool:
+        drawn, chord = (_both((seam.sides, (seam.ease, seam.eased)), lines, each) for each in (found, flat))
+        laid = chord[:2] if seam.as_laid else None
+        now, least = (_differences(*each, laid) for each in (drawn, chord))
+        return any(one > max(1.0, _NO_WORSE * other) for one, other in zip(now, least, strict=True))
 
     # Chords on one side of a seam may change an edge of another one.
     while straying := [seam for seam in unchecked if strays(seam)]:
-        for sides, _ in straying:
-            found |= {key: flat[key] for row in sides for key in ((side.piece, side.edge) for side in row)}
+        for seam in straying:
+            found |= {key: flat[key] for row in seam.sides for key in ((side.piece, side.edge) for side in row)}
         unchecked = [seam for seam in unchecked if seam not in straying]
     return {key: curve for key, (curve, _) in found.items()}
 
@@ -387,9 +389,11 @@ def _difference(first: FloatArray, second: FloatArray, ease: Eased) -> float:
     return max(_differences(first, second, ease))
 
 
-def _differences(first: FloatArray, second: FloatArray, ease: Eased) -> tuple[float, float]:
+def _differences(
+    first: FloatArray, second: FloatArray, ease: Eased, laid: tuple[FloatArray, FloatArray] | None = None
+) -> tuple[float, float]:
     """Return by how much the sides of a seam differ as a whole, and over a short stretch, each over what is allowed."""
-    near = worst_difference(first, second, *ease)
+    near = worst_difference(first, second, *ease, laid=laid)
     whole = abs(second[-1] - first[-1] * (1 + ease[0])) / SEAM_TOLERANCE
     return float(whole), 0.0 if near is None else near / LOCAL_TOLERANCE
 

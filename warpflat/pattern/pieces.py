@@ -192,6 +192,8 @@ class Seam:
         sides: exactly two, each a sequence of `SeamSide`.
         ease: length of the second side over the first, minus 1: 0.03 eases 3 % more of the second side in.
         eased: shares of the first side's length between which the second is longer; all along it if not given.
+        as_laid: whether its sides are as long as each other as a whole only: what one has more here than the other, in the points of its
+            edges, is eased in there.
         notches: fractions of the first side's length in (0, 1) that get notches on both sides; None places them by length.
         size_notches: by size, fractions instead of `notches`, where a notch stands for a length, as the end of a zip.
         double: double notches; None means double where a back takes part and no front does.
@@ -202,6 +204,7 @@ class Seam:
     sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
     ease: float = 0.0
     eased: tuple[float, float] = (0.0, 1.0)
+    as_laid: bool = False
     notches: tuple[float, ...] | None = None
     size_notches: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     double: bool | None = None
