@@ -182,7 +182,10 @@ def summary_lines(
         if ring["passes"] is False
     ]
     parts += [f"needs an opening at {' and '.join(shut)}"] if shut else []
-    parts += [f"print {folder}/pattern.pdf"] if "pattern.pdf" in files else []
+    if metrics.get("garment", {}).get("no_pattern"):
+        parts.append("no pattern yet")
+    elif "pattern.pdf" in files:
+        parts.append(f"print {folder}/pattern.pdf")
     lines.append(_clipped(f"result: {'; '.join(parts) or f'see {folder}'}", width))
     return lines
 

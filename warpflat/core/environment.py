@@ -33,6 +33,7 @@ def require_environment() -> None:
 
         stack = resource.getrlimit(resource.RLIMIT_STACK)[0]
         if stack != resource.RLIM_INFINITY and stack < _STACK:
+            wanted = _STACK // 1024
             raise InputError(
-                f"the stack of this process is limited to {stack // 1024} kB; it needs {_STACK // 1024}: raise it by ulimit -s {_STACK // 1024}"
+                f"the stack is limited to {stack // 1024} kB; {wanted} are needed: ulimit -s {wanted} gives them"
             )

@@ -132,12 +132,12 @@ def pattern_of_garment(
                 f"{' and '.join(dict.fromkeys(pair.pieces))} about ({place}) cm: no edges of them fit each other there",
             )
         # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
-        eased = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
+        as_laid = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
         stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
         pattern = replace(
             pattern,
             seams=[
-                replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in eased) for seam in pattern.seams
+                replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in as_laid) for seam in pattern.seams
             ],
         )
         if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():

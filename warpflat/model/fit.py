@@ -184,7 +184,10 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     # A million faces of them take a tenth of a gigabyte each, and the smoothing more.
     del strain, stress, lengths, spread, pull, load, unit, bias, sine, along_warp, along_weft, crossed
     pressure = smooth_face_values(surface, loaded, smoothing_length)
-    excess = np.maximum(np.abs(strain_warp), np.abs(strain_weft)) - fabric.strain_limit
+    # A stretch that is asked for beyond the limit is meant: the cloth is judged from there.
+    asked = np.zeros((faces, 2)) if network.stretch is None else network.stretch - 1.0
+    held = np.column_stack([strain_warp, strain_weft]) - np.where(asked > fabric.strain_limit, asked, 0.0)
+    excess = np.abs(held).max(axis=1) - fabric.strain_limit
     total_area = max(float(weight.sum()), 1e-300)
     # Regions that are held beyond the limit, the largest first.
     outside, misfits = np.flatnonzero(excess > 1e-9), list[Misfit]()
@@ -196,7 +199,7 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         regions = np.bincount(part, weight[outside], minlength=count)
         # Of each region the face of the largest excess, and of several the first.
         worst = outside[np.lexsort((-excess[outside], part))[begin[:-1]]]
-        on_warp = np.abs(strain_warp[worst]) >= np.abs(strain_weft[worst])
+        on_warp = np.abs(held[worst, 0]) >= np.abs(held[worst, 1])
         largest = np.where(on_warp, strain_warp[worst], strain_weft[worst])
         for k in np.argsort(-regions, kind="stable").tolist():
             misfits.append(

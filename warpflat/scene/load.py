@@ -108,8 +108,7 @@ def scene_fabric(scene: Scene) -> Fabric:
     """
     settings = scene.settings
     with errors_named(f"{scene.where}: fabric_files"):
-        files = [scene.folder / expand_variables(file) for file in settings.fabric_files]
-    library = load_library(files)
+        library = load_library([scene.folder / expand_variables(file) for file in settings.fabric_files])
     if isinstance(settings.fabric, FabricTable):
         return fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
     with errors_named(f"{scene.where}: fabric"):
