@@ -393,6 +393,8 @@ def test_the_ledger_ranks_candidates_by_what_they_release(bodice: Flattening):
     assert x[0] == pytest.approx(-x[1], abs=1e-9)
     assert "bust" in peaks.words[0]
     ledger = make_ledger(bodice)
+    assert len(repr(ledger)) < 200
+    assert max(len(repr(entry)) for entry in ledger.entries) < 800
     per_cm = [entry.per_cm for entry in ledger.entries]
     assert per_cm == sorted(per_cm, reverse=True)
     by_name = {entry.candidate.name: entry for entry in ledger.entries}

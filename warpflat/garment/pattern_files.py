@@ -263,6 +263,7 @@ def _write_pattern(
     from warpflat.pattern.curves import TOLERANCE
     from warpflat.pattern.cut_list import cut_list
     from warpflat.pattern.draft import draft_garment
+    from warpflat.pattern.notches import MEET
     from warpflat.pattern.walked import walk_seams
 
     if not options.formats and options.cloth is None:
@@ -297,6 +298,8 @@ def _write_pattern(
             *notes, f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it",
         )  # fmt: skip
     notes = (*notes, *(f"{piece.name}: {note}" for piece in pieces for note in piece.notes))
+    missed = [seam for seam in drafted.seams if seam.notches_mm is not None and seam.notches_mm > 1000 * MEET]
+    notes = (*notes, *(f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed))
     walked = walk_seams(drafted)
     drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
     near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
@@ -313,8 +316,8 @@ def _write_pattern(
         "cloths": [{"name": cloth, "pieces": [asdict(entry) for entry in rows]} for cloth, rows in cloths.items()],
         "corners": [asdict(corner) for corner in drafted.corners],
         "walked": [
-            {key: getattr(seam, key) for key in ("name", "size", "distance_mm", "difference_mm", "notch_mm")}
-            for seam in walked
+            {"name": seam.name, "size": seam.size, "difference_mm": seam.difference_mm, "notches_mm": seam.notches_mm}
+            for seam in drafted.seams
         ],
     }
     refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""

@@ -90,7 +90,7 @@ def draft_garment(
             drafted[size] = tuple(
                 replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
             )
-            reports += seam_reports(garment.seams, pieces, size)
+            reports += seam_reports(seams, {piece.name: piece for piece in drafted[size]}, size)
         return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
 
 

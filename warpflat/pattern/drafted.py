@@ -245,6 +245,8 @@ class SeamReport:
         difference_mm: by how much the second side is too long (or, negative, too short) for that ease [mm].
         local_mm: the largest difference over 50 mm of the first side, without its sign, measured between the vertices
             of the mesh that both sides share; None where they come from no mesh, or from different vertices.
+        notches_mm: the largest distance along the seam from a notch to the notch, or the joint, that it meets [mm]; None
+            without notches.
     """
 
     name: str
@@ -254,6 +256,7 @@ class SeamReport:
     ease: float
     difference_mm: float
     local_mm: float | None = None
+    notches_mm: float | None = None
 
     @property
     def matches(self) -> bool:
