@@ -72,6 +72,8 @@ _MOST_EDGES = 8
 BESIDE, ALIGNED = 0.05, 1e-3
 #: How a note on a seam of a mesh begins that its pattern lacks; shorter stretches [m] are not told.
 LACKING, _LACKING = "not sewn in the pattern:", 1e-3
+# How a note on a pattern begins that does not show how it is worn.
+_NO_DRAWING = "the guide has no line drawing of the garment"
 # What lines along a border are called that nobody has named, with the numbers of their stretches.
 _UNNAMED = re.compile(r"(to .+|edge|seam)(_\d+)?( \d+)*")
 # A plane of symmetry whose normal has this cosine to x at least is that between left and right.
@@ -143,7 +145,8 @@ def pattern_of_garment(
         if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
             pattern = _named_by_pieces(pattern)
             return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
-        pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
+        with optional_step(_NO_DRAWING, is_needed=False):
+            pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
         if pairs:
             pattern = _hung_upright(pattern, sample, pairs)
@@ -256,7 +259,9 @@ def pattern_of_garment(
         # Godets of one size are equal, unless a slanted hem cuts them.
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
         notes += equal
-    return replace(pattern, worn=describe_worn(garments, pattern.sample, rises)), notes
+    with optional_step(_NO_DRAWING, is_needed=False):
+        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises))
+    return pattern, notes
 
 
 def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair]) -> Pattern:

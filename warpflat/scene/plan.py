@@ -168,7 +168,9 @@ class MeshPlan:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])
         found = () if self.found is None else (seam_words(self.found), *self.found.notes)
-        return replace(garment, remarks=(*found, *(note for sequence in self.sequences for note in sequence.notes)))
+        return replace(
+            garment, remarks=(*unsewn, *found, *(note for sequence in self.sequences for note in sequence.notes))
+        )
 
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help where it does not fit."""
@@ -241,7 +243,13 @@ class GarmentPlan:
             for layout in (piece.unsewn, piece):
                 if layout is not None:
                     recorder.record_result(layout)
-        return replace(garment, openings=tuple(self.openings), finishing=finishing, pockets=pockets)
+        return replace(
+            garment,
+            openings=tuple(self.openings),
+            finishing=finishing,
+            pockets=pockets,
+            remarks=(*unsewn, *garment.remarks),
+        )
 
     @cached_property
     def bricks(self) -> dict[str, list[str]]:
