@@ -55,7 +55,8 @@ class _Group(click.Group):
             raise _Interrupted(error.code if isinstance(error, Stopped) else INTERRUPTED) from None
         for step in dict.fromkeys(left_out):
             where = "" if step.folder is None else f"{step.folder}: "
-            click.echo(one_line(f"warpflat: {'' if step.is_needed else 'note: '}{where}{step.note}"), err=True)
+            head = "" if step.is_needed else f"note: {where}"
+            click.echo(one_line(f"warpflat: {head}{step.note}"), err=True)
         return code or (NOT_CONVERGED if any(step.is_needed for step in left_out) else DONE)
 
 
