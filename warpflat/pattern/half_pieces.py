@@ -34,15 +34,15 @@ def halved(garment: DraftedGarment) -> DraftedGarment:
     A piece whose half cannot be drawn stays whole: a slit along its middle may cross the fold.
     """
     halves: dict[str, list[DraftedPiece]] = {}
-    for piece in next(iter(garment.pieces.values())):
-        sizes = garment.all_sizes(piece.name)
+    for name in garment.piece_names:
+        sizes = garment.all_sizes(name)
         if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in sizes):
             side = _kept_side(sizes[0], garment.garment.seams)
-            with optional_step(f"{piece.name} is printed whole, not as a half on the fold", is_needed=False):
-                halves[piece.name] = [_half(p, garment, side) for p in sizes]
+            with optional_step(f"{name} is printed whole, not as a half on the fold", is_needed=False):
+                halves[name] = [_half(p, garment, side) for p in sizes]
     pieces = {
-        size: tuple(halves[piece.name][number] if piece.name in halves else piece for piece in row)
-        for number, (size, row) in enumerate(garment.pieces.items())
+        size: tuple(halves[piece.name].pop(0) if piece.name in halves else piece for piece in row)
+        for size, row in garment.pieces.items()
     }
     return replace(garment, pieces=pieces)
 
