@@ -602,6 +602,10 @@ class Metrics(Entry):
     marker: Marker | None = None
     drape: Drape | None = None
     verdict: Verdict | None = None
+    notes: list[str] | None = None
+    """Steps that were left out, and why."""
+    left_out: list[str] | None = None
+    """Those of them without which the pattern is not complete: the run ends with exit code 1."""
     files: dict[str, dict[str, str]] | None = None
     """SHA-256 of every file, by run and name."""
     sha256: str | None = None

@@ -15,7 +15,17 @@ from .promise import Case
 
 __all__ = ["GEOMETRY_SHARES", "garment_meshes", "geometry_case"]
 
-GEOMETRY_SHARES = {"form": 3, "tables": 6, "pieces": 6, "open": 4, "garment": 4, "islands": 5}
+GEOMETRY_SHARES = {
+    "form": 3,
+    "finishing": 2,
+    "tables": 6,
+    "pieces": 6,
+    "open": 4,
+    "garment": 4,
+    "islands": 5,
+    "body": 2,
+    "worn": 2,
+}
 """How many of a hundred cases, or so, are of which kind: a form takes seconds."""
 
 _QUIET = "[output]\nframes = 0\npicture = false\nreview = false\n"
@@ -30,6 +40,19 @@ _FORMS = (
     + "[[openings]]\nkind = 'buttons'\nseam = 'centre front'\nwidth_mm = 20\nbutton_mm = 18\nspacing_mm = 90\n"
     "[[pockets]]\nkind = 'patch'\npiece = 'front_left'\nline = 'hip'\nbelow_mm = 20\nfrom_centre_mm = 70\n"
     "[cloth]\ninterfacing = 'interfacing'\n" + _QUIET,
+)
+_FINISHED = (
+    "fabric = 'woven'\nform = 'skirt'\nshape = 'darts'\n"
+    + _BODY
+    + "[[openings]]\nkind = 'zip'\nseam = 'side left'\nlength_mm = 180\n"
+    "[[finishing]]\nkind = 'waistband'\nedge = 'waist'\nwidth_mm = 35\noverlap_mm = 40\nshaped = true\n"
+    "[[finishing]]\nkind = 'flounce'\nedge = 'hip'\nwidth_mm = 200\nturns = 0.5\n"
+    "[[pockets]]\nkind = 'patch'\npiece = 'front_left'\nline = 'hip'\nbelow_mm = 20\nfrom_centre_mm = 70\n" + _QUIET,
+    "fabric = 'woven'\nform = {like = 'dress'}\n"
+    + _BODY
+    + "[[finishing]]\nkind = 'facing'\nedge = 'neck'\nwidth_mm = 60\n[[finishing]]\nkind = 'binding'\nedge = 'armhole'\n"
+    "[[finishing]]\nkind = 'band'\nedge = 'hip'\nwidth_mm = 60\nshare = 0.85\nshorten_mm = 60\nelastic = 0.9\n"
+    "[cloth]\nlining = 'lining'\ninterfacing = 'interfacing'\n" + _QUIET,
 )
 _SURFACES = (
     "[surface]\nshape = 'cone'\nresolution = 7\n[[seams]]\nname = 'back'\nsides = ['left', 'right']\nfullness = 0.02\nlonger = 'left'\n"
@@ -198,16 +221,62 @@ def meshes_with_seams() -> dict[str, bytes]:
     return files
 
 
+def wrong_shape(random: Random, content: bytes) -> bytes:
+    """A mesh (OBJ) of which something is no number, far away, without area, twice there, or gone."""
+    rows = [row for row in content.decode().splitlines() if row[:2] in ("v ", "f ")]
+    points = np.array([row.split()[1:4] for row in rows if row[0] == "v"], dtype=float)
+    faces = [[int(word.split("/")[0]) - 1 for word in row.split()[1:]] for row in rows if row[0] == "f"]
+    for _ in range(random.choice((1, 1, 2))):
+        what, some = random.randrange(8), random.randrange(len(points))
+        if what == 0:
+            points[some, random.randrange(3)] = random.choice((np.nan, np.inf))
+        elif what == 1:
+            points[some] = random.choice((1e7, -1e7, 1e30)) * np.eye(3)[random.randrange(3)]
+        elif what == 2:
+            points = points * random.choice((1e7, 1e-7, 0.0)) + random.choice((0.0, 1e7))
+        elif what == 3:  # flat, or a line
+            points[:, random.randrange(3)] = 0.0
+        elif what == 4:
+            for face in faces[:: random.choice((1, 2, 50))]:
+                face[1] = face[0]
+        elif what == 5:  # two of them, perhaps in one place
+            faces += [[k + len(points) for k in face] for face in faces]
+            points = np.vstack([points, points + random.choice((0.0, 0.5, 3.0)) * np.eye(3)[0]])
+        elif what == 6:  # a half
+            axis = random.randrange(3)
+            middle = np.nanmedian(points[:, axis])
+            faces = [face for face in faces if points[face, axis].max() <= middle] or faces[:1]
+        else:
+            points[:, random.randrange(3)] *= -1.0
+    text = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+    return "\n".join([*text, *("f " + " ".join(str(k + 1) for k in face) for face in faces), ""]).encode()
+
+
 def geometry_case(kind: str, random: Random) -> Case:
     """A damaged scene or mesh of a kind, and the command that reads it."""
+    from . import seeds
     from .mutations import _MUCH_WORK, damaged_bytes, damaged_json, damaged_toml
     from .seeds import BARE
 
     meshes = garment_meshes()
-    if kind in ("form", "tables"):
-        content = _MUCH_WORK.sub(
-            rb"\g<1>5", damaged_toml(random, random.choice(_FORMS if kind == "form" else _SURFACES))
-        )
+    if kind in ("body", "worn"):
+        skirt, body = seeds.SKIRT, random.choice(seeds.bodies())
+        if kind == "body" or random.randrange(2):
+            body = wrong_shape(random, body)
+        else:
+            skirt = wrong_shape(random, skirt)
+        if kind == "body":
+            files, subject = {"odd.obj": body}, "odd.obj"
+            command = ["mannequin", "--scan", "odd.obj", "--units", "m", "--resolution", "40", "--out", "out", "-q"]
+        else:
+            files, subject = {"skirt.obj": skirt, "body.obj": body}, "skirt.obj"
+            command = ["fit", "skirt.obj", "--units", "m", "--to", "EU 38", "--out", "out", *seeds.BARE]
+            command += random.choice(([], ["--from", "body.obj"], ["--from", "EU 40"]))
+        leaves = "out/metrics.json" if kind == "body" else "out/fit.json"
+        return Case(kind, files, tuple(command), subject=subject, leaves=leaves, seconds=90.0)
+    if kind in ("form", "finishing", "tables"):
+        texts = {"form": _FORMS, "finishing": _FINISHED, "tables": _SURFACES}[kind]
+        content = _MUCH_WORK.sub(rb"\g<1>5", damaged_toml(random, random.choice(texts)))
         files = {**meshes, "odd.scene.toml": content}
         seconds = 120.0 if b"mannequin" in content else 40.0
         run = ("run", "odd.scene.toml", "--out", "out", "--quiet")

@@ -26,13 +26,15 @@ from types import TracebackType
 
 from .snapshot import snapshot
 
-__all__ = ["Case", "Environment", "Verdict", "Worker"]
+__all__ = ["Case", "Environment", "Verdict", "Worker", "broken_promise"]
 
 MEMORY = 2 * 1024**3
 """The most that one case may take [B]."""
 LONGEST_LINE = 2000
 """Letters of a message. A path may have 4,096, but no case has one."""
 CASES_PER_PROCESS = 500
+_INTERNAL = r": (\w*(?:Error|Exception|Interrupt|Warning|StopIteration))\b"
+"""A note that names an error of Python: a fault of the program."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,7 @@ def _replaced(case: Case, here: str, path: str) -> bool:
     return path.startswith(f"{here}/out/") if case.replaces == "*" else path == os.path.join(here, case.replaces)
 
 
-def _broken(
+def broken_promise(
     case: Case, here: str, ended: Verdict, before: dict[str, bytes | None], after: dict[str, bytes | None]
 ) -> str:
     """What was not as promised, or ""."""
@@ -190,6 +192,8 @@ def _broken(
             return message
     elif not all(line.startswith("warpflat: ") for line in ended.stderr.splitlines()):
         return "done, but a line on standard error is not ours"
+    elif note := re.search(_INTERNAL, ended.stderr):
+        return f"done, but something was left out by an internal error: {note[1]}"
     elif files := _broken_files(case, here, before, after):
         return files
     for words in (case.says, *case.names):
@@ -221,7 +225,7 @@ class _Place:
     def judge(self, code: int | None, seconds: float, memory: int) -> Verdict:
         stdout, stderr = (file.read_text(encoding="utf-8", errors="replace") for file in (self.stdout, self.stderr))
         ended = Verdict(code, seconds, memory, stdout, stderr)
-        broken = _broken(self.case, self.here.name, ended, self.before, snapshot(self.root))
+        broken = broken_promise(self.case, self.here.name, ended, self.before, snapshot(self.root))
         return Verdict(code, seconds, memory, stdout, stderr, broken)
 
 

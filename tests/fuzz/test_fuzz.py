@@ -6,6 +6,7 @@ What Hypothesis finds it shrinks; the file is printed with the failure, and belo
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from .known_faults import GROUPS
 from .mutations import SHARES, random_case
-from .promise import Case, Worker
+from .promise import Case, Verdict, Worker, broken_promise
 from .regressions import cases_of, regression_files
 
 # A few of each kind; `python -m tests.fuzz` runs thousands.
@@ -82,3 +83,10 @@ def test_a_broken_promise_is_seen(worker: Worker) -> None:
     without = worker.run(Case("arguments", {}, ("fabrics",), leaves="out/metrics.json"))
     assert without.broken == "done, but without metrics.json"
     assert not worker.run(Case("arguments", {}, ("fabrics",))).broken
+
+
+def test_a_note_that_names_an_error_of_python_is_an_internal_error() -> None:
+    ended = Verdict(0, 0.1, 0, "", "warpflat: note: out: picture.png was left out: KeyError: 3\n")
+    assert "KeyError" in broken_promise(Case("obj", {}, ()), "here", ended, {}, {})
+    good = replace(ended, stderr="warpflat: note: out: picture.png was left out: it has no room\n")
+    assert broken_promise(Case("obj", {}, ()), "here", good, {}, {}) == ""

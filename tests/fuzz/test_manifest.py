@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from warpflat.cli.main import main
-from warpflat.core.errors import InputError
+from warpflat.core.errors import CannotWriteError, InputError
 from warpflat.core.output import remove_stale
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.pattern_files import export_patterns
@@ -121,7 +121,7 @@ def test_nothing_is_removed_by_a_run_that_fails(tmp_path: Path, monkeypatch: pyt
     before = files(tmp_path)
 
     def full(*_: object, **__: object) -> None:
-        raise InputError("cannot write: no space left on device")
+        raise CannotWriteError("cannot write: no space left on device")
 
     monkeypatch.setattr("warpflat.garment.pattern_files._write", full)
     with pytest.raises(InputError, match="no space"):

@@ -18,7 +18,7 @@ from warpflat.flattening.fit_picture import write_wear_sheet
 from warpflat.flattening.fit_report import fit_lines, garment_wear
 from warpflat.flattening.verdict import judge
 from warpflat.model.fit import MAPS, assess_pattern
-from warpflat.model.wear import Wear
+from warpflat.model.wear import Wear, intended_stretch
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.curvature import curvature_tensors
@@ -352,3 +352,20 @@ def test_misspelled_wishes_in_a_scene(tmp_path: Path, text: str, message: str):
     (tmp_path / "a.toml").write_text(f"{text}[surface]\nshape = 'dome'\n")
     with pytest.raises(InputError, match=message):
         load_scene(tmp_path / "a.toml")
+
+
+def test_a_pressure_on_a_ball_is_carried_both_ways():
+    """p = 2 T / R: a gore of a ball is smaller by half of what a tube of its radius is, along both threads."""
+    film, radius = replace(NET, stiffness_warp=5e3, stiffness_weft=5e3, curve_warp=(), curve_weft=()), 1.0
+    surface = make_shape("dome", size=0.5, radius=radius, resolution=17)
+    stretch, notes = intended_stretch(surface, film, surface.vertices[:, :2], Wear(pressure=200.0))
+    assert stretch is not None
+    np.testing.assert_allclose(np.median(stretch - 1.0, axis=0), 200.0 * radius / 2.0 / 5000.0, rtol=0.1)
+    assert any("along warp and weft" in note for note in notes)
+
+
+def test_a_stretch_beyond_the_limit_is_meant_and_told():
+    wear = Wear(stretch_weft=NET.strain_limit + 0.1)
+    result = warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device=DEVICE)
+    assert result.fit.fits
+    assert any("beyond power-net's limit" in note for note in result.notes)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import shapely
 
-from warpflat.core.polyline import polyline_length
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.pattern.curves import chords, fit_curve
 from warpflat.pattern.draft import draft_piece
-from warpflat.pattern.fitting import drawn_length, is_wavy, smooth_line
+from warpflat.pattern.fitting import as_in_layout, drawn_length, is_wavy, smooth_line
 from warpflat.pattern.piece_parts import Dart, Edge
-from warpflat.pattern.pieces import Piece
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 
 
 def bent(count: int = 24) -> np.ndarray:
@@ -132,3 +133,20 @@ def test_a_line_whose_curve_would_cross_itself_is_as_long_as_its_chords():
         )
     )
     assert drafted.edge("neck").length == pytest.approx(drawn_length(neck), abs=1e-6)
+
+
+@pytest.mark.parametrize(("as_laid", "longer"), [(False, 1.0), (True, 1.0), (True, 1.1)])
+def test_sides_of_a_seam_that_curves_would_part_are_drawn_by_their_chords(as_laid: bool, longer: float):
+    """A zigzag and a straight line of its length: what smooths the one away shortens it."""
+    rough = teeth(41, 0.004)
+    lengths = arc_lengths(rough)
+    straight = np.column_stack([np.zeros(41), longer * lengths])
+    lines = {("a", "edge"): rough, ("b", "edge"): straight}
+    side = [(SeamSide(piece=name, edge="edge"),) for name in "ab"]
+    seam = Seam(name="seam", sides=(side[0], side[1]), ease=longer - 1.0, as_laid=as_laid)
+    smooth = {("a", "edge"): chords(rough[[0, -1]]), ("b", "edge"): chords(straight)}
+    assert abs(smooth["a", "edge"].length - lengths[-1]) > 2 * SEAM_TOLERANCE
+    kept = as_in_layout(lines, [seam], smooth)
+    assert kept["a", "edge"].length == pytest.approx(lengths[-1], abs=1e-9)
+    # What agrees stays as it is.
+    assert as_in_layout(lines, [seam], kept)["a", "edge"] is kept["a", "edge"]

@@ -8,7 +8,9 @@ import shapely
 from shapely.affinity import scale
 
 from warpflat.core.errors import InputError
+from warpflat.core.output import LeftOut, listening_to_left_out
 from warpflat.pattern.draft import draft_piece
+from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.from_mesh import MeshFeatures, piece_from_mesh
 
 
@@ -233,3 +235,20 @@ def test_a_narrow_hollow_tip_has_its_corner_where_the_border_turns_and_an_even_a
     assert ends <= {int(index[row, column]) for row in (0, -1) for column in (0, -1)}
     cut = shapely.Polygon(draft_piece(piece).cut_line)
     assert cut.symmetric_difference(scale(cut, xfact=-1, origin=(0, 0))).area < 1e-5
+
+
+def test_a_hole_that_lies_on_itself_is_not_cut_and_drawn_dashed():
+    faces, flat, _, index = grid()
+    flat = flat.copy()
+    hole = np.isin(faces, index[5:8, 4:7]).all(axis=1)
+    # One side of the hole is pulled across the other.
+    flat[index[6, 4]] += [0.07, 0.0]
+    heard = list[LeftOut]()
+    with listening_to_left_out(heard.append):
+        piece = make_piece(faces[~hole], flat, name="kite")
+    assert not piece.holes
+    assert list(piece.internal_lines) == ["hole_1 left out"]
+    assert [step.is_needed for step in heard] == [True]
+    assert heard[0].note.startswith("hole_1 of kite is not cut, and drawn dashed: ")
+    strokes = draw_piece(draft_piece(piece)).strokes
+    assert [stroke.name for stroke in strokes if stroke.role == "left_out"] == ["hole_1 left out"]

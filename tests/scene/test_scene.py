@@ -86,6 +86,15 @@ def test_a_fabric_table_and_fabric_files(tmp_path: Path):
     assert own.stiffness_warp == pytest.approx(98.07 / 0.03, rel=1e-3)
 
 
+def test_the_only_fabric_of_the_files_is_meant_and_of_several_one_must_be_named(tmp_path: Path):
+    write_scene(tmp_path, "[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
+    start, surface = "fabric_files = ['cloth.toml']\n", "[surface]\nshape = 'dome'\n"
+    assert scene_fabric(load_scene(write_scene(tmp_path, start + surface))).shear_stiffness == 40.0
+    write_scene(tmp_path, "[mine]\nbase = 'denim'\n[yours]\nbase = 'mine'\n", "cloth.toml")
+    with pytest.raises(InputError, match=r"fabric is not given.*mine, yours"):
+        load_scene(write_scene(tmp_path, start + surface))
+
+
 def test_scenes_and_fabrics_may_begin_with_a_byte_order_mark(tmp_path: Path):
     write_scene(tmp_path, "\ufeff[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
     text = "\ufefffabric = 'mine'\nfabric_files = ['cloth.toml']\n[surface]\nshape = 'dome'\n"

@@ -65,7 +65,13 @@ _FILES = """\b
     "with the cloth.",
 )
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
-@click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
+@click.option(
+    "--fabric-file",
+    "fabric_files",
+    multiple=True,
+    metavar="FILE",
+    help="A fabric file of your own; its only fabric needs no --fabric.",
+)
 @shear_limit_option
 @click.option("--bands", metavar="HOW", help="As for warpflat flatten.")
 @click.option("--name", metavar="NAME", help="Name of the files.  [default: the garment's]")

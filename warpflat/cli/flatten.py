@@ -84,7 +84,13 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
-@click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
+@click.option(
+    "--fabric-file",
+    "fabric_files",
+    multiple=True,
+    metavar="FILE",
+    help="A fabric file of your own; its only fabric needs no --fabric.",
+)
 @shear_limit_option
 @click.option(
     "--datum",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -26,14 +27,14 @@ from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.marker import marker
 from warpflat.cli.new import new
-from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
+from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES, NOT_CONVERGED
 from warpflat.cli.review import review
 from warpflat.cli.run import run
 from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.cli.studio import studio
 from warpflat.core.errors import InputError, system_reason
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
-from warpflat.core.output import listening_to_left_out
+from warpflat.core.output import LeftOut, listening_to_left_out, written_folders
 from warpflat.core.source_date import source_date
 from warpflat.core.text import one_line
 
@@ -46,19 +47,18 @@ class _Interrupted(Exception):
 
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
-        left_out: dict[str, None] = {}
+        left_out = list[LeftOut]()
         try:
-            with (
-                stop_on_signals(),
-                listening_to_left_out(lambda path, note: left_out.setdefault(f"{path.parent}: {note}")),
-            ):
+            with stop_on_signals(), listening_to_left_out(left_out.append):
                 code = super().invoke(ctx)
         except KeyboardInterrupt as error:
             # Click would print an empty line of its own.
             raise _Interrupted(error.code if isinstance(error, Stopped) else INTERRUPTED) from None
-        for note in left_out:
-            click.echo(one_line(f"warpflat: note: {note}"), err=True)
-        return code
+        for step in dict.fromkeys(left_out):
+            where = "" if step.folder is None else f"{step.folder}: "
+            head = "" if step.is_needed else f"note: {where}"
+            click.echo(one_line(f"warpflat: {head}{step.note}"), err=True)
+        return code or (NOT_CONVERGED if any(step.is_needed for step in left_out) else DONE)
 
 
 @click.group(
@@ -119,11 +119,14 @@ for _command in (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
-    # Standard error that is closed opens on the null device, so that no file takes its number.
-    if not _is_open(sys.stderr):
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open as long as the process)
-        if sys.stderr.fileno() != 2:
-            os.dup2(sys.stderr.fileno(), 2)
+    # A standard stream that is closed opens on the null device, so that no file takes its number.
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if not _is_open(getattr(sys, name)):
+            stream = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open as long as the process)
+            setattr(sys, name, stream)
+            if stream.fileno() != number:
+                os.dup2(stream.fileno(), number)
+    written = len(written_folders())
     try:
         source_date()
         code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
@@ -154,7 +157,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # To the null device: at the end of the process what is left of standard output would fail once more.
             with suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nothing:
                 os.dup2(nothing.fileno(), sys.stdout.fileno())
-            return _fail(f"cannot write to standard output: {reason}")
+            message = f"cannot write to standard output: {reason}"
+            if len(written_folders()) > written:
+                click.echo(f"warpflat: {message}; the files are written", err=True)
+                return NOT_CONVERGED
+            return _fail(message)
         return _fail(f"cannot read or write {error.filename or 'a temporary file'}: {reason}")
 
 
@@ -164,8 +171,8 @@ def _is_open(stream: TextIO | None) -> bool:
         os.write(-1 if stream is None else stream.fileno(), b"")
     except (AttributeError, io.UnsupportedOperation):
         return True
-    except OSError:
-        return False
+    except OSError as error:
+        return error.errno != errno.EBADF  # what is full is open
     return True
 
 

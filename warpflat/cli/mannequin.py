@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from warpflat.cli.options import DONE, ComputingCommand
+from warpflat.cli.run import start_warp_silently
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_usd
 
@@ -88,6 +89,8 @@ def mannequin(
     if resolution is not None:
         tables["resolution_mm"] = resolution
     table = check_table(MannequinTable, tables, "command line")
+    if scan is not None:
+        start_warp_silently()
     names = [name for kind, name in MANNEQUIN_FILES.items() if kind != "distances" or source["scan"] is not None]
     with output_folder(out if out is not None else Path("out") / "mannequin", names, guard=True) as folder:
         body = mannequin_from_table(table, path_of=Path)

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from warpflat.core.environment import require_environment
 from warpflat.core.memory_limit import require_memory_for_libraries
 
 __all__ = [
@@ -27,8 +28,8 @@ DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 EXIT_CODES = """\b
 Exit codes:
   0    done
-  1    done, but a piece did not converge, has flipped faces or lies over itself, in whatever size, or no
-       pattern could be drawn
+  1    done, but a piece did not converge, has flipped faces or lies over itself, in whatever size, the
+       sides of a drawn seam differ, or a step that the pattern needs had to be left out
   2    bad input; one line says what is wrong, where, and what would be right
   70   an internal error, which is the program's own fault; WARPFLAT_TRACEBACK=1 prints its traceback
   129  the terminal was closed
@@ -72,14 +73,15 @@ shear_limit_option = click.option(
 
 
 class ComputingCommand(click.Command):
-    """A command that loads the numerical libraries, if there is memory for them."""
+    """A command that loads the numerical libraries, if they can run here."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command.
 
         Raises:
-            InputError: the memory limit leaves no room for the libraries.
+            InputError: the memory limit leaves no room for the libraries, or what surrounds the process would make them crash.
         """
+        require_environment()
         require_memory_for_libraries()
         return super().invoke(ctx)
 

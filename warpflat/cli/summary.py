@@ -72,7 +72,9 @@ def summary_lines(
     what += [size] if size else []
     what += openings or (["it goes on without a further opening"] if metrics.get("rings") else [])
     lines.append("; ".join(what))
-    if "pattern.pdf" in files:
+    if metrics.get("garment", {}).get("no_pattern"):
+        lines.append("no pattern yet")
+    elif "pattern.pdf" in files:
         lines.append(f"print {folder}/pattern.pdf")
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
     return [*(_clipped(line, width) for line in lines if line), _listed(f"{folder}: ", ordered, width)]

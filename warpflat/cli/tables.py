@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.text import energy_words
+from warpflat.core.text import energy_words, format_count
 from warpflat.fabric.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def _price(joules: float | None) -> str:
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
-    """Return a line for each fault of a piece, of every size: not converged, flipped faces, overlap; and for a missing pattern."""
+    """Return a line for each fault of a piece, of every size: not converged, flipped faces, overlap; and for seams whose sides differ."""
     lines, sewing = list[str](), metrics.get("sewing", {})
     for name, piece in metrics["pieces"].items():
         if not _converged(piece):
@@ -178,15 +178,20 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         fallen = drape["distance_m"]["mean"] > _FALLEN
         remedy = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
         lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {remedy} in [drape]")
+    pattern = metrics.get("pattern", {})
+    if differing := pattern.get("seams_that_differ"):
+        names = ", ".join(differing[:3]) + (f" and {len(differing) - 3} more" if len(differing) > 3 else "")
+        near = pattern["seam_difference_per_50mm_mm"]
+        over = "" if near is None else f" as a whole, and {near:.2f} mm over 50 mm"
+        lines.insert(
+            0,
+            f"the drawn sides of {format_count(len(differing), 'seam')} differ by up to {pattern['seam_difference_mm']:.2f} mm{over}: "
+            f"{names}; one side must be eased to the other there",
+        )
     if refused := metrics.get("garment", {}).get("no_pattern"):
         lines.insert(0, refused)
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
-    lines += [
-        f"no {what} was {done}: {metrics[what][f'not_{done}']}"
-        for what, done in (("pattern", "drawn"), ("marker", "made"))
-        if f"not_{done}" in metrics.get(what, {})
-    ]
     return lines
 
 

@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar
 
 from warpflat.core.activity import activity_listener, report_activity
 from warpflat.core.input_files import listening_to_reads, note_read
-from warpflat.core.output import leave_out, listening_to_left_out
+from warpflat.core.output import LeftOut, leave_out, listening_to_left_out
 from warpflat.core.threads import thread_count
 
 __all__ = ["Beside", "two_at_a_time", "work_beside"]
@@ -111,8 +111,8 @@ class Beside(Generic[Result]):
         good, value, read, left_out = pickle.loads(b"".join(parts))
         for path in read:
             note_read(path)
-        for path, note in left_out:
-            leave_out(path, note)
+        for step in left_out:
+            leave_out(step)
         if not good:
             raise value
         return value
@@ -155,12 +155,12 @@ def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
         ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
         if os.getppid() != parent:  # it has died meanwhile
             os._exit(0)
-        read, left_out = list[Path](), list[tuple[Path, str]]()
+        read, left_out = list[Path](), list[LeftOut]()
         try:
             with (
                 activity_listener(lambda activity: None),
                 listening_to_reads(read.append),
-                listening_to_left_out(lambda path, note: left_out.append((path, note))),
+                listening_to_left_out(left_out.append),
             ):
                 answer: tuple[bool, Any] = True, function()
         except Exception as error:

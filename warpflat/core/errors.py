@@ -13,6 +13,7 @@ __all__ = [
     "SIGNALS",
     "CannotWriteError",
     "InputError",
+    "StepError",
     "expect",
     "expect_callback",
     "expect_each",
@@ -44,6 +45,10 @@ class InputError(ValueError):
 
 class CannotWriteError(InputError):
     """A file cannot be written: its place, the disk, or a file of the user's there is what the user must see to."""
+
+
+class StepError(InputError):
+    """A step cannot be taken with what the steps before it have made, which is no mistake of the user's: a run goes on without it."""
 
 
 def system_reason(error: OSError) -> str:

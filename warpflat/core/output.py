@@ -8,9 +8,11 @@ What warpflat has written it knows by digest. The commands leave reports in JSON
 and name, with their SHA-256, and has under `sha256` a seal, the digest of its own content. Every other file, and one that was changed
 since, is the user's: it is neither replaced nor removed, and nor is a file from which the run was made.
 
-Pictures, films and pages are optional: whatever goes wrong while one is made becomes a note, one sentence on the console and under
-`notes` in `metrics.json`. The run goes on, and its exit code stays. What the user must see to ends it as ever: a place that cannot be
-written, or a file of the user's there. So do an interruption and a want of memory.
+What is made is kept. Once pieces are flattened, a step that cannot be taken (:func:`optional_step`), such as sewing, a hole, a half on
+the fold, a file of the pattern or a picture, is left out: the rest is made, and a note names it, one sentence on the console and under
+`notes` in `metrics.json`. Under `left_out` stands there, too, what a pattern needs: the run then ends with exit code 1. A note that
+names an error of Python is a fault of the program. What the user must see to ends a run as ever: a place that cannot be written, or a
+file of the user's there. So do an interruption and a want of memory.
 """
 
 from __future__ import annotations
@@ -43,6 +45,7 @@ from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.text import one_line
 
 __all__ = [
+    "LeftOut",
     "NotOursError",
     "atomic_path",
     "expect_files",
@@ -53,6 +56,7 @@ __all__ = [
     "leave_out",
     "listening_to_left_out",
     "optional_file",
+    "optional_step",
     "output_folder",
     "plain_json",
     "prepare_folder",
@@ -68,6 +72,7 @@ __all__ = [
     "write_json",
     "write_report",
     "write_sealed",
+    "written_folders",
 ]
 
 # .NAME-warpflat-MACHINE-PROCESS-RANDOM.SUFFIX
@@ -90,8 +95,24 @@ _NAMELESS = (
     "review.html", "film.webp", "contact_sheet.png", "worn.usdc",
 )  # fmt: skip
 
-#: Called with the path of a file that was left out, and the note on it.
-Listener = Callable[[Path, str], object]
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """A step that was left out.
+
+    Attributes:
+        note: what was left out, and why: one sentence.
+        folder: of the run; None outside of one.
+        is_needed: whether the pattern is not complete without it.
+    """
+
+    note: str
+    folder: Path | None
+    is_needed: bool
+
+
+#: Called with each step that is left out.
+Listener = Callable[[LeftOut], object]
 
 
 class NotOursError(CannotWriteError):
@@ -111,7 +132,7 @@ class _Run:
         sources: files that have been read, which are not replaced.
         removed: names of files of earlier runs that go with the change.
         amended: names of files that keep what they hold when they are written again.
-        notes: on files that were left out, each once.
+        left_out: the steps that were, each once.
     """
 
     folder: Path
@@ -122,7 +143,7 @@ class _Run:
     sources: set[Path] = field(default_factory=set)
     removed: set[str] = field(default_factory=set)
     amended: set[str] = field(default_factory=set)
-    notes: dict[str, None] = field(default_factory=dict)
+    left_out: dict[LeftOut, None] = field(default_factory=dict)
 
     @property
     def new(self) -> Path:
@@ -178,10 +199,13 @@ class _Run:
             raise _cannot_write(self.folder / name, error) from error
         # From here on the new files are those of the folder, whatever happens to what is hidden.
         (self.hidden / _FRESH).unlink()
+        _written.append(self.folder)
 
 
 _runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
 _listeners: ContextVar[tuple[Listener, ...]] = ContextVar("left_out", default=())
+# The folders into which this process has written.
+_written: list[Path] = []
 # Hidden files and folders that this process has made or is about to make, and the folders that go with each if nothing is left in them.
 _unfinished: dict[Path, Sequence[Path]] = {}
 
@@ -246,7 +270,7 @@ def output_folder(
 def prepare_folder(path: str | os.PathLike[str]) -> Path:
     """Create the output folder, parents included.
 
-    What killed runs have left half-written there is removed (see :func:`remove_unfinished`).
+    What killed runs have left half-written there, and in the folders beside it, is removed (see :func:`remove_unfinished`).
 
     Raises:
         InputError: it is a file, lies below a file, or cannot be created, or its name is no text.
@@ -265,7 +289,16 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise _no_output_folder(folder, error) from error
     remove_unfinished(folder)
+    with suppress(OSError):
+        for beside in {path.parent for path in folder.absolute().parent.glob("*/.run-warpflat-*")}:
+            if not beside.is_symlink():
+                remove_unfinished(beside)
     return folder
+
+
+def written_folders() -> tuple[Path, ...]:
+    """Return the folders into which the runs of this process have written their files, in order."""
+    return tuple(_written)
 
 
 def expect_files(folder: Path, files: Iterable[str]) -> None:
@@ -419,12 +452,47 @@ def plain_json(value: Any, where: str = "metrics") -> Any:
     raise TypeError(f"{where}: a {type(value).__name__} cannot be written as JSON")
 
 
-# --- files that a run can do without
+# --- steps that a run can do without
+
+
+@contextmanager
+def optional_step(
+    words: str, *, of: type[InputError] = InputError, is_needed: bool = True, folder: Path | None = None
+) -> Iterator[list[str]]:
+    """Take a step that the run can do without in a ``with`` block; an error in the block becomes a note, and the block ends there.
+
+    Args:
+        words: how the note begins; the reason follows.
+        of: errors of input that are no mistake of the user's; others are raised.
+        is_needed: whether the pattern is not complete without it.
+        folder: of the run; the one whose block is innermost if not given.
+
+    Yields:
+        The note, once the block has ended with an error; before, and where it has not, nothing.
+
+    Raises:
+        InputError: a place cannot be written, the disk is full, or the error is none of `of`.
+    """
+    notes = list[str]()
+    try:
+        yield notes
+    except Exception as error:
+        foreseen = isinstance(error, InputError)
+        if (
+            SIGNALS
+            or isinstance(error, CannotWriteError)
+            or is_out_of_memory(error)
+            or (foreseen and not isinstance(error, of))
+        ):
+            raise
+        notes.append(one_line(f"{words}: {error}" if foreseen else f"{words}: {type(error).__name__}: {error}"))
+        run = next(reversed(_going_on()), None) if folder is None else _run_into(folder)
+        leave_out(LeftOut(note=notes[0], folder=folder if run is None else run.folder, is_needed=is_needed))
 
 
 @contextmanager
 def optional_file(path: str | os.PathLike[str], files: list[str], *, part: str = "") -> Iterator[Path]:
-    """Make a file that the run can do without in a ``with`` block; an error in the block becomes a note, and the block ends there.
+    """Make a file that the run can do without in a ``with`` block, as an :func:`optional_step`.
 
     Args:
         path: the file.
@@ -436,28 +504,24 @@ def optional_file(path: str | os.PathLike[str], files: list[str], *, part: str =
     """
     path = Path(path)
     require_writable(path)
-    try:
+    words = f"{part or path.name} was left out{f' of {path.name}' if part else ''}"
+    with optional_step(words, is_needed=False, folder=path.parent) as left_out:
         yield path
-    except Exception as error:
-        if SIGNALS or isinstance(error, CannotWriteError) or is_out_of_memory(error):
-            raise
-        why = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-        leave_out(path, one_line(f"{part or path.name} was left out{f' of {path.name}' if part else ''}: {why}"))
-    else:
+    if not left_out:
         files.append(path.name)
 
 
-def leave_out(path: Path, note: str) -> None:
-    """Keep a note on a file that was left out, for `metrics.json` and for whoever listens."""
-    if run := _run_into(path.parent):
-        run.notes[note] = None
+def leave_out(step: LeftOut) -> None:
+    """Keep a step that was left out, for `metrics.json` and for whoever listens."""
+    if step.folder is not None and (run := _run_into(step.folder)):
+        run.left_out[step] = None
     for listener in _listeners.get():
-        listener(path, note)
+        listener(step)
 
 
 @contextmanager
 def listening_to_left_out(listener: Listener) -> Iterator[None]:
-    """Call `listener` with each file that is left out in the block."""
+    """Call `listener` with each step that is left out in the block."""
     before = _listeners.set((*_listeners.get(), listener))
     try:
         yield
@@ -604,8 +668,10 @@ def write_report(
     }
     record[name] = {**mine, **record.get(name, {})}
     run = _run_into(folder)
-    notes = {"notes": list(run.notes)} if run is not None and run.notes and path.name == "metrics.json" else {}
-    return write_sealed(path, {**data, **notes, "files": {run: known for run, known in record.items() if known}})
+    steps = list(run.left_out) if run is not None and path.name == "metrics.json" else []
+    notes = {"notes": [step.note for step in steps], "left_out": [step.note for step in steps if step.is_needed]}
+    told = {key: list(dict.fromkeys(row)) for key, row in notes.items() if row}
+    return write_sealed(path, {**data, **told, "files": {run: known for run, known in record.items() if known}})
 
 
 def remove_stale(
@@ -657,7 +723,8 @@ def remove_stale(
         names = ", ".join(file for _, file in removed)
         notes.insert(0, f"removed what an earlier run had left and this one did not make: {names}")
     complete = write_report(folder / "metrics.json", metrics, name=name, files=files, gone=removed)
-    return complete, (*(going_on.notes if going_on is not None else ()), *notes)
+    left_out = () if going_on is None else dict.fromkeys(step.note for step in going_on.left_out)
+    return complete, (*left_out, *notes)
 
 
 def record_file(folder: Path, name: str, file: str) -> None:

@@ -10,7 +10,7 @@ from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import StepError
 
 __all__ = ["factor_symmetric"]
 
@@ -27,7 +27,7 @@ def factor_symmetric(matrix: Any, *, dtype: type[np.floating] = np.float64) -> C
     dense block, as it expects of another order of the columns; that makes a factor of slivers six times as slow, so each column is its own.
 
     Raises:
-        InputError: the matrix is singular even with next to nothing on its diagonal, or its numbers are not finite.
+        StepError: the matrix is singular even with next to nothing on its diagonal, or its numbers are not finite.
     """
 
     def factored(system: csc_array) -> Any:
@@ -35,6 +35,8 @@ def factor_symmetric(matrix: Any, *, dtype: type[np.floating] = np.float64) -> C
         return splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, relax=1, options=options)
 
     system = csc_array(matrix, dtype=dtype)
+    if not np.isfinite(system.data).all():
+        raise StepError("faces are crushed until their stiffness is beyond all numbers")
     try:
         factor = factored(system)
     except RuntimeError:
@@ -43,7 +45,7 @@ def factor_symmetric(matrix: Any, *, dtype: type[np.floating] = np.float64) -> C
         try:
             factor = factored(csc_array(system + held * eye_array(system.shape[0], format="csc", dtype=dtype)))
         except RuntimeError as error:
-            raise InputError(
+            raise StepError(
                 "faces are too small or too far from the rest for their stiffness: leave them out, or repair the mesh"
             ) from error
     # SuperLU returns its solution column by column; rows of two or three numbers are what all else takes.

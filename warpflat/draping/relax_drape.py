@@ -21,7 +21,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import StepError
 from warpflat.core.launch import Sequence, record
 from warpflat.draping.body import Body
 from warpflat.draping.drape_energy import DrapeEnergy
@@ -87,10 +87,10 @@ class DrapedCloth:
         """Refuse cloth that has fallen off.
 
         Raises:
-            InputError: it has.
+            StepError: it has.
         """
         if self.fell_off:
-            raise InputError(
+            raise StepError(
                 f"falls off: nothing on the body holds the garment, its top has sunk by over {_FALLEN:g} m; "
                 "make it narrower there, or name in [drape] a line that stays: hold = [...]"
             )

@@ -74,9 +74,11 @@ def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:
             # A step is a unit of work, an iteration several.
             unit = "step" if stage["work_units"] <= stage["steps"] else "iteration"
             counts[unit] = counts.get(unit, 0) + stage["steps"]
-            released[unit] = released.get(unit, 0.0) + before["model_energy_j"] - stage["model_energy_j"]
+            # The energy of crushed faces is beyond all numbers.
+            if None not in (before["model_energy_j"], stage["model_energy_j"]):
+                released[unit] = released.get(unit, 0.0) + before["model_energy_j"] - stage["model_energy_j"]
     return ", ".join(
-        f"{format_count(counts[unit], unit)} released {energy_words(released[unit])}"
+        f"{format_count(counts[unit], unit)} released {energy_words(released.get(unit, 0.0))}"
         for unit in ("step", "iteration")
         if counts.get(unit)
     )

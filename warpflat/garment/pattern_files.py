@@ -321,10 +321,8 @@ def _rewritten(
 def _write_pattern(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
 ) -> WrittenPattern:
-    """Make, draft and write a pattern; geometry that defeats it becomes a note, and `not_drawn` in the metrics."""
-    from shapely.errors import ShapelyError
-
-    from warpflat.core.output import file_in, output_folder
+    """Make, draft and write a pattern; what cannot be drawn or written of it is left out (:func:`warpflat.core.output.optional_step`)."""
+    from warpflat.core.output import LeftOut, file_in, listening_to_left_out, optional_step, output_folder
     from warpflat.export.pdf import too_many_sheets
     from warpflat.pattern.curves import TOLERANCE
     from warpflat.pattern.cut_list import cut_list
@@ -335,72 +333,89 @@ def _write_pattern(
     if not options.formats and options.cloth is None:
         return WrittenPattern()
     report_activity("drafting the pattern")
-    try:
-        pattern, notes = make()
-        pattern = add_lining(pattern, options.lining) if options.lining else pattern
-        pattern = add_interfacing(pattern, options.interfacing) if options.interfacing else pattern
-        # In the printed names and units that were asked for.
-        titled = {
-            size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row)
-            for size, row in pattern.pieces.items()
+    heard = list[LeftOut]()
+    with listening_to_left_out(heard.append):
+        with optional_step("no pattern was drawn", folder=Path(to)) as not_drawn:
+            pattern, notes = make()
+            for cloth, add in ((options.lining, add_lining), (options.interfacing, add_interfacing)):
+                if cloth:
+                    with optional_step(f"the pattern has no {cloth}", folder=Path(to)):
+                        pattern = add(pattern, cloth)
+            # In the printed names and units that were asked for.
+            titled = {
+                size: tuple(
+                    replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row
+                )
+                for size, row in pattern.pieces.items()
+            }
+            drafted = draft_garment(
+                replace(pattern, pieces=titled, words=options.words), tolerance=options.tolerance, true=options.true
+            )
+        if not_drawn:
+            return WrittenPattern(notes=tuple(not_drawn), metrics={"pattern": {"not_drawn": _reason(not_drawn[0])}})
+        pieces = [piece for row in drafted.pieces.values() for piece in row]
+        ragged: dict[str, float] = {}
+        for piece in pieces:
+            for edge in piece.edges:
+                if options.tolerance is None and edge.tolerance > TOLERANCE:
+                    name_of = f"{piece.name}.{edge.name}"
+                    ragged[name_of] = max(ragged.get(name_of, 0.0), edge.fit_error)
+        if ragged:
+            within = max(ragged.values()) * 1000
+            notes = (
+                *notes, f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it",
+            )  # fmt: skip
+        notes = (*notes, *(f"{piece.name}: {note}" for piece in pieces for note in piece.notes))
+        missed = [seam for seam in drafted.seams if seam.notches_mm is not None and seam.notches_mm > 1000 * MEET]
+        notes = (*notes, *(f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed))
+        walked = walk_seams(drafted)
+        drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
+        near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
+        edges = [edge for row in drafted.pieces.values() for piece in row for edge in piece.edges]
+        cloths = cut_list(drafted.pieces[drafted.garment.sample])
+        metrics: dict[str, Any] = {
+            # How far curves stray from the mesh, and sides of seams from each other, at worst.
+            "pattern": {
+                "fit_error_mm": 1000 * max(edge.fit_error for edge in edges),
+                "seam_difference_mm": max((abs(seam.difference_mm) for seam in drafted.seams), default=None),
+                "seam_difference_per_50mm_mm": max(near, default=None),
+                "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
+            },
+            "cloths": [{"name": cloth, "pieces": [asdict(entry) for entry in rows]} for cloth, rows in cloths.items()],
+            "corners": [asdict(corner) for corner in drafted.corners],
+            "walked": [
+                {
+                    "name": seam.name,
+                    "size": seam.size,
+                    "difference_mm": seam.difference_mm,
+                    "notches_mm": seam.notches_mm,
+                }
+                for seam in drafted.seams
+            ],
         }
-        drafted = draft_garment(
-            replace(pattern, pieces=titled, words=options.words), tolerance=options.tolerance, true=options.true
-        )
-    except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
-        why = " ".join(str(error).split())
-        return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})
-    pieces = [piece for row in drafted.pieces.values() for piece in row]
-    ragged: dict[str, float] = {}
-    for piece in pieces:
-        for edge in piece.edges:
-            if options.tolerance is None and edge.tolerance > TOLERANCE:
-                name_of = f"{piece.name}.{edge.name}"
-                ragged[name_of] = max(ragged.get(name_of, 0.0), edge.fit_error)
-    if ragged:
-        within = max(ragged.values()) * 1000
-        notes = (
-            *notes, f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it",
-        )  # fmt: skip
-    notes = (*notes, *(f"{piece.name}: {note}" for piece in pieces for note in piece.notes))
-    missed = [seam for seam in drafted.seams if seam.notches_mm is not None and seam.notches_mm > 1000 * MEET]
-    notes = (*notes, *(f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed))
-    walked = walk_seams(drafted)
-    drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
-    near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
-    edges = [edge for row in drafted.pieces.values() for piece in row for edge in piece.edges]
-    cloths = cut_list(drafted.pieces[drafted.garment.sample])
-    metrics: dict[str, Any] = {
-        # How far curves stray from the mesh, and sides of seams from each other, at worst.
-        "pattern": {
-            "fit_error_mm": 1000 * max(edge.fit_error for edge in edges),
-            "seam_difference_mm": max((abs(seam.difference_mm) for seam in drafted.seams), default=None),
-            "seam_difference_per_50mm_mm": max(near, default=None),
-            "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
-        },
-        "cloths": [{"name": cloth, "pieces": [asdict(entry) for entry in rows]} for cloth, rows in cloths.items()],
-        "corners": [asdict(corner) for corner in drafted.corners],
-        "walked": [
-            {"name": seam.name, "size": seam.size, "difference_mm": seam.difference_mm, "notches_mm": seam.notches_mm}
-            for seam in drafted.seams
-        ],
-    }
-    refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
-    notes = (*notes, f"pattern.pdf was left out: {refused}") if refused else notes
-    with output_folder(to) as folder:
-        files = list[str]()
-        for kind in FORMATS:
-            if kind in options.formats and not (kind == "pdf" and refused):
-                file, lost = _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
-                files.append(file)
-                notes = (*notes, *lost)
-        if "dxf" in options.formats and len(drafted.pieces) > 1:
-            files.append(file_in(folder, name, ".rul").name)
-        if options.cloth is not None:
-            marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
-            files += marked
-            notes = (*notes, *remarks)
-            metrics["marker"] = plans[0]
+        refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
+        notes = (*notes, f"pattern.pdf was left out: {refused}") if refused else notes
+        with output_folder(to) as folder:
+            files = list[str]()
+            for kind in FORMATS:
+                if kind in options.formats and not (kind == "pdf" and refused):
+                    with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder):
+                        file, lost = _write(
+                            drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper
+                        )
+                        files.append(file)
+                        notes = (*notes, *lost)
+                        if kind == "dxf" and len(drafted.pieces) > 1:
+                            files.append(file_in(folder, name, ".rul").name)
+            if options.cloth is not None:
+                with optional_step("no marker was made", folder=folder) as not_made:
+                    marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+                    files += marked
+                    notes = (*notes, *remarks)
+                    metrics["marker"] = plans[0]
+                if not_made:
+                    metrics["marker"] = {"not_made": _reason(not_made[0])}
+    notes = (*notes, *(step.note for step in heard))
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics, walked=walked)
 
 
@@ -420,6 +435,11 @@ def check_names(names: Mapping[str, str], pieces: Iterable[str]) -> None:
     for name in names:
         if name not in known:
             raise InputError(f"names: there is no piece {name!r}; {nearest(name, known)}")
+
+
+def _reason(note: str) -> str:
+    """Return what follows the first colon of a note on a step that was left out."""
+    return note.partition(": ")[2]
 
 
 def _write(
@@ -476,7 +496,7 @@ def _marker(
 
     Returns names, notes and the measures of each marker, or why there is none.
     """
-    from warpflat.core.output import file_in, write_json
+    from warpflat.core.output import file_in, optional_step, write_json
     from warpflat.export.svg import write_marker_svg
     from warpflat.pattern.cut_list import cloths_of
     from warpflat.pattern.marker import make_marker
@@ -487,11 +507,11 @@ def _marker(
     names, remarks, plans = list[str](), list[str](), list[dict[str, Any]]()
     for number, fabric in enumerate(cloths):
         own = cloth if number == 0 else replace(cloth, stripes=Stripes())
-        try:
+        of = "" if number == 0 else f" of {fabric}"
+        with optional_step(f"no marker{of} was made", folder=folder) as not_made:
             marker = make_marker(drafted, own, fabric=fabric if len(cloths) > 1 else "", sizes=sizes, seconds=seconds)
-        except InputError as error:
-            remarks.append(f"no marker was made: {error}")
-            plans.append({"not_made": str(error)})
+        if not_made:
+            plans.append({"not_made": _reason(not_made[0])})
             continue
         # The shell's marker has no more than the garment's name.
         stem = name if number == 0 else f"{name}.{plain_letters(fabric).replace(' ', '_')}"
@@ -520,7 +540,7 @@ def _marker(
         plans.append(measures)
         wide = f"{marker.width:.2f} m wide" + (" when folded" if marker.folded else "")
         remarks.append(
-            f"marker{'' if number == 0 else f' of {fabric}'}: {marker.length:.2f} m of cloth {wide}, {marker.utilisation:.1%} of it "
+            f"marker{of}: {marker.length:.2f} m of cloth {wide}, {marker.utilisation:.1%} of it "
             f"used by {format_count(len(placements), 'piece')}"
         )
     return names, tuple(remarks), plans

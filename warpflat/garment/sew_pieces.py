@@ -65,6 +65,7 @@ def sew_pieces(
     eased: bool = False,
     bands: Bands = "as worn",
     shorter: float = 0.0,
+    relaxed: bool = True,
 ) -> Garment:
     """Relax pieces of meshes again, all together, so that seams and darts match and constraints hold.
 
@@ -82,12 +83,14 @@ def sew_pieces(
         bands: long strips of even width that are cut straight, and stretched as they are sewn: "straight" all, "auto" those that are closed
             to a ring, at least fifteen times as long as wide, and sewn along one side; "as worn" none. One that a constraint holds is none.
         shorter: the share by which these are cut shorter than their shorter side is worn.
+        relaxed: whether they are relaxed together; if not, each keeps its layout, and the seams only say what meets what.
 
     Returns:
-        The garment; its `sewn` is None where there is nothing to be sewn or held.
+        The garment; its `sewn` is None where there is nothing to be sewn or held, or nothing was relaxed.
 
     Raises:
         InputError: a constraint or a seam names a line that its piece does not have, or asks what the line cannot be.
+        StepError: the pieces cannot be relaxed together.
     """
     flat = {piece.surface.name: piece for piece in pieces}
     first = next(iter(flat))
@@ -148,7 +151,7 @@ def sew_pieces(
     flat |= straight
     rest = [pair for pair in pairs if straight.keys().isdisjoint(pair.pieces)]
     sewn: Sewn | None = None
-    if rest or constraints:
+    if relaxed and (rest or constraints):
         sewn = _sew_evenly(
             {name: piece for name, piece in flat.items() if name not in straight}, rest, constraints, options
         )

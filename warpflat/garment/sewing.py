@@ -21,7 +21,7 @@ import warp as wp
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, StepError
 from warpflat.core.sums import range_offsets
 from warpflat.flattening.applied_cut import cut_sides
 from warpflat.flattening.progress import CONTACT, STEPS, Stage
@@ -43,6 +43,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.solver.equations import ConstrainedOutcome, factor_pays, relax_under_equations
 from warpflat.solver.grain import grain_alignments
+from warpflat.solver.metric import stiffness_matrix
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.steps import Relaxation
 from warpflat.solver.stop import Outcome
@@ -147,6 +148,7 @@ def sew(
 
     Raises:
         InputError: a constraint names what does not exist, or a piece cannot be laid with its fold straight.
+        StepError: pieces are crushed so far that they cannot be relaxed together.
     """
     start_time = time.perf_counter()
     options = given_options(options)
@@ -187,7 +189,16 @@ def sew(
         for part in parts
     ]
     state = Relaxation(network, options, start=start, alignments=alignments)
-    ended = _relax(state, equations)
+    try:
+        ended = _relax(state, equations)
+    except StepError as error:
+        # Stiff beyond all numbers are pieces that have not come to rest on their own.
+        stiff = [
+            name
+            for name, piece in pieces.items()
+            if not np.isfinite(stiffness_matrix(piece.network, piece.positions).data).all()
+        ]
+        raise StepError(f"{', '.join(stiff)}: {error}, before anything is sewn" if stiff else str(error)) from error
     seconds = time.perf_counter() - start_time
     converged = ended.outcome.converged and ended.satisfied
     first = ended.outcome.first_steps

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.output import optional_step
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import find_unused_name, quote_value
 from warpflat.cutting.separate_pieces import separate
@@ -70,6 +72,8 @@ _MOST_EDGES = 8
 BESIDE, ALIGNED = 0.05, 1e-3
 #: How a note on a seam of a mesh begins that its pattern lacks; shorter stretches [m] are not told.
 LACKING, _LACKING = "not sewn in the pattern:", 1e-3
+# How a note on a pattern begins that does not show how it is worn.
+_NO_DRAWING = "the guide has no line drawing of the garment"
 # What lines along a border are called that nobody has named, with the numbers of their stretches.
 _UNNAMED = re.compile(r"(to .+|edge|seam)(_\d+)?( \d+)*")
 # A plane of symmetry whose normal has this cosine to x at least is that between left and right.
@@ -130,12 +134,19 @@ def pattern_of_garment(
                 f"{' and '.join(dict.fromkeys(pair.pieces))} about ({place}) cm: no edges of them fit each other there",
             )
         # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
+        as_laid = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
         stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
-        pattern = replace(pattern, seams=[_eased(seam, pattern, stretched) for seam in pattern.seams])
+        pattern = replace(
+            pattern,
+            seams=[
+                replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in as_laid) for seam in pattern.seams
+            ],
+        )
         if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
             pattern = _named_by_pieces(pattern)
             return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
-        pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
+        with optional_step(_NO_DRAWING, is_needed=False):
+            pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
         pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
         if pairs:
             pattern = _hung_upright(pattern, sample, pairs)
@@ -238,13 +249,19 @@ def pattern_of_garment(
             head = garment.mannequin.extremity("head")
             girths[size] |= {} if head is None else {"head": head}
     rises = hem_rises(pattern, sample.finishing)
-    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width)
-    pattern = add_pockets(pattern, sample.pockets)
+    with optional_step("the pattern has no finishing"):
+        pattern = finish_edges(
+            pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width
+        )
+    with optional_step("the pattern has no pockets"):
+        pattern = add_pockets(pattern, sample.pockets)
     if not rises:
         # Godets of one size are equal, unless a slanted hem cuts them.
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
         notes += equal
-    return replace(pattern, worn=describe_worn(garments, pattern.sample, rises)), notes
+    with optional_step(_NO_DRAWING, is_needed=False):
+        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises))
+    return pattern, notes
 
 
 def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair]) -> Pattern:
@@ -284,9 +301,14 @@ def _named_by_pieces(pattern: Pattern) -> Pattern:
     return replace(pattern, seams=seams)
 
 
+def _pieces_of(seam: Seam) -> frozenset[str]:
+    """Return the names of the pieces that a seam joins."""
+    return frozenset(side.piece for row in seam.sides for side in row)
+
+
 def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
     """Return a seam of pieces that are stretched to each other with its longer side last, eased to the other."""
-    if frozenset(side.piece for row in seam.sides for side in row) not in stretched:
+    if _pieces_of(seam) not in stretched:
         return seam
     first, second = sorted(
         seam.sides,
@@ -514,12 +536,19 @@ def pattern_of_surface(
     """
     rules = rules or EdgeRules()
     ends = ends or {}
-    pieces = [_mesh_piece(result, size, ends.get(result.surface.name, ())) for result in results]
+    drawn = dict[str, Piece]()
+    for result in results:
+        with optional_step(f"{result.surface.name} was left out of the pattern") if len(results) > 1 else nullcontext():
+            drawn[result.surface.name] = _mesh_piece(result, size, ends.get(result.surface.name, ()))
+    if not drawn:
+        raise InputError("none of the pieces can be drawn")
+    results, pieces = [result for result in results if result.surface.name in drawn], list(drawn.values())
     named = []
     for seam in seams:
-        first, second = (_edges_along(line, results, pieces) for line in seam.sides)
-        back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
-        named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
+        with optional_step(f"seam {seam.name!r} was left out of the pattern"):
+            first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+            back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
+            named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
     names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
     rules, notes = rules.known(names)
     notes += tuple(

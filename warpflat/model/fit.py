@@ -241,7 +241,10 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     # A million faces of them take a tenth of a gigabyte each, and the smoothing more.
     del strain, stress, lengths, spread, pull, load, along_warp, along_weft, crossed
     pressure = smooth_face_values(surface, loaded, smoothing_length)
-    demand = Demand.of(fabric, strain_warp, strain_weft, shear)
+    # A stretch that is asked for beyond the limit is meant: the cloth is judged from there.
+    asked = np.zeros((faces, 2)) if network.stretch is None else network.stretch - 1.0
+    meant = np.where(asked > fabric.strain_limit, asked, 0.0)
+    demand = Demand.of(fabric, strain_warp - meant[:, 0], strain_weft - meant[:, 1], shear)
     total_area = max(float(weight.sum()), 1e-300)
     misfits = list[Misfit]()
     # Held cloth and slack cloth are regions of their own: a dart helps the one, folds are the other.

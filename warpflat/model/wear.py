@@ -24,6 +24,10 @@ __all__ = ["SKIN_LENGTH", "Wear", "intended_stretch", "unused_stretch"]
 
 # Cloth bridges what is smaller than this, and a scan is rough below it: curvature is taken over such lengths [m].
 SKIN_LENGTH = 0.01
+# Bisections of a strain, and rounds over both threads.
+_HALVINGS, _ROUNDS = 50, 6
+# Both threads are said to carry a pressure where one is strained by this share of the other.
+_BOTH = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,8 +36,9 @@ class Wear:
 
     Attributes:
         stretch_warp, stretch_weft: elongation of the cloth on the body over its flat length; 0.2 for 20 %.
-        pressure: intended pressure on the skin [Pa], if any. The threads around the body, along its stronger curvature,
-            get the stretch that gives it, face by face; the others get the stretch given here.
+        pressure: intended pressure on the skin [Pa], if any. Threads get the stretch that gives it, face by face, each by the curvature
+            along it: on a tube those around it, on a ball both. Where a stretch is given, the threads across the stronger curvature get
+            that, and those along it the rest.
     """
 
     stretch_warp: float = 0.0
@@ -90,9 +95,11 @@ def intended_stretch(
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
     """Return the intended length worn over length flat along warp and weft, #F by 2, and notes.
 
-    For a pressure, p = T_warp k_warp / s_weft + T_weft k_weft / s_warp is solved for the stretch s of the threads that
-    run along the stronger curvature k, with the fabric's own curve for their tension T; k is that along the threads of
-    the layout, averaged over 10 mm. No stretch goes beyond the fabric's limit.
+    A pressure p = n_warp k_warp + n_weft k_weft is carried by the forces n = T / s per worn width, where k is the curvature along the
+    threads of the layout, averaged over 10 mm, T the fabric's own tension, and s the stretch of the other threads. Each thread gets
+    n_i = p k_i^3 / (k_warp^4 + k_weft^4): pR around a tube, whatever the noise of the curvature along it, and pR / 2 both ways on a
+    ball. If the stretch across the stronger curvature is given, only the other one is solved for. No stretch of a pressure goes beyond
+    the fabric's limit.
 
     Args:
         surface: the piece on the body.
@@ -108,7 +115,10 @@ def intended_stretch(
         return None, ()
     stretch = np.tile([1.0 + wear.stretch_warp, 1.0 + wear.stretch_weft], (len(surface.faces), 1))
     if not wear.pressure:
-        return stretch, ()
+        asked = max(wear.stretch_warp, wear.stretch_weft)
+        limit = f"{fabric.name}'s limit of {100 * fabric.strain_limit:.3g} %"
+        beyond = f"a stretch of {100 * asked:.3g} % is asked for, beyond {limit}: the fit is judged from there"
+        return stretch, (beyond,) if asked > fabric.strain_limit else ()
     network = SpringNetwork.build(surface, fabric, positions, grain_angle=grain_angle, device="cpu")
     area = network.cell_arrays.area
     face_area = np.maximum(np.bincount(network.cell_arrays.face, area, minlength=len(surface.faces)), 1e-300)
@@ -123,10 +133,14 @@ def intended_stretch(
     around = int(np.abs(curved[1]) @ face_area >= np.abs(curved[0]) @ face_area)
     thread = ("warp", "weft")[around]
     other = 1 - around
-    low, high = _stretch_for_pressure(fabric, wear.pressure, curved, around, stretch[:, other])
-    stretch[:, around] = 1.0 + 0.5 * (low + high)
-    short = float(face_area[low > fabric.strain_limit - 1e-6].sum() / face_area.sum())
-    notes = [f"pressure {wear.pressure:g} Pa by stretch along {thread}, which runs around the body"]
+    given = (wear.stretch_warp, wear.stretch_weft)[other]
+    strain = _strain_for_pressure(fabric, wear.pressure, curved, around, given)
+    stretch = 1.0 + strain
+    short = float(face_area[strain[:, around] > fabric.strain_limit - 1e-6].sum() / face_area.sum())
+    along = f"{thread}, which runs around the body"
+    if not given and float(strain[:, other] @ face_area / face_area.sum()) > _BOTH * float(strain[:, around].mean()):
+        along = "warp and weft, by the body's curvature along each"
+    notes = [f"pressure {wear.pressure:g} Pa by stretch along {along}"]
     if unused := unused_stretch(wear, thread):
         notes.append(unused)
     if short > 0.001:
@@ -137,37 +151,47 @@ def intended_stretch(
     return stretch, tuple(notes)
 
 
-def _stretch_for_pressure(
-    fabric: Fabric, pressure: float, curved: Sequence[FloatArray], around: int, across: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Solve for the strain along the threads around the body by bisection.
+def _strain_for_pressure(
+    fabric: Fabric, pressure: float, curved: Sequence[FloatArray], around: int, given: float
+) -> FloatArray:
+    """Solve for the strains of the threads, each by bisection while the other stays, since only Poisson's ratio couples them.
 
     Args:
         fabric: the cloth.
         pressure: intended [Pa].
         curved: #F each, curvature along warp and weft [1/m].
         around: 0 if the warp runs around the body, 1 if the weft does.
-        across: #F, length worn over length flat along the other threads.
+        given: strain of the other threads; 0 leaves them to the pressure, too.
 
     Returns:
-        Lower and upper bounds of the strain, #F each; the fabric's limit where the pressure cannot be reached.
+        #F by 2, strains along warp and weft; the fabric's limit where the pressure cannot be reached.
     """
     c_warp, c_weft, c_cross = plane_stress(fabric)
     excess = (c_warp - fabric.stiffness_warp, c_weft - fabric.stiffness_weft)
-    other = 1 - around
+    other, k = 1 - around, np.maximum(np.stack(curved, axis=1), 0.0)
+    strain = np.zeros((len(k), 2))
+    strain[:, other] = given
 
-    def tension(thread: int, strain: FloatArray, strain_across: FloatArray) -> FloatArray:
-        own = fabric.tension(strain, "weft" if thread else "warp")
-        return own + excess[thread] * strain + c_cross * strain_across
+    def force(thread: int, own: FloatArray) -> FloatArray:
+        """Return the force of threads per worn width [N/m], of strains of theirs (#F)."""
+        tension = fabric.tension(own, "weft" if thread else "warp") + excess[thread] * own
+        return np.asarray((tension + c_cross * strain[:, 1 - thread]) / (1.0 + strain[:, 1 - thread]))
 
-    low, high = np.zeros(len(across)), np.full(len(across), fabric.strain_limit)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        reached = tension(around, middle, across - 1.0) * curved[around] / across
-        reached += tension(other, across - 1.0, middle) * curved[other] / (1.0 + middle)
-        enough = reached >= pressure
-        high, low = np.where(enough, middle, high), np.where(enough, low, middle)
-    return low, high
+    share = k**3 / np.maximum((k**4).sum(axis=1, keepdims=True), 1e-300)
+    for _ in range(1 if given else _ROUNDS):
+        for thread in (around,) if given else (around, other):
+            low, high = np.zeros(len(k)), np.full(len(k), fabric.strain_limit)
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                if given:
+                    strain[:, around] = middle
+                    carried = force(around, middle) * curved[around] + force(other, strain[:, other]) * curved[other]
+                    enough = carried >= pressure
+                else:
+                    enough = force(thread, middle) >= pressure * share[:, thread]
+                high, low = np.where(enough, middle, high), np.where(enough, low, middle)
+            strain[:, thread] = 0.5 * (low + high)
+    return strain
 
 
 def unused_stretch(wear: Wear, around: str) -> str:

@@ -31,7 +31,7 @@ from warpflat.pattern.drafted_darts import (
     fisheye_legs,
     smooth_fisheye,
 )
-from warpflat.pattern.fitting import TOLERANCES, equal_sides, fit_edges, is_wavy, smooth_line
+from warpflat.pattern.fitting import TOLERANCES, as_in_layout, equal_sides, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.piece_parts import Edge
@@ -279,10 +279,8 @@ def _fitted_edges(
         frame = _frame(piece)
         lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
-    curves, corners = (
-        equal_sides(pieces, seams, {key: curve for key, (curve, _) in fitted.items()}),
-        list[CornerReport](),
-    )
+    curves = equal_sides(pieces, seams, {key: curve for key, (curve, _) in fitted.items()})
+    curves, corners = as_in_layout(lines, seams, curves), list[CornerReport]()
     trued: Mapping[tuple[str, str], Curve] = curves
     if true:
         # Turned ends change lengths a little, too.

@@ -18,7 +18,7 @@ from warpflat.pattern.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import TAILS, Label, Words, text_width
 from warpflat.pattern.measures import name_in_units
-from warpflat.pattern.piece_parts import HEMMED_LEVELS
+from warpflat.pattern.piece_parts import HEMMED_LEVELS, LEFT_OUT
 from warpflat.pattern.placement import LabelRoom, Spot, spots_along
 from warpflat.pattern.words import translate, translate_name
 
@@ -55,7 +55,7 @@ class Stroke:
     """One line of a drawing.
 
     Attributes:
-        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout",
+        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "left_out", "grain", "notch", "drill", "cutout",
             "leader".
         name: what it is called in files, unique among the strokes of a piece; empty for decoration.
         points: #P by 2 [m].
@@ -291,7 +291,12 @@ def _annotations(
     strokes = [
         *grain_strokes(piece.grain),
         *(
-            Stroke(role="internal", name=name, points=line, curve=_fit_internal_line(line.tobytes()))
+            Stroke(
+                role="left_out" if name.endswith(LEFT_OUT) else "internal",
+                name=name,
+                points=line,
+                curve=_fit_internal_line(line.tobytes()),
+            )
             for name, line in piece.internal_lines.items()
         ),
     ]

@@ -15,7 +15,16 @@ from warpflat.pattern.piece_parts import SAME_POINT
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 
-__all__ = ["TOLERANCES", "EdgeKey", "drawn_length", "equal_sides", "fit_edges", "is_wavy", "smooth_line"]
+__all__ = [
+    "TOLERANCES",
+    "EdgeKey",
+    "as_in_layout",
+    "drawn_length",
+    "equal_sides",
+    "fit_edges",
+    "is_wavy",
+    "smooth_line",
+]
 
 #: Names of a piece and of its edge.
 EdgeKey = tuple[str, str]
@@ -38,6 +47,8 @@ WAVES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 EQUAL = 1e-4
 #: Curves keep near their points where the sides of their seams then differ by at most this share of what is allowed.
 SAFE = 0.8
+# Sides that differ by more than allowed in the layout are drawn with at most so many times that.
+_NO_WORSE = 1.1
 #: What is drawn for the length of an edge, by its role.
 STRIPS = ("strip", "waistband", "cuff")
 #: Sides of a seam that differ by less [m] stay as they are.
@@ -211,6 +222,36 @@ def equal_sides(
     return found
 
 
+def as_in_layout(
+    lines: Mapping[EdgeKey, FloatArray], seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]
+) -> dict[EdgeKey, Curve]:
+    """Return the curves with chords along both sides of each seam that would differ as drawn, and by more than in the layout.
+
+    No smooth line near a ragged border may be as long as that; its chords are.
+
+    Args:
+        lines: #P by 2 [m], the points of every edge, in its piece's direction.
+        seams: between them.
+        curves: of all edges.
+    """
+    found = {key: (curve, 0.0) for key, curve in curves.items()}
+    flat = {key: (chords(line), 0.0) for key, line in lines.items()}
+    unchecked = list(seams)
+
+    def strays(seam: Seam) -> bool:
+        drawn, chord = (_both((seam.sides, (seam.ease, seam.eased)), lines, each) for each in (found, flat))
+        laid = chord[:2] if seam.as_laid else None
+        now, least = (_differences(*each, laid) for each in (drawn, chord))
+        return any(one > max(1.0, _NO_WORSE * other) for one, other in zip(now, least, strict=True))
+
+    # Chords on one side of a seam may change an edge of another one.
+    while straying := [seam for seam in unchecked if strays(seam)]:
+        for seam in straying:
+            found |= {key: flat[key] for row in seam.sides for key in ((side.piece, side.edge) for side in row)}
+        unchecked = [seam for seam in unchecked if seam not in straying]
+    return {key: curve for key, (curve, _) in found.items()}
+
+
 def drawn_length(line: FloatArray) -> float:
     """Return the length of an edge as it is drawn where no seam has a say: along its fitted curve [m].
 
@@ -346,9 +387,16 @@ def _lengths_at_points(
 
 def _difference(first: FloatArray, second: FloatArray, ease: Eased) -> float:
     """Return by how much the sides of a seam differ, over what is allowed."""
-    near = worst_difference(first, second, *ease)
+    return max(_differences(first, second, ease))
+
+
+def _differences(
+    first: FloatArray, second: FloatArray, ease: Eased, laid: tuple[FloatArray, FloatArray] | None = None
+) -> tuple[float, float]:
+    """Return by how much the sides of a seam differ as a whole, and over a short stretch, each over what is allowed."""
+    near = worst_difference(first, second, *ease, laid=laid)
     whole = abs(second[-1] - first[-1] * (1 + ease[0])) / SEAM_TOLERANCE
-    return float(whole if near is None else max(whole, near / LOCAL_TOLERANCE))
+    return float(whole), 0.0 if near is None else near / LOCAL_TOLERANCE
 
 
 def _lengths_along(curve: Curve, points: FloatArray) -> FloatArray:

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.output import optional_step
 from warpflat.pattern.corners import find_corners, find_cracks
-from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Piece
+from warpflat.pattern.piece_parts import LEFT_OUT, Dart, Edge, Hole
+from warpflat.pattern.pieces import Piece, check_hole
 from warpflat.pattern.placement import default_grain
 from warpflat.surface.connectivity import border_loops
 
@@ -77,7 +78,7 @@ def piece_from_mesh(
 
     Raises:
         InputError: unknown names, a mesh without a border, dart vertices that are not on it, a border that crosses
-            itself, or a crack or hole around which the cloth lies on itself.
+            itself, or a crack around which the cloth lies on itself.
     """
     features = features or MeshFeatures()
     flat = np.asarray(positions, dtype=np.float64)
@@ -161,7 +162,14 @@ def piece_from_mesh(
     for number, loop in enumerate(inner, start=1):
         crack = next((each for each, ids in cracks.items() if np.array_equal(ids, np.sort(loop))), None)
         label, kind = (f"hole_{number}", "cutout") if crack is None else (crack, "dart")
-        holes.append(Hole(name=label, points=flat[loop[::-1]], kind=kind))
+        hole = Hole(name=label, points=flat[loop[::-1]], kind=kind)
+        if kind == "cutout":
+            with optional_step(f"{label} of {name} is not cut, and drawn dashed") as left_out:
+                check_hole(f"piece {name!r}", hole)
+            if left_out:
+                internal[label + LEFT_OUT] = flat[np.append(loop, loop[0])]
+                continue
+        holes.append(hole)
     return Piece(
         name=name,
         size=size,

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.output import optional_step
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.text import without_side
 from warpflat.pattern.curves import Curve, split_bezier
@@ -28,15 +29,19 @@ ON_AXIS = 1e-6
 
 
 def halved(garment: DraftedGarment) -> DraftedGarment:
-    """Return the garment with every wide piece that is its own mirror image, in all sizes, as a half on the fold."""
-    on_fold = {
-        name
-        for name in garment.piece_names
-        if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in garment.all_sizes(name))
-    }
-    sides = {name: _kept_side(garment.all_sizes(name)[0], garment.garment.seams) for name in on_fold}
+    """Return the garment with every wide piece that is its own mirror image, in all sizes, as a half on the fold.
+
+    A piece whose half cannot be drawn stays whole: a slit along its middle may cross the fold.
+    """
+    halves: dict[str, list[DraftedPiece]] = {}
+    for name in garment.piece_names:
+        sizes = garment.all_sizes(name)
+        if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in sizes):
+            side = _kept_side(sizes[0], garment.garment.seams)
+            with optional_step(f"{name} is printed whole, not as a half on the fold", is_needed=False):
+                halves[name] = [_half(p, garment, side) for p in sizes]
     pieces = {
-        size: tuple(_half(piece, garment, sides[piece.name]) if piece.name in on_fold else piece for piece in row)
+        size: tuple(halves[piece.name].pop(0) if piece.name in halves else piece for piece in row)
         for size, row in garment.pieces.items()
     }
     return replace(garment, pieces=pieces)

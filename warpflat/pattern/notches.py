@@ -52,7 +52,8 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
         if all(edge.edge.vertices is not None for line in lines for edge in line.edges) and (
             len(lines[0].places) == len(lines[1].places)
         ):
-            worst = worst_difference(lines[0].places, lines[1].places, seam.ease, seam.eased)
+            laid = (lines[0].laid, lines[1].laid) if seam.as_laid else None
+            worst = worst_difference(lines[0].places, lines[1].places, seam.ease, seam.eased, laid=laid)
         # A notch meets a notch or a joint of the other side; of equal edges one is drawn, and its notches are those of all.
         alike = {name for name, group in groups.items() if group == groups[seam.name]}
         marked = [line.marked(alike) for line in lines]
@@ -265,10 +266,18 @@ class SeamLine:
     @property
     def places(self) -> FloatArray:
         """Length [m] along the side of each point of its edges as they came in, joints once."""
-        rows: list[FloatArray] = []
-        for edge, start, side in zip(self.edges, self.joints, self.side, strict=False):
-            along = edge.length - edge.places[::-1] if side.reversed else edge.places
-            rows.append(start + along[bool(rows) :])
+        return self._joined([edge.places for edge in self.edges])
+
+    @property
+    def laid(self) -> FloatArray:
+        """Length [m] along the side of each point of its edges in the layout, joints once."""
+        return self._joined([arc_lengths(edge.edge.points) for edge in self.edges])
+
+    def _joined(self, lengths: Sequence[FloatArray]) -> FloatArray:
+        """Return lengths [m] along the edges, each in its piece's direction, as lengths along the side."""
+        rows = [np.zeros(1)]
+        for along, side in zip(lengths, self.side, strict=True):
+            rows.append(rows[-1][-1] + (along[-1] - along[::-1] if side.reversed else along)[1:])
         return np.concatenate(rows)
 
     def index(self, length: float) -> int:

@@ -17,6 +17,7 @@ __all__ = [
     "EDGE_KINDS",
     "FOLD_STRAIGHT",
     "HEMMED_LEVELS",
+    "LEFT_OUT",
     "MOST_ALLOWANCE",
     "SAME_POINT",
     "Dart",
@@ -34,6 +35,8 @@ EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
 #: skirt, a band or a facing.
 HEMMED_LEVELS = frozenset(("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "forearm", "wrist"))
 
+#: Ends the name of a line inside a piece that is the border of a hole which cannot be cut.
+LEFT_OUT = " left out"
 #: Ends of neighbouring edges that are closer than this [m] are one corner.
 SAME_POINT = 1e-6
 #: How far [m] an edge on the fold of the cloth may stray from straight.

@@ -24,7 +24,7 @@ from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Elastic", "FoundSeam", "Pattern", "Piece", "Seam", "SeamSide", "unknown_size"]
+__all__ = ["Elastic", "FoundSeam", "Pattern", "Piece", "Seam", "SeamSide", "check_hole", "unknown_size"]
 
 
 #: Kinds of :class:`SeamOpening`.
@@ -41,7 +41,8 @@ class Piece:
         quantity: how often it is cut; an even number of a piece that is not its own mirror image is cut in pairs.
         edges: in order, closed and counter-clockwise; an edge of kind "fold" makes it a half on the fold of the cloth.
         darts: their legs are edges of the outline.
-        internal_lines: #P by 2 [m] by name: feature lines, placement lines; drawn, not cut.
+        internal_lines: #P by 2 [m] by name: feature lines, placement lines; drawn, not cut. Those whose name ends with `LEFT_OUT` are the
+            borders of holes that could not be cut; they are dashed.
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
         marks: points [m] by name that are marked through the cloth: buttons, corners of pockets.
@@ -107,7 +108,7 @@ class Piece:
     @property
     def printed_name(self) -> str:
         """What stands on paper; of a pair without its side."""
-        name = self.name.replace("_", " ")
+        name = self.name.replace("_", " ") if self.name.strip("_ ") else self.name
         return self.title or translate_name(without_side(name) if self.is_pair else name)
 
     @property
@@ -191,6 +192,8 @@ class Seam:
         sides: exactly two, each a sequence of `SeamSide`.
         ease: length of the second side over the first, minus 1: 0.03 eases 3 % more of the second side in.
         eased: shares of the first side's length between which the second is longer; all along it if not given.
+        as_laid: whether its sides are as long as each other as a whole only: what one has more here than the other, in the points of its
+            edges, is eased in there.
         notches: fractions of the first side's length in (0, 1) that get notches on both sides; None places them by length.
         size_notches: by size, fractions instead of `notches`, where a notch stands for a length, as the end of a zip.
         double: double notches; None means double where a back takes part and no front does.
@@ -201,6 +204,7 @@ class Seam:
     sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
     ease: float = 0.0
     eased: tuple[float, float] = (0.0, 1.0)
+    as_laid: bool = False
     notches: tuple[float, ...] | None = None
     size_notches: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     double: bool | None = None
@@ -481,14 +485,26 @@ def check_piece(
             raise InputError(
                 f"{where}: edge {edge.name!r} is of kind 'dart' but belongs to {legs.count(edge.name)} darts, not 1"
             )
-    # The cloth around holes does not overlap.
     for hole in holes:
-        width = overlap_width(hole.points)
-        if width <= OVERLAP:
-            continue
-        if hole.kind == "dart":
-            raise InputError(f"{where}: dart {hole.name!r} {overlapping(width)}")
-        raise InputError(
-            f"{where}: the cloth around hole {hole.name!r} lies on itself by {width * 1000:.1f} mm; a hole runs "
-            "counter-clockwise and does not cross itself"
-        )
+        check_hole(where, hole)
+
+
+def check_hole(where: str, hole: Hole) -> None:
+    """Check that the cloth around a hole does not lie on itself.
+
+    Args:
+        where: what messages begin with.
+        hole: of a piece.
+
+    Raises:
+        InputError: it does.
+    """
+    width = overlap_width(hole.points)
+    if width <= OVERLAP:
+        return
+    if hole.kind == "dart":
+        raise InputError(f"{where}: dart {hole.name!r} {overlapping(width)}")
+    raise InputError(
+        f"{where}: the cloth around hole {hole.name!r} lies on itself by {width * 1000:.1f} mm; a hole runs "
+        "counter-clockwise and does not cross itself"
+    )

@@ -379,7 +379,9 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
     for label, penalty in _wrapped_labels(tuple(lines)):
         corners = []
         for row in label.words():
-            half = np.array([text_width(row.text, row.height, bold=row.bold), row.height * LEADING]) / 2
+            # A blank row takes the room of a letter.
+            wide = max(text_width(row.text, row.height, bold=row.bold), row.height)
+            half = np.array([wide, row.height * LEADING]) / 2
             corners.append(row.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
         shape = np.asarray(shapely.MultiPoint(np.concatenate(corners)).convex_hull.exterior.coords)
         # Places are made when they are first asked for.

@@ -30,7 +30,12 @@ def eased_length(length: Any, whole: float, ease: float, eased: tuple[float, flo
 
 
 def worst_difference(
-    first: FloatArray, second: FloatArray, ease: float, eased: tuple[float, float] = (0.0, 1.0)
+    first: FloatArray,
+    second: FloatArray,
+    ease: float,
+    eased: tuple[float, float] = (0.0, 1.0),
+    *,
+    laid: tuple[FloatArray, FloatArray] | None = None,
 ) -> float | None:
     """Return the largest difference [m] of two sides of a seam over any `STRETCH`; None if they share no vertices.
 
@@ -38,9 +43,12 @@ def worst_difference(
         first, second: #P, the lengths [m] at which both sides have their common vertices.
         ease: by how much the second side is meant to be longer, as a share.
         eased: shares of the first side between which it is longer.
+        laid: the lengths [m] of both sides in the layout, of a seam whose sides differ from place to place as they do there.
     """
     if len(first) != len(second):
         return None
+    if laid is not None:
+        second = second - (laid[1] - laid[0])
     starts = np.unique(np.concatenate([first, first - STRETCH]))
     starts = starts[(starts >= 0) & (starts <= first[-1] - STRETCH)]
     starts = starts if len(starts) else first[:1]

@@ -151,9 +151,14 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
     masks = [_masks(shape, cell, gap, (0, 2)) for shape in shapes]
     if any(row[0].cells.shape[1] > across for row in masks):
         return None
-    longest = sum(row[0].cells.shape[0] for row in masks)
-    lengths, places = [], Places((longest, across))
-    for order in orders(masks):
+    # Boxes in shelves take twice their area and the tallest (Coffman et al. 1980); what takes more gets a longer strip, up to all above
+    # each other. Where shapes lie does not hang on that.
+    tall = [row[0].cells.shape[0] for row in masks]
+    strip = min(sum(tall), 2 * sum(row[0].cells.size for row in masks) // across + max(tall))
+    places = Places((strip, across))
+
+    def laid(order: Sequence[int]) -> int | None:
+        """Return the rows that shapes take in an order, each where it is lowest; None where the strip is too short."""
         places.clear()
         length = 0
         for k in order:
@@ -162,10 +167,19 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
             for mask in masks[k]:
                 free = places.free(mask)
                 row = int(np.argmax(free.any(axis=1)))
+                if not free[row].any():
+                    return None
                 found.append((row, int(np.argmax(free[row])), mask))
             row, column, mask = min(found, key=lambda item: (max(length, item[0] + len(item[2].cells)), item[0]))
             places.take(mask, row, column)
             length = max(length, row + len(mask.cells))
+        return length
+
+    lengths = list[int]()
+    for order in orders(masks):
+        while (length := laid(order)) is None:
+            strip = min(2 * strip, sum(tall))
+            places = Places((strip, across))
         lengths.append(length)
     return min(lengths) * float(cell[1])
 

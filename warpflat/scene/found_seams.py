@@ -332,7 +332,8 @@ def _as_cuts(scene: Scene, number: int, table: SeamCutTable, marks: Sequence[Sea
     if isinstance(table.edges, str):
         with errors_named(here):
             path = scene.folder / expand_variables(table.edges)
-        edges = read_edges(path)
+        with errors_named(f"{here}: edges"):
+            edges = read_edges(path)
     elif table.edges is not None:
         edges = table.edges
     plane = table.plane

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_file_name, make_file_name
 from warpflat.core.toml_file import check_table, read_toml
 from warpflat.fabric.fabric import Fabric
@@ -88,9 +88,18 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
         where: what messages begin with.
 
     Raises:
-        InputError: as `load_scene`.
+        InputError: as `load_scene`; it names no fabric, and its fabric files have several.
     """
     settings = check_table(SceneTable, data, where)
+    if settings.fabric_files and "fabric" not in settings.model_fields_set:
+        # The only fabric of the user's files is meant.
+        with errors_named(f"{where}: fabric_files"):
+            library = load_library([folder / expand_variables(file) for file in settings.fabric_files])
+        shipped = load_library()
+        own = [name for name, fabric in library.items() if fabric is not shipped.get(name)]
+        if len(own) > 1:
+            raise InputError(f"{where}: fabric is not given, and the fabric files have several; {nearest('', own)}")
+        settings = settings.model_copy(update={"fabric": own[0]})
     if settings.name is not None:
         with errors_named(f"{where}: name"):
             check_file_name(settings.name)
@@ -105,8 +114,7 @@ def scene_fabric(scene: Scene) -> Fabric:
     """
     settings = scene.settings
     with errors_named(f"{scene.where}: fabric_files"):
-        files = [scene.folder / expand_variables(file) for file in settings.fabric_files]
-    library = load_library(files)
+        library = load_library([scene.folder / expand_variables(file) for file in settings.fabric_files])
     if isinstance(settings.fabric, FabricTable):
         fabric = fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
     else:
@@ -167,4 +175,4 @@ def errors_named(where: str) -> Iterator[None]:
         yield
     except InputError as error:
         message = str(error)
-        raise InputError(message if message.startswith(f"{where}: ") else f"{where}: {message}") from None
+        raise type(error)(message if message.startswith(f"{where}: ") else f"{where}: {message}") from None

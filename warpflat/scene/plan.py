@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, StepError
+from warpflat.core.output import optional_step
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.remedies import advise
 from warpflat.cutting.separate_pieces import cut_surfaces
@@ -50,6 +51,8 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
 
+# How a note begins on pieces that cannot be sewn.
+_UNSEWN = "the pieces are not sewn, and their seams do not match: each lies as it does on its own"
 # Work units that a piece takes alone at most before it is sewn to others.
 _ALONE = 4000
 
@@ -148,10 +151,14 @@ class MeshPlan:
             constraints = scene_constraints(settings.constraints, lines)
             # Where nobody has said what meets what, a seam is eased as a tailor does it.
             eased = self.found is not None or bool(self.panels)
-            garment = sew_pieces(
-                pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased, bands=settings.bands,
+            sewing = partial(
+                sew_pieces, pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased, bands=settings.bands,
                 shorter=settings.bands_shorter,
             )  # fmt: skip
+            with optional_step(_UNSEWN, of=StepError) as unsewn:
+                garment = sewing()
+            if unsewn:
+                garment = sewing(relaxed=False)
             if self.panels:
                 garment = garment_as_cut(
                     self.panels, self.surfaces, fabric=scene_fabric(scene), name=scene.name, flattened=garment,
@@ -161,7 +168,9 @@ class MeshPlan:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])
         found = () if self.found is None else (seam_words(self.found), *self.found.notes)
-        return replace(garment, remarks=(*found, *(note for sequence in self.sequences for note in sequence.notes)))
+        return replace(
+            garment, remarks=(*unsewn, *found, *(note for sequence in self.sequences for note in sequence.notes))
+        )
 
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help where it does not fit."""
@@ -213,7 +222,8 @@ class GarmentPlan:
             InputError: as :func:`warpflat.flatten_form`.
         """
         with errors_named(self.scene.where):
-            garment = flatten_form(
+            flattened = partial(
+                flatten_form,
                 self.mannequin,
                 self.form,
                 callback=callback,
@@ -222,6 +232,10 @@ class GarmentPlan:
                 constraints=self.constraints,
                 **self.settings,
             )
+            with optional_step(_UNSEWN, of=StepError) as unsewn:
+                garment = flattened()
+            if unsewn:
+                garment = flattened(sewn=False)
             finishing = scene_finishing(self.scene.settings.finishing)
             pockets = scene_pockets(self.scene.settings.pockets)
         for name, recorder in (recorders or {}).items():
@@ -229,7 +243,13 @@ class GarmentPlan:
             for layout in (piece.unsewn, piece):
                 if layout is not None:
                     recorder.record_result(layout)
-        return replace(garment, openings=tuple(self.openings), finishing=finishing, pockets=pockets)
+        return replace(
+            garment,
+            openings=tuple(self.openings),
+            finishing=finishing,
+            pockets=pockets,
+            remarks=(*unsewn, *garment.remarks),
+        )
 
     @cached_property
     def bricks(self) -> dict[str, list[str]]:

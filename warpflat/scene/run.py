@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,13 +13,14 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.beside import Beside
-from warpflat.core.errors import InputError
+from warpflat.core.errors import StepError
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.core.output import (
     expect_files,
     file_in,
     latest_file,
     optional_file,
+    optional_step,
     output_folder,
     remove_stale,
     require_own_metrics,
@@ -168,10 +169,12 @@ def _run(
             pictures = Beside(partial(_write_pictures, plan, garment, folder), "drawing the pictures")
             if vertices < _MANY:
                 beside.enter_context(pictures)
-            graded = {
-                size: other.flatten(callback=lambda _, progress: None if on_progress is None else on_progress(progress))
-                for size, other in others.items()
-            }
+            graded = dict[str, Garment]()
+            for size, other in others.items():
+                with optional_step(f"size {size} was left out"):
+                    graded[size] = other.flatten(
+                        callback=lambda _, progress: None if on_progress is None else on_progress(progress)
+                    )
             require_open_darts(scene, graded.values())
             sizes = {**graded, own_size: garment}
             pattern = Beside(partial(_draft, plan, sizes, own_size, folder), "drafting the pattern")
@@ -183,8 +186,9 @@ def _run(
         if settings.drape is not None:
             measured, fit_notes, remedies, worn = fit.result()
             garment = garment.advised(lambda part: part.with_remedies(remedies[part.surface.name]))
-            draped, drape_files = write_drape(scene, garment, folder, device=device)
-            files = list(dict.fromkeys([*drape_files, *files]))
+            with optional_step("it was not draped", of=StepError):
+                draped, drape_files = write_drape(scene, garment, folder, device=device)
+                files = list(dict.fromkeys([*drape_files, *files]))
         # What is ready is packed for the review while other processes write.
         page, reviewed = folder / "review.html", output.picture and output.review
         packed: Mapping[str, Any] | None = None
@@ -235,8 +239,7 @@ def _write_pictures(plan: MeshPlan | GarmentPlan, garment: Garment, folder: Path
 
     drafted = list[DraftedOutline]()
     if plan.scene.settings.output.picture and (garment.finishing or garment.pockets):
-        # What defeats the pattern is told where that is written.
-        with suppress(InputError):
+        with optional_step("the picture is without what finishing and pockets add", is_needed=False):
             pattern, _ = pattern_of_garment(
                 {"": garment}, name=garment.name, rules=plan.drawing.rules, cloth_width=plan.drawing.cloth_width
             )
@@ -260,7 +263,9 @@ def _measure_fit(
         What goes into `metrics.json`, the garment's notes, by part the cuts that would help, and the names of the pictures.
     """
     report_activity("measuring how it fits")
-    advised, files = garment.advised(plan.advise), list[str]()
+    advised, files = garment, list[str]()
+    with optional_step("no cuts that would help were looked for", is_needed=False):
+        advised = garment.advised(plan.advise)
     settings, wearer = plan.scene.settings, advised.wearer
     if settings.output.picture and (settings.wear is not None or (wearer is not None and wearer.is_stretched)):
         if garment.form is None:
