@@ -40,7 +40,10 @@ def by_tape(points: np.ndarray, faces: np.ndarray, tips: dict[str, int]) -> dict
     marks = Landmarks(faces)
     on_floor = points - [0.0, points[:, 1].min(), 0.0]
     mesh = trimesh.Trimesh(on_floor, triangles, process=False)
-    found: dict[str, tuple[float, float]] = {"head": head_tape(mesh), **tapes(on_floor, faces, marks.fold(on_floor))}
+    found: dict[str, tuple[float, float]] = {
+        "head": head_tape(mesh),
+        **tapes(on_floor, faces, marks.fold(on_floor), marks.bust(on_floor)),
+    }
     armpit, crotch, _ = armpit_and_crotch(mesh)
     for side in ("left", "right"):
         left = side == "left"
