@@ -75,9 +75,9 @@ def test_levels_agree_with_tapes_laid_without_the_package(kind: str, sex: str) -
             continue
         guess = any(note.startswith(f"{level} = ") for note in body.notes)
         if guess and kind != "noisy":
-            # No fold shows under these chests; nothing else is guessed.
+            # No fold shows under these chests, some of which hardly stand out; nothing else is guessed.
             assert sex != "female"
-            assert level == "underbust"
+            assert level in ("bust", "underbust")
         # Noise moves the place of a flat extreme, not its girth; a bust that hardly stands out has a flat one.
         near = 0.012 if guess or kind == "noisy" else 0.006 if level == "bust" else 0.004
         assert abs(levels[level].height - height) < near, level

@@ -207,7 +207,8 @@ def _attractor(body: BodySections, levels: Mapping[str, float]) -> Callable[[Flo
         place = np.asarray(np.einsum("nk,nkd->nd", weights, closest.corners[triangle]))
         at = place[:, [1, 0]]
         share = np.clip((levels["front_neck"] - place[:, 1]) / (levels["front_neck"] - levels["bust"]), 0.0, 1.0)
-        share = share * share * (3.0 - 2.0 * share) * (np.abs(place[:, 0]) < reach)
+        # Towards the armholes the bridge fades out.
+        share = share * share * (3.0 - 2.0 * share) * np.clip((1.0 - np.abs(place[:, 0]) / reach) / 0.1, 0.0, 1.0)
         ahead, behind = front(at), back(at)
         is_front = place[:, 2] > 0.5 * (ahead + behind)
         bridge = np.where(is_front, np.maximum(ahead - place[:, 2], 0.0), np.minimum(behind - place[:, 2], 0.0))

@@ -123,9 +123,12 @@ def find_levels(
     points = _BUST_POINTS * float(np.interp(bust, t.y, t.girth)) / size
     ahead = smooth(np.array([np.interp(points, OUTLINES, row).max() for row in t.outlines]), 1.5 if noise else 0.75)
     shown = least("bust", t.y, -ahead, bust, "no bust stands out", armpit - _BELOW_ARMPIT * size)
-    is_far = abs(shown.height - bust) > _NEAR * size and not is_sure
-    why = "the chest stands out most elsewhere than the body model's" if is_far else None
-    found["bust"] = ScanLevel(height=halfway(bust, shown.height), guess=shown.guess or why)
+    if is_sure:
+        found["bust"] = ScanLevel(height=halfway(bust, shown.height), guess=shown.guess)
+    else:
+        # A chest without a fold hardly stands out: its place is flat, and the model tells more.
+        why = "no fold shows under it, and it stands out most elsewhere than the body model's"
+        found["bust"] = ScanLevel(height=bust, guess=why if abs(shown.height - bust) > ISO_HEIGHT else shown.guess)
     waist, hip = (given.get(name, found[name].height) for name in ("waist", "hip"))
     between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
     belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
