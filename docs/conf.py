@@ -24,7 +24,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
 ]
-myst_enable_extensions = ["dollarmath", "fieldlist"]
+myst_enable_extensions = ["dollarmath", "fieldlist", "html_image"]
 myst_heading_anchors = 3
 # Notebooks are run by `python docs/run_notebooks.py`, which keeps what they show.
 nb_execution_mode = "off"

@@ -20,6 +20,7 @@ DOCS = Path(__file__).resolve().parent
 SCENES = DOCS.parent / "scenes"
 OUT = DOCS.parent / "out" / "gallery"
 PICTURE_WIDTH = 720  # as wide as a page's text
+THUMBNAIL_WIDTH, THUMBNAILS_IN_ROW = 84, 5
 # Of a line drawing [pixels], and by how much finer it is drawn before it is made small.
 DRAWING_HEIGHT, DRAWING_MARGIN, FINER = 190, 12, 4
 
@@ -40,21 +41,30 @@ def scene_files() -> list[Path]:
 
 
 def gallery_page() -> str:
-    """Return the page: each scene with its words, its command and its picture."""
+    """Return the page: a thumbnail of each scene, and folded below it the scene's words, its command and its picture."""
     blocks = [
         "# Gallery",
-        "Every scene of `scenes/`, with the command that made its picture: of a garment its line drawing, how it lies on the body, and its "
-        "pieces. Colours are strain energy density [J/m2].\n"
+        "Every scene of `scenes/`: click a picture for what it shows and for its command. Of a garment it has the line drawing, how the "
+        "garment lies on the body, and its pieces. Colours are strain energy density [J/m2].\n"
         "`python docs/make_gallery.py` runs the commands and makes this page.",
     ]
+    thumbnails, folded = [], []
     for path in scene_files():
         paragraphs, commands = read_comment(path)
         # tests/scene runs every scene, and tests/cli/test_docs.py what is not marked.
         fence = "<!-- only parsed -->\n```sh\n" + "\n".join(commands) + "\n```"
-        blocks += [f"## {path.stem}", *paragraphs, fence]
+        picture = []
         if (DOCS / "gallery" / f"{path.stem}.webp").exists():
-            blocks.append(f"![What {path.name} makes](gallery/{path.stem}.webp)")
-    return "\n\n".join(blocks) + "\n"
+            shown = f'<img src="gallery/{path.stem}.webp" alt="{path.stem}" width="{THUMBNAIL_WIDTH}">'
+            thumbnails.append(f'<a href="#{path.stem}">{shown}</a><br>{path.stem}')
+            picture = [f"![What {path.name} makes](gallery/{path.stem}.webp)"]
+        # A browser opens the fold around what a link leads to.
+        summary = f'<details>\n<summary>{path.stem}</summary>\n<a id="{path.stem}"></a>'
+        folded.append("\n\n".join([summary, *paragraphs, fence, *picture, "</details>"]))
+    rows = [thumbnails[k : k + THUMBNAILS_IN_ROW] for k in range(0, len(thumbnails), THUMBNAILS_IN_ROW)]
+    empty = "|" + " |" * THUMBNAILS_IN_ROW
+    table = [empty, "|" + "---|" * THUMBNAILS_IN_ROW, *("| " + " | ".join(row) + " |" for row in rows)]
+    return "\n\n".join([*blocks, "\n".join(table), *folded]) + "\n"
 
 
 def make_picture(scene: Path) -> None:

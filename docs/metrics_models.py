@@ -408,15 +408,13 @@ class Curves(Entry):
 
 
 class WalkedSeam(Entry):
-    """The two sides of a seam laid upon each other as near as they come, darts closed."""
+    """The two sides of a seam laid along each other."""
 
     name: str
     size: str
-    distance_mm: float
-    """Largest distance of two places that are sewn together."""
     difference_mm: float
     """By how much the second side is too long for its ease."""
-    notch_mm: float | None
+    notches_mm: float | None
     """Largest distance along the seam from a notch to what it meets."""
 
 

@@ -13,8 +13,6 @@ import warp as wp
 from warpflat.kernels.springs import compute_spring_energy
 
 import warpflat
-from warpflat.flattening.develop import develop
-from warpflat.model.network import SpringNetwork
 
 wp.set_module_options({"enable_backward": False})
 
@@ -29,8 +27,8 @@ def pull_to_line(place: wp.array(dtype=wp.vec2d), stiffness: wp.float64, force: 
 def main() -> None:
     """Print the energies of the springs, before, after, and under a force of one's own."""
     surface = warpflat.make_shape("dome", resolution=17)
-    development = develop(surface, surface.lines["centre"])
-    network = SpringNetwork.build(surface, warpflat.find_fabric("woven"), development.positions, device="cpu")
+    development = warpflat.develop(surface, surface.lines["centre"])
+    network = warpflat.SpringNetwork.build(surface, warpflat.find_fabric("woven"), development.positions, device="cpu")
     count = network.vertex_count
     position = wp.array(development.positions, dtype=wp.vec2d, device="cpu")
     force = wp.empty_like(position)

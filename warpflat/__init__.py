@@ -38,8 +38,10 @@ if TYPE_CHECKING:
     from warpflat.export.read_dxf import read_dxf
     from warpflat.export.read_pattern import read_pattern
     from warpflat.export.read_svg import read_svg
+    from warpflat.export.usd import FrameWriter
     from warpflat.fabric.fabric import Fabric
     from warpflat.fabric.library import find_fabric, load_library
+    from warpflat.flattening.develop import develop
     from warpflat.flattening.edit import change_fabric, change_surface
     from warpflat.flattening.fit_report import Remedy
     from warpflat.flattening.flatten_all import flatten_all
@@ -61,6 +63,8 @@ if TYPE_CHECKING:
     from warpflat.mannequin.output import write_mannequin
     from warpflat.mannequin.scan_pose import ScanOptions
     from warpflat.model.fit import assess_pattern
+    from warpflat.model.network import SpringNetwork
+    from warpflat.model.strain import worn_strain
     from warpflat.model.wear import Wear
     from warpflat.pattern.draft import draft_garment
     from warpflat.pattern.marker import Cloth, make_marker
@@ -71,6 +75,7 @@ if TYPE_CHECKING:
     from warpflat.seams.layers import read_layers
     from warpflat.seams.options import SeamCut, SeamOptions
     from warpflat.solver.options import RelaxOptions
+    from warpflat.solver.steps import Relaxation
     from warpflat.surface.io.read import read_surface
     from warpflat.surface.mesh import Surface
     from warpflat.surface.paths.lines import line_between, line_from_curve, line_on_plane, with_lines
@@ -102,8 +107,8 @@ _find_kernels()
 
 _HOME = {
     "Cloth": "pattern.marker",
-    "CutPlan": "cutting.cut_plan",
     "Correction": "draping.correct_pattern",
+    "CutPlan": "cutting.cut_plan",
     "Drape": "draping.result",
     "DrapeOptions": "draping.options",
     "EdgeRules": "garment.edge_rules",
@@ -111,6 +116,7 @@ _HOME = {
     "FixedLength": "garment.constraints",
     "Flattening": "flattening.result",
     "Form": "mannequin.forms",
+    "FrameWriter": "export.usd",
     "Garment": "garment.garment",
     "Gradient": "flattening.gradient",
     "InputError": "core.errors",
@@ -120,12 +126,14 @@ _HOME = {
     "Progress": "flattening.progress",
     "Recovery": "draping.recover_pattern",
     "RelaxOptions": "solver.options",
+    "Relaxation": "solver.steps",
     "RelaxationStep": "flattening.step_by_step",
     "Remedy": "flattening.fit_report",
     "ScanOptions": "mannequin.scan_pose",
     "SeamCut": "seams.options",
     "SeamOptions": "seams.options",
     "SeamWish": "garment.ease",
+    "SpringNetwork": "model.network",
     "Straight": "garment.constraints",
     "Surface": "surface.mesh",
     "Wear": "model.wear",
@@ -134,9 +142,10 @@ _HOME = {
     "change_fabric": "flattening.edit",
     "change_surface": "flattening.edit",
     "compare_fabrics": "scene.compare",
-    "cut": "cutting.cut_piece",
-    "draft_garment": "pattern.draft",
     "correct_pattern": "draping.correct_pattern",
+    "cut": "cutting.cut_piece",
+    "develop": "flattening.develop",
+    "draft_garment": "pattern.draft",
     "drape": "draping.drape_garment",
     "drape_pattern": "draping.drape_pattern",
     "find_fabric": "fabric.library",
@@ -164,9 +173,9 @@ _HOME = {
     "pattern_of_garment": "garment.to_pattern",
     "read_dxf": "export.read_dxf",
     "read_layers": "seams.layers",
-    "read_pieces": "surface.io.read_pieces",
     "read_pattern": "export.read_pattern",
     "read_pattern_json": "export.pattern_json",
+    "read_pieces": "surface.io.read_pieces",
     "read_surface": "surface.io.read",
     "read_svg": "export.read_svg",
     "recover_pattern": "draping.recover_pattern",
@@ -181,6 +190,7 @@ _HOME = {
     "size_names": "mannequin.measurements",
     "surface_files": "garment.pattern_files",
     "with_lines": "surface.paths.lines",
+    "worn_strain": "model.strain",
     "write_mannequin": "mannequin.output",
 }
 
@@ -195,6 +205,7 @@ __all__ = [
     "FixedLength",
     "Flattening",
     "Form",
+    "FrameWriter",
     "Garment",
     "Gradient",
     "InputError",
@@ -204,12 +215,14 @@ __all__ = [
     "Progress",
     "Recovery",
     "RelaxOptions",
+    "Relaxation",
     "RelaxationStep",
     "Remedy",
     "ScanOptions",
     "SeamCut",
     "SeamOptions",
     "SeamWish",
+    "SpringNetwork",
     "Straight",
     "Surface",
     "Wear",
@@ -221,6 +234,7 @@ __all__ = [
     "compare_fabrics",
     "correct_pattern",
     "cut",
+    "develop",
     "draft_garment",
     "drape",
     "drape_pattern",
@@ -266,6 +280,7 @@ __all__ = [
     "size_names",
     "surface_files",
     "with_lines",
+    "worn_strain",
     "write_mannequin",
 ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import signal
 from pathlib import Path
 from typing import Any
@@ -307,3 +308,20 @@ def test_a_killed_worker_costs_nothing_but_time(tmp_path: Path):
     assert [row.status for row in rows] == ["at rest"] * 4
     run_batch(tasks[:1], tmp_path / "serial")
     assert contents(tmp_path / "out" / tasks[0].key) == contents(tmp_path / "serial" / tasks[0].key)
+
+
+def test_a_folder_is_named_by_scene_body_and_cloth(tmp_path: Path):
+    (task, *_) = load_batch(SCENES / "batch_sizes.toml")
+    assert re.fullmatch(r"basic_block-EU_36-woven-[0-9a-f]{16}", task.key)
+    assert [re.sub(r"-\w{16}$", "", each.key) for each in plan(tmp_path)] == [
+        "patch-woven", "patch-denim", "patch-jersey",
+    ]  # fmt: skip
+
+
+def test_without_a_terminal_lines_tell_how_far_it_is(tmp_path: Path):
+    file = write(tmp_path)
+    told = CliRunner().invoke(batch, [str(file), "--out", str(tmp_path / "out")])
+    assert re.search(r"^b: 1 of 3 tasks, about \d+ min left$", told.stderr, re.MULTILINE)
+    assert "b: 3 of 3 tasks\n" in told.stderr
+    again = CliRunner().invoke(batch, [str(file), "--out", str(tmp_path / "out"), "-q"])
+    assert again.stderr == ""

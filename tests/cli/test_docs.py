@@ -218,8 +218,8 @@ def test_commands_and_snippets_of_a_page_run(page: Path, folder: Path, capfd: py
                 run_commands(block, folder, capfd)
             elif block.language == "python":
                 check_names(block.text)
-                # Those of the README that write files have a test of their own.
-                if not block.is_only_parsed(block.text) and (page.stem != "README" or ".save(" not in block.text):
+                # Those of the page on Python that write files have a test of their own.
+                if not block.is_only_parsed(block.text) and (page.stem != "python" or ".save(" not in block.text):
                     for name, unit in re.findall(r'"(\w+\.obj)", units="(\w+)"', block.text):
                         make_inputs([name, "--units", unit], folder)
                     exec(compile(with_coarse_meshes(block.text), place, "exec"), names)
@@ -247,15 +247,30 @@ def check_toml(block: Block, folder: Path) -> None:
         assert len(refused) < len(bases), refused
 
 
-def test_the_scripts_of_the_readme_write_what_they_say(folder: Path) -> None:
-    piece, garment = (block.text for block in blocks(ROOT / "README.md") if ".save(" in block.text)
-    (of_piece,) = re.findall(r"`(warpflat\.surface_files\(.*?\))`", (ROOT / "README.md").read_text(encoding="utf-8"))
+def test_the_scripts_of_the_page_on_python_write_what_they_say(folder: Path) -> None:
+    page = ROOT / "docs" / "python.md"
+    piece, garment = (block.text for block in blocks(page) if ".save(" in block.text)
+    (of_piece,) = re.findall(r"`(warpflat\.surface_files\(.*?\))`", page.read_text(encoding="utf-8"))
     for script in (f"{piece}\n{of_piece}", garment):
         exec(with_coarse_meshes(script), {})
     for name, objects in (("bodice", {"bodice.obj"}), ("dress", {"front_centre.obj", "back_centre.obj"})):
         files = {path.name for path in (folder / "out" / name).iterdir()}
         assert {"metrics.json", "picture.png", f"{name}.dxf", f"{name}.svg", "pattern.pdf", "pattern.json"} <= files
         assert objects < files
+
+
+def test_every_row_of_the_equations_is_held_by_a_test_and_names_what_there_is() -> None:
+    rows = [line for line in (ROOT / "docs" / "how.md").read_text(encoding="utf-8").splitlines() if "`tests/" in line]
+    assert len(rows) >= 12
+    for row in rows:
+        for path, names in re.findall(
+            r"`((?:kernels|solver|mannequin|flattening|cutting)/\w+\.py)`((?:, `[\w.]+`)*)", row
+        ):
+            code = next(file for file in (ROOT / path, ROOT / "warpflat" / path) if file.is_file()).read_text()
+            for name in re.findall(r"`([\w.]+)`", names):
+                assert f"def {name.rpartition('.')[2]}(" in code, (path, name)
+        path, test = re.findall(r"`(tests/\w+/\w+\.py)::(\w+)`", row)[0]
+        assert f"def {test}(" in (ROOT / path).read_text(encoding="utf-8"), test
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)

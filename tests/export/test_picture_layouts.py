@@ -29,6 +29,7 @@ from warpflat.export.picture_garment import Body
 from warpflat.flattening import fit_picture
 from warpflat.model.fit import MAPS as MAPS_OF_FIT
 from warpflat.model.fit import Misfit, WornFit
+from warpflat.pattern.drafted import SeamReport
 from warpflat.pattern.walked import WalkedSeam
 
 EXAMPLES = int(os.environ.get("WARPFLAT_LAYOUTS", "0"))
@@ -242,17 +243,17 @@ def seams(draw: st.DrawFn) -> WalkedSeam:
     if draw(st.booleans()):  # a ring: its ends meet
         turn = 2 * np.pi * along / length
         first = length * np.column_stack([np.cos(turn), np.sin(turn)])
-    second = first + draw(st.sampled_from([0.0, 1e-4, 0.3])) * length
     notches = first[: draw(st.integers(0, 4))]
-    return WalkedSeam(
+    report = SeamReport(
         name=draw(NAMES),
         size=draw(st.sampled_from(["", "EU 38", "made to measure"])),
-        sides=(first, second),
-        notches=(notches, notches),
-        distance_mm=0.1,
+        sides=("a", "b"),
+        length_mm=(1e3 * length, 1e3 * length),
+        ease=draw(st.sampled_from([0.0, 0.05])),
         difference_mm=-0.1,
-        notch_mm=draw(st.sampled_from([None, 0.2])),
+        notches_mm=draw(st.sampled_from([None, 0.2])),
     )
+    return WalkedSeam(report=report, line=first, notches=(notches, notches))
 
 
 @examples(4, 0.2)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,7 @@ def test_every_shipped_value_says_where_it_comes_from(fabric: Fabric):
         assert origin.unit, key
         assert origin.grade in GRADES, key
         assert (origin.grade == "E") == origin.source.startswith("estimate"), key
-        if key not in ("areal_density", "strain_limit", "poisson_ratio"):
+        if key not in ("areal_density", "strain_limit", "shear_limit", "poisson_ratio"):
             assert origin.test_load, key
         if origin.spread is not None:
             assert origin.spread[0] < getattr(fabric, key) < origin.spread[1], key
@@ -85,7 +86,8 @@ def test_woven_is_the_measured_wool_plain_weave_balanced():
     wool = find_fabric("wool-plain")
     assert fabric.stiffness_warp == fabric.stiffness_weft == (wool.stiffness_warp + wool.stiffness_weft) / 2
     assert fabric.shear_stiffness == wool.shear_stiffness
-    assert not any(origin.is_estimate for origin in fabric.provenance.values())
+    estimated = {key for key, origin in fabric.provenance.items() if origin.is_estimate}
+    assert estimated <= {"shear_limit"}
 
 
 def test_the_default_fabric_is_shipped():
@@ -108,10 +110,26 @@ def test_only_isotropic_fabrics_are_isotropic():
     assert not cloth(stiffness_warp=1010.0, shear_stiffness=500.0).is_isotropic
 
 
+def test_a_limit_of_shear_that_nobody_gave_is_an_estimate_by_kind():
+    assert cloth().shear_limit == 15.0
+    assert cloth().provenance["shear_limit"].is_estimate
+    knit = cloth(strain_limit=0.15)
+    # Threads of unit length at 90 degrees less the limit: their bisector's diagonal grows by the strain limit.
+    diagonal = 2.0 * math.cos(math.radians(90.0 - knit.shear_limit) / 2.0)
+    assert diagonal / math.sqrt(2.0) == pytest.approx(1.15)
+    assert cloth(strain_limit=1.0).shear_limit == 80.0
+    assert find_fabric("paper").shear_limit < 1.0
+    given = cloth(strain_limit=0.15, shear_limit=9.0)
+    assert given.shear_limit == 9.0
+    assert "shear_limit" not in given.provenance
+
+
 def test_names_and_aliases_are_found_as_people_type_them():
     assert find_fabric("Power Net").name == "power-net"
     assert find_fabric("WOOL_plain").name == "wool-plain"
-    assert find_fabric("jersey").name == "interlock"
+    jersey, interlock = find_fabric("Jersey"), find_fabric("interlock")
+    assert (jersey.name, jersey.aliases) == ("jersey", ("interlock", "t-shirt"))
+    assert replace(jersey, name=interlock.name, aliases=interlock.aliases) == interlock
     with pytest.raises(InputError, match=r"^unknown fabric 'demin': did you mean 'denim'\? valid: cotton, denim"):
         find_fabric("demin")
 
@@ -135,6 +153,8 @@ def test_impossible_values_are_refused_by_name(key: str, value: object):
             r"areal_density = 1000 kg/m2 is out of range; .* 5 kg/m2 \(if that is in g/m2, write 1\)",
         ),
         ({"strain_limit": 5.0}, r"strain_limit = 5 .* \(if that is in percent, write 0.05\)"),
+        ({"shear_limit": 0.26}, r"shear_limit = 0.26 degrees .* \(if that is in radians, write 14.9\)"),
+        ({"shear_limit": 90.0}, "shear_limit = 90 degrees is out of range; must lie between 0.5 and 80 degrees"),
         ({"poisson_ratio": -0.1}, "poisson_ratio = -0.1 is out of range; must lie between 0 and 0.99"),
         ({"poisson_ratio": 0.8, "stiffness_warp": 500.0}, r"poisson_ratio = 0.8 .* must be below .* = 0.707"),
         ({"curve_warp": ((0.1, 5.0), (0.05, 9.0))}, r"curve_warp\[1\] = \(0.05, 9\) does not rise"),
@@ -331,7 +351,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path):
 
 def test_every_measured_value_is_listed():
     assert set(value_names()) == {
-        *MEASURED, "poisson_ratio", "strain_limit", "compression_factor", "bending", "curve_warp", "curve_weft"
+        *MEASURED, "poisson_ratio", "strain_limit", "shear_limit", "compression_factor", "bending", "curve_warp", "curve_weft"
     }  # fmt: skip
 
 

@@ -108,15 +108,18 @@ def test_the_move_is_bounded() -> None:
     assert np.abs(curve.sample()[:, 1]).max() == pytest.approx(0.003, rel=0.02)
 
 
-def test_walked_sides_lie_on_each_other() -> None:
-    """Equal sides of a seam lie on each other; a bent one shows how far, a longer one by how much."""
+def test_a_seam_is_walked_by_its_length() -> None:
+    """Equal sides end together, and their notches meet; a longer side shows by how much it is, a bent one is laid along the other."""
     (walked,) = walk_seams(draft_garment(flared(0.0)))
-    assert (walked.distance_mm, walked.difference_mm, walked.notch_mm) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+    assert (walked.report.difference_mm, walked.report.notches_mm) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert walked.notches[0] == pytest.approx(walked.notches[1], abs=1e-9)
     front, back = flared(0.0).pieces[""]
     side = np.array([[0.2, 0.0], [0.21, 0.2], [0.2, 0.403]])
     edges = [replace(edge, points=side) if edge.name == "side" else edge for edge in back.edges]
     edges[2] = replace(edges[2], points=np.array([[0.2, 0.403], [0.0, 0.4]]))
     garment = replace(flared(0.0), pieces={"": [front, replace(back, edges=edges)]})
     (walked,) = walk_seams(draft_garment(garment))
-    assert walked.difference_mm == pytest.approx(1000 * (np.hypot(0.01, 0.2) + np.hypot(0.01, 0.203) - 0.4), abs=0.6)
-    assert 4.0 < walked.distance_mm < 10.0
+    longer = 1000 * (np.hypot(0.01, 0.2) + np.hypot(0.01, 0.203) - 0.4)
+    assert walked.report.difference_mm == pytest.approx(longer, abs=0.6)
+    assert walked.report.notches_mm == pytest.approx(0.0, abs=1e-3)
+    assert walked.notches[0] == pytest.approx(walked.notches[1], abs=1e-6)

@@ -34,12 +34,12 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
 
 
 def test_fabrics_are_compared_with_the_first(comparison: Comparison):
-    assert comparison.fabrics == ["denim", "interlock", "power-net"]
+    assert comparison.fabrics == ["denim", "jersey", "power-net"]
     assert comparison.pieces == ["front"]
     distances = comparison.distances("front")
-    assert list(distances) == ["interlock", "power-net"]
+    assert list(distances) == ["jersey", "power-net"]
     for name in ("left start / bottom start", "bust start", "centre end"):
-        assert name in distances["interlock"]
+        assert name in distances["jersey"]
     # Laid upon it by turning and shifting only: lengths stay, and the mean stays put.
     for fabric in comparison.fabrics:
         own, laid = comparison.results[fabric]["front"].positions, comparison.layouts[fabric]["front"]
@@ -69,7 +69,7 @@ def test_stiffness_shows_as_the_cloth_has_it(comparison: Comparison):
     """Denim's weft is five times as stiff as its warp: it is strained less; the net gives both ways."""
     worn = {fabric: result["front"].measures["wear"] for fabric, result in comparison.results.items()}
     spread = {fabric: w["strain_weft"]["max"] - w["strain_weft"]["min"] for fabric, w in worn.items()}
-    assert spread["denim"] < spread["interlock"] < spread["power-net"]
+    assert spread["denim"] < spread["jersey"] < spread["power-net"]
     borders = {fabric: comparison.borders(fabric, "front") for fabric in comparison.fabrics}
     assert set(borders["denim"]) == {"outline", "left", "right", "bottom", "top"}
     for lengths in borders.values():
@@ -81,12 +81,12 @@ def test_files_and_table(comparison: Comparison, tmp_path: Path):
     assert save_comparison(comparison, tmp_path) == ["compare.json", "compare.png", "compare.svg"]
     data = json.loads((tmp_path / "compare.json").read_text())
     assert data["compared_with"] == "denim"
-    assert set(data["fabrics"]["interlock"]["front"]) >= {"area_m2", "border_lengths_m", "model_energy_j", "wear"}
+    assert set(data["fabrics"]["jersey"]["front"]) >= {"area_m2", "border_lengths_m", "model_energy_j", "wear"}
     assert (tmp_path / "compare.png").read_bytes().startswith(b"\x89PNG")
 
     root = ET.parse(tmp_path / "compare.svg").getroot()
     paths = {p.get("id"): p.get("d") for p in root.iter("{http://www.w3.org/2000/svg}path")}
-    assert set(paths) == {"front.denim", "front.interlock", "front.power-net"}
+    assert set(paths) == {"front.denim", "front.jersey", "front.power-net"}
     for fabric in comparison.fabrics:
         drawn = np.array([[float(x) for x in at[1:].split(",")] for at in paths[f"front.{fabric}"].split(" ")[:-1]])
         loop = 1e3 * outline(comparison.results[fabric]["front"], comparison.layouts[fabric]["front"])[0][:-1]
@@ -95,7 +95,7 @@ def test_files_and_table(comparison: Comparison, tmp_path: Path):
     assert root.get("width", "").endswith("mm")
 
     table = comparison_table(comparison)
-    assert table.splitlines()[0].split() == ["front", "denim", "interlock", "power-net"]
+    assert table.splitlines()[0].split() == ["front", "denim", "jersey", "power-net"]
     for row in (
         "area [cm2]",
         "left [mm]",
@@ -111,7 +111,7 @@ def test_files_and_table(comparison: Comparison, tmp_path: Path):
     ("fabrics", "message"),
     [
         (["denim"], r"1 fabric given to compare; name two or more"),
-        (["jersey", "interlock"], r"fabric 'interlock' is given twice \(interlock\)"),
+        (["jersey", "interlock"], r"fabric 'interlock' is given twice \(jersey\)"),
         (["denim", "jersy"], r"fabric: unknown fabric 'jersy': did you mean 'jersey'"),
     ],
 )

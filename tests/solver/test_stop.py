@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.stop import Remainder, RemainderEstimate
+from warpflat.solver.stop import Remainder, RemainderEstimate, relative_change
 
 
 @pytest.mark.parametrize("ratio", [0.7, 0.9, 0.98])
@@ -41,3 +43,13 @@ def test_stricter_tolerances_are_met_whatever_is_estimated():
     assert not little.is_small(RelaxOptions(energy_left=0.0))
     assert not little.is_small(RelaxOptions(residual_tolerance=1e-4))
     assert not little.is_small(RelaxOptions(energy_tolerance=1e-9))
+
+
+def test_equation_11_is_the_relative_change_of_the_energy_per_step():
+    """|U(t+h) - U(t)| / U(t) of each of several steps, whatever the sign; infinite before the first energy."""
+    energies = np.array([1.66, 1.32, 1.16, 1.18])
+    by_hand = np.abs(np.diff(energies)) / energies[1:]
+    per_step = [relative_change(before, after) for before, after in pairwise(energies)]
+    np.testing.assert_allclose(per_step, by_hand, rtol=1e-12)
+    assert relative_change(1.66, 1.16, steps=2) == pytest.approx(0.5 * (1.66 - 1.16) / 1.16, rel=1e-12)
+    assert relative_change(np.inf, 1.0) == np.inf

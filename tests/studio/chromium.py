@@ -100,6 +100,10 @@ class Chromium:
         self.wait(_VISIBLE % ("[role=option]", json.dumps(value)) + " != null")
         self.run(_VISIBLE % ("[role=option]", json.dumps(value)) + ".click()")
 
+    def prefer(self, scheme: str) -> None:
+        """Let the system be "dark" or "light"."""
+        self.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
     def picture(self, path: Path) -> None:
         """Save what is seen."""
         path.write_bytes(base64.b64decode(self.send("Page.captureScreenshot", format="png")["data"]))

@@ -59,11 +59,15 @@ def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
     )
     try:
         with chromium(str(BROWSER), tmp_path / "profile", 900, 600) as browser:
+            browser.prefer("dark")
             browser.send("Page.navigate", url=page.url)
             browser.wait(f"{head}?.includes('at rest') && {head}")
+            browser.wait("document.documentElement.dataset.mantineColorScheme === 'dark'")
             browser.run("document.body.innerText = 'before'")
+            browser.prefer("light")
             browser.send("Page.reload")
             browser.wait(f"{head}?.includes('at rest') && {head}")
+            browser.wait("document.documentElement.dataset.mantineColorScheme === 'light'")
             whole = page.session.solution
             assert whole is not None
             steps, rest = whole.pieces["trial"].stages[1:]

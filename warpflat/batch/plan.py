@@ -7,6 +7,7 @@ import hashlib
 import itertools
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from pydantic import Field, model_validator
 from warpflat._version import __version__
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import file_digest
-from warpflat.core.text import quote_value
+from warpflat.core.text import plain_letters, quote_value
 from warpflat.core.toml_file import Table, check_table, read_toml
 from warpflat.mannequin.table import MannequinTable
 from warpflat.scene.load import Scene, errors_named, expand_variables, make_scene
@@ -26,6 +27,7 @@ __all__ = ["BatchTable", "BodyTable", "Task", "TaskTable", "load_batch"]
 
 # Hexadecimal digits of a key: in a million tasks two share one with a chance of 3e-8.
 _KEY_DIGITS = 16
+_KEY_LETTERS = 60
 _LONGEST_LABEL = 80
 # Tasks of a batch: each is held in memory, and has a row in the index.
 _MOST_TASKS = 100_000
@@ -111,7 +113,7 @@ class Task:
     """One run of a batch.
 
     Attributes:
-        key: its hash, the name of its folder.
+        key: scene, body, fabric and a hash, the name of its folder.
         name: of the scene, and of its files.
         scene, body, fabric, override: what the index says of it; a body or an override may be empty.
         data: the scene's tables; paths are absolute.
@@ -200,12 +202,16 @@ def _make_task(
         else:
             scan = settings.mannequin.scan
             label = settings.mannequin.size_name if scan is None else Path(scan).stem
+        fabric = settings.fabric if isinstance(settings.fabric, str) else "own"
+        # Who looks into the folder finds a task by its words; the digits tell apart what they leave out.
+        words = "-".join(filter(None, (scene.name, label, fabric)))
+        plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(words))[:_KEY_LETTERS].strip("_.-")
         return Task(
-            key=hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS],
+            key=f"{plain}-{hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS]}",
             name=name,
             scene=scene.name,
             body=label,
-            fabric=settings.fabric if isinstance(settings.fabric, str) else "own",
+            fabric=fabric,
             override=override,
             data=data,
             where=where,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ What comes out, in DIR:
   bodies.csv, bodies.png
                    of several bodies: measures of the patterns over girths, and which bodies no size fits"""
 _MOST_ERRORS = 10
+# Where no terminal is, a line after each such share of the tasks, and at least so often [s].
+_LINES, _SILENCE = 10, 60.0
 _BAR = "{desc}: {n_fmt}/{total_fmt} tasks |{bar:20}| [{elapsed}, {remaining} left]"
 
 
@@ -63,7 +66,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
             workers = 1
     start_warp_silently()
     folder = out if out is not None else Path("out") / file.stem
-    with _Bar(file.stem, len(tasks), hidden=quiet or not sys.stderr.isatty()) as bar:
+    with _Bar(file.stem, len(tasks), quiet=quiet) as bar:
         rows = run_batch(
             tasks,
             folder,
@@ -91,12 +94,14 @@ def _note(text: str) -> None:
 
 
 class _Bar:
-    """A bar on stderr with the number of tasks done and the time left; nothing if stderr is no terminal."""
+    """The number of tasks done and the time left on stderr: a bar on a terminal, a line now and then elsewhere."""
 
-    def __init__(self, name: str, total: int, *, hidden: bool) -> None:
+    def __init__(self, name: str, total: int, *, quiet: bool) -> None:
         """Prepare the bar of a batch with `total` tasks."""
-        self._name, self._total, self._hidden = name, total, hidden
+        self._name, self._total, self._quiet = name, total, quiet
         self._bar: Any = None
+        self._began = self._told = time.monotonic()
+        self._told_share = 0
 
     def __enter__(self) -> _Bar:
         return self
@@ -107,14 +112,23 @@ class _Bar:
 
     def show(self, done: int, before: int) -> None:
         """Show the number of tasks done; those done before say nothing of the pace."""
+        if self._quiet:
+            return
+        if not sys.stderr.isatty():
+            now, share = time.monotonic(), _LINES * done // max(self._total, 1)
+            if share > self._told_share or now - self._told > _SILENCE:
+                self._told, self._told_share = now, share
+                left = (now - self._began) * (self._total - done) / max(done - before, 1)
+                more = f", about {left / 60.0:.0f} min left" if done < self._total and done > before else ""
+                click.echo(f"{self._name}: {done} of {self._total} tasks{more}", err=True)
+            return
         from tqdm import tqdm
 
-        if self._bar is None and not self._hidden:
+        if self._bar is None:
             self._bar = tqdm(
                 desc=self._name, total=self._total, initial=before, file=sys.stderr, smoothing=0.05, bar_format=_BAR
             )
-        elif self._bar is not None:
-            self._bar.update(done - self._bar.n)
+        self._bar.update(done - self._bar.n)
 
     def note(self, text: str) -> None:
         """Print a note above the bar."""

@@ -38,6 +38,7 @@ _UNITS = {
     "stiffness_warp": "N/m",
     "stiffness_weft": "N/m",
     "shear_stiffness": "N/m per rad",
+    "shear_limit": "degrees",
     "bending": "N m",
 }
 

@@ -13,6 +13,7 @@ from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.core.short_repr import short_repr
 from warpflat.cutting.candidates import Candidate, find_candidates, find_peaks
 from warpflat.cutting.cut_piece import cut
 from warpflat.cutting.cut_plan import CutPlan
@@ -64,6 +65,8 @@ class LedgerEntry:
         candidate, result: of a mesh: the path, and the piece with this cut, relaxed coarsely.
         cut: of a form: its table in `[[cuts]]`.
     """
+
+    __repr__ = short_repr
 
     name: str
     pieces: tuple[str, ...]
@@ -207,6 +210,8 @@ class Ledger:
         refused: cuts that could not be made, and why.
         notes: what the comparison leaves out, one sentence each.
     """
+
+    __repr__ = short_repr
 
     name: str
     pieces: tuple[Flattening, ...]

@@ -258,6 +258,7 @@ class SeamEntry(Entry):
     ease: float
     difference_mm: float
     difference_per_50mm_mm: float | None
+    notches_mm: float | None = None
 
 
 class ElasticEntry(Entry):
@@ -389,6 +390,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
                 "ease": report.ease,
                 "difference_mm": report.difference_mm,
                 "difference_per_50mm_mm": report.local_mm,
+                "notches_mm": report.notches_mm,
                 "matches": report.matches,
             }
             for report in garment.seams
@@ -561,6 +563,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
                 ease=seam.ease,
                 difference_mm=seam.difference_mm,
                 local_mm=seam.difference_per_50mm_mm,
+                notches_mm=seam.notches_mm,
             )
             for seam in data.seams
         )

@@ -1,4 +1,4 @@
-"""A picture of walked seams: both sides of each laid upon each other, with their notches."""
+"""A picture of walked seams: the second side of each laid along the first by its length, with the notches of both."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 from matplotlib.lines import Line2D
+from matplotlib.markers import CARETDOWNBASE, CARETUPBASE
 from matplotlib.patches import Polygon
 
 from warpflat.core.activity import report_activity
@@ -30,7 +31,7 @@ _CLOTH_ALPHA = 0.2
 
 @all_letters()
 def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSeam], *, title: str) -> None:
-    """Draw every seam with its first side in blue and its second in red, each with the cloth above it, upright lengths true to each other.
+    """Draw every seam: above it the cloth and the notches of its first side in blue, below it those of its second in red.
 
     Args:
         path: the file, ``*.png``.
@@ -44,7 +45,7 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     # The tallest first, so that the columns end at nearly the same height.
     seams = sorted(seams, key=lambda seam: -float(np.ptp(_fitted(seam)[0], axis=0)[1]))
     fitted = [_fitted(seam) for seam in seams]
-    sizes = [(CELL, CLOTH + 2 * MARGIN + float(np.ptp(lines[0], axis=0)[1])) for lines in fitted]
+    sizes = [(CELL, 2 * CLOTH + 3 * MARGIN + float(np.ptp(lines[0], axis=0)[1])) for lines in fitted]
     # As many columns as leave least of the page empty.
     packed = [pack_boxes(sizes, columns * CELL) for columns in range(2, COLUMNS + 1)]
     places, width, foot = min(packed, key=lambda found: found[1] * (found[2] + HEAD))
@@ -59,21 +60,29 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
         seam_height = float(np.ptp(lines[0], axis=0)[1])
         centre = np.array([middle, upper - CLOTH - 0.5 * seam_height])
         half = 0.5 * CELL - MARGIN
-        room = shapely.box(middle - half, upper - CLOTH - seam_height - MARGIN, middle + half, upper)
-        for line, notches, colour in zip(lines[1:3], lines[3:], COLOURS, strict=True):
-            on_page = line + centre
-            # The pieces lie to the left of their seam: above it, where it runs to the right.
-            cloth = shapely.LineString(on_page).buffer(CLOTH + MARGIN, single_sided=True, join_style="round")
+        room = shapely.box(middle - half, upper - 2 * CLOTH - seam_height - MARGIN, middle + half, upper)
+        line = lines[0] + centre
+        for side, colour, notches in zip((1.0, -1.0), COLOURS, lines[1:], strict=True):
+            # The pieces of the first side lie to the left of their seam: above it, where it runs to the right.
+            cloth = shapely.LineString(line).buffer(side * CLOTH, single_sided=True, join_style="round")
             for part in shapely.get_parts(shapely.intersection(cloth, room)):
                 # As an artist it moves no limits, which would be looked for along each of its sides.
                 outline = shapely.get_coordinates(part.exterior)
                 axis.add_artist(Polygon(outline, facecolor=colour, alpha=_CLOTH_ALPHA, linewidth=0))
-            axis.add_artist(Line2D(*on_page.T, color=colour, linewidth=1.6, alpha=0.85))
-            axis.add_artist(Line2D(*(notches + centre).T, color=colour, marker="|", markersize=9, linestyle=""))
-        notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"
-        words = f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip()
-        axis.text(middle, upper - 0.4 * CLOTH, words, fontsize=9, ha="center", va="center")
-    words = f"{title}: the two sides of each seam laid upon each other, right sides together, darts closed [mm]"
+            # Notches point into their cloth.
+            marker = CARETUPBASE if side > 0.0 else CARETDOWNBASE
+            axis.add_artist(Line2D(*(notches + centre).T, color=colour, marker=marker, markersize=8, linestyle=""))
+        axis.add_artist(Line2D(*line.T, color="black", linewidth=0.9))
+        report = seam.report
+        notch = "no notches" if report.notches_mm is None else f"notches meet within {report.notches_mm:.1f} mm"
+        words = f"{report.name} {report.size}\n{report.length_mm[0]:.0f} mm"
+        if report.ease:
+            words += f", {1e3 * 0.1 * report.ease:+.1f} % ease"
+        words += f", sides differ by {abs(report.difference_mm):.2f} mm\n{notch}"
+        axis.text(middle, upper - 0.4 * CLOTH, words, fontsize=8, ha="center", va="center")
+    words = (
+        f"{title}: the two sides of each seam laid along each other by their length, right sides together, darts closed"
+    )
     axis.text(
         MARGIN,
         height - 0.5 * HEAD,
@@ -85,12 +94,11 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
 
 
 def _fitted(seam: WalkedSeam) -> list[FloatArray]:
-    """Return both sides together, then each side and its notches, level and around the origin, as large as a cell lets them be [in]."""
-    start, end = seam.sides[0][[0, -1]]
+    """Return the line of a seam and the notches of both sides, level and around the origin, as large as a cell lets them be [in]."""
+    start, end = seam.line[[0, -1]]
     x, y = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
     along = np.array([[x, -y], [y, x]])
-    both = np.concatenate(seam.sides) @ along
-    low, high = both.min(axis=0), both.max(axis=0)
+    level = seam.line @ along
+    low, high = level.min(axis=0), level.max(axis=0)
     scale = float((np.array([CELL - 2 * MARGIN, TALLEST]) / np.maximum(high - low, 1e-9)).min())
-    middle = 0.5 * (low + high)
-    return [scale * (both - middle), *(scale * (rows @ along - middle) for rows in (*seam.sides, *seam.notches))]
+    return [scale * (rows @ along - 0.5 * (low + high)) for rows in (seam.line, *seam.notches)]

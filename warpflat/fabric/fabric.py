@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -35,6 +35,7 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "areal_density": (0.005, 5.0, "kg/m2"),
     "poisson_ratio": (0.0, 0.99, ""),
     "strain_limit": (0.001, 2.0, ""),
+    "shear_limit": (0.5, 80.0, "degrees"),
     "compression_factor": (0.001, 1.0, ""),
     "bending": (1e-8, 0.1, "N m"),
 }
@@ -42,6 +43,9 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 
 # Cloth that may be strained by more than this is a knit.
 _WOVEN_STRAIN = 0.1
+
+# Threads of a medium woven lie side by side, and press on each other, from about this shear angle on [degrees].
+_WOVEN_SHEAR = 15.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +90,9 @@ class Fabric:
             cloth, so 0 unless a source gives one; an isotropic sheet has G = K / (2 (1 + nu)).
         areal_density: mass per area [kg/m2].
         strain_limit: strain a pattern may ask of the cloth, either sign; 0.05 is usual for wovens.
+        shear_limit: angle that warp and weft of a pattern may be off the right angle when worn [degrees], either way;
+            beyond it cloth locks or buckles. Where it is not given, it is an estimate: 15 for wovens; for knits and for
+            isotropic sheets, whose threads do not lock, the angle that lengthens the bias by `strain_limit`.
         compression_factor: stiffness under in-plane compression over that under tension. Cloth wrinkles instead of
             being pressed together, so less than 1 is real; 1 keeps springs that act alike both ways.
         bending: bending moment per width per curvature, warp and weft averaged [N m]; only a drape needs it. A medium
@@ -105,6 +112,7 @@ class Fabric:
     areal_density: float
     poisson_ratio: float = 0.0
     strain_limit: float = 0.05
+    shear_limit: float = None  # type: ignore[assignment]  # never None once made
     compression_factor: float = 1.0
     bending: float = 1e-5
     curve_warp: Curve = ()
@@ -114,7 +122,19 @@ class Fabric:
     provenance: Mapping[str, Provenance] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        estimated = self.shear_limit is None
+        if estimated:
+            object.__setattr__(self, "shear_limit", _WOVEN_SHEAR)
         self.validate()
+        if estimated:
+            origin = Provenance(source="estimate for wovens", grade="E", unit="degrees")
+            if self.is_knit or self.is_isotropic:
+                # Threads that keep their lengths and cross at 90 degrees less g lengthen the bias to sqrt(1 + sin g).
+                limit = math.degrees(math.asin(min((1.0 + self.strain_limit) ** 2 - 1.0, 1.0)))
+                lowest, highest, _ = _RANGES["shear_limit"]
+                object.__setattr__(self, "shear_limit", min(max(limit, lowest), highest))
+                origin = replace(origin, source="estimate: shear that lengthens the bias by strain_limit")
+            object.__setattr__(self, "provenance", {**self.provenance, "shear_limit": origin})
 
     def validate(self) -> None:
         """Check the values.
@@ -204,13 +224,17 @@ class Fabric:
 def fabric_called(name: str, library: Mapping[str, Fabric]) -> Fabric:
     """Return a library's fabric of that name or alias; case, spaces and underscores do not matter.
 
+    Who asks by an alias gets the fabric under that name, so that files and messages call it as the user does.
+
     Raises:
         InputError: there is none; names the nearest.
     """
     wanted = _plain(name)
     for fabric in library.values():
-        if wanted in (_plain(fabric.name), *map(_plain, fabric.aliases)):
-            return fabric
+        known = (fabric.name, *fabric.aliases)
+        for called in known:
+            if wanted == _plain(called):
+                return replace(fabric, name=called, aliases=tuple(other for other in known if other != called))
     names = [*library, *(alias for fabric in library.values() for alias in fabric.aliases)]
     raise InputError(f"unknown fabric {name!r}: {nearest(wanted, names)}")
 
@@ -241,4 +265,6 @@ def _unit_hint(key: str, value: float) -> str:
         return f" (if that is in uN m, write {1e-6 * value:g})"
     if key == "strain_limit" and 2.0 < value <= 200.0:
         return f" (if that is in percent, write {value / 100.0:g})"
+    if key == "shear_limit" and 0.0 < value < 0.5:
+        return f" (if that is in radians, write {math.degrees(value):.3g})"
     return ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from importlib import resources
@@ -38,6 +39,7 @@ _UNITS: dict[str, dict[str, float]] = {
     "areal_density": {"kg/m2": 1.0, "g/m2": 1e-3, "mg/cm2": 1e-2, "oz/yd2": 0.0339057474748},
     "poisson_ratio": {"1": 1.0},
     "strain_limit": {"1": 1.0, "percent": 0.01},
+    "shear_limit": {"degrees": 1.0, "rad": math.degrees(1.0)},
     "compression_factor": {"1": 1.0, "percent": 0.01},
     "bending": {"N m": 1.0, "uN m": 1e-6, "gf cm2/cm": KES_BENDING_UNIT},
 }
@@ -138,6 +140,7 @@ class FabricTable(Table):
     areal_density: Quantity | None = None
     poisson_ratio: Quantity | None = None
     strain_limit: Quantity | None = None
+    shear_limit: Quantity | None = None
     compression_factor: Quantity | None = None
     bending: Quantity | None = None
     curve_warp: CurveTable | None = None

@@ -75,7 +75,7 @@ def draft_garment(
     with printed_in(garment.words):
         chosen = garment.sizes if sizes is None else tuple(sizes)
         for size in chosen:
-            garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
+            garment.check_size(size)
         drafted: dict[str, tuple[DraftedPiece, ...]] = {}
         reports: list[SeamReport] = []
         corners: list[CornerReport] = []
@@ -90,7 +90,7 @@ def draft_garment(
             drafted[size] = tuple(
                 replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
             )
-            reports += seam_reports(garment.seams, pieces, size)
+            reports += seam_reports(seams, {piece.name: piece for piece in drafted[size]}, size)
         return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
 
 

@@ -201,8 +201,13 @@ class DraftedGarment:
     def name(self) -> str:
         return self.garment.name
 
+    @property
+    def piece_names(self) -> tuple[str, ...]:
+        """Names of the pieces of all sizes, those of the first size first."""
+        return tuple(dict.fromkeys(piece.name for row in self.pieces.values() for piece in row))
+
     def all_sizes(self, name: str) -> tuple[DraftedPiece, ...]:
-        """Return one piece in every size, in the order of the sizes."""
+        """Return one piece in the sizes that have it, in the order of the sizes."""
         return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
 
 
@@ -245,6 +250,8 @@ class SeamReport:
         difference_mm: by how much the second side is too long (or, negative, too short) for that ease [mm].
         local_mm: the largest difference over 50 mm of the first side, without its sign, measured between the vertices
             of the mesh that both sides share; None where they come from no mesh, or from different vertices.
+        notches_mm: the largest distance along the seam from a notch to the notch, or the joint, that it meets [mm]; None
+            without notches.
     """
 
     name: str
@@ -254,6 +261,7 @@ class SeamReport:
     ease: float
     difference_mm: float
     local_mm: float | None = None
+    notches_mm: float | None = None
 
     @property
     def matches(self) -> bool:

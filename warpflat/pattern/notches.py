@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -14,7 +14,15 @@ from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import eased_length, worst_difference
 from warpflat.pattern.sides import Wedge
 
-__all__ = ["SeamLine", "cut_darts", "dart_notches", "seam_notches", "seam_reports"]
+__all__ = [
+    "SeamLine",
+    "copied_together",
+    "cut_darts",
+    "dart_notches",
+    "opposite_length",
+    "seam_notches",
+    "seam_reports",
+]
 
 
 #: Notches are cut this deep [m], and never deeper than this share of the allowance.
@@ -27,13 +35,15 @@ SHORTEST, SPACING = 0.080, 0.200
 DOUBLE_SPACING = 0.008
 #: Least distance [m] of a notch from a joint of edges, in which it would be lost.
 CLEAR = 0.012
+#: Notches meet that are no farther apart than this [m].
+MEET = 2e-4
 #: Where a side cannot be notched, the notch is tried at these shares of its distance from the seam's start.
 SHARES_FROM_START = (1.0, 0.5, 0.25)
 
 
 def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size: str) -> list[SeamReport]:
-    """Measure both sides of every seam along the fitted sewing lines."""
-    reports = []
+    """Measure both sides of every seam along the fitted sewing lines, and how far its notches miss each other."""
+    reports, groups = [], copied_together(seams)
     for seam in seams:
         lines = [SeamLine(side, pieces) for side in seam.sides]
         first, second = (line.length for line in lines)
@@ -43,6 +53,15 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
             len(lines[0].places) == len(lines[1].places)
         ):
             worst = worst_difference(lines[0].places, lines[1].places, seam.ease, seam.eased)
+        # A notch meets a notch or a joint of the other side; of equal edges one is drawn, and its notches are those of all.
+        alike = {name for name, group in groups.items() if group == groups[seam.name]}
+        marked = [line.marked(alike) for line in lines]
+        joints = [np.concatenate([row, line.joints]) for row, line in zip(marked, lines, strict=True)]
+        gaps = [
+            float(np.abs(joints[1 - side] - opposite_length(seam, lines, side, at)).min())
+            for side in (0, 1)
+            for at in marked[side]
+        ]
         reports.append(
             SeamReport(
                 name=seam.name,
@@ -52,6 +71,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
                 ease=seam.ease,
                 difference_mm=(second - first * (1 + seam.ease)) * 1000,
                 local_mm=None if worst is None else 1000 * worst,
+                notches_mm=1000 * max(gaps) if gaps else None,
             )
         )
     return reports
@@ -65,14 +85,64 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     wrong way round shows. Where one side has a joint (a shoulder seam at a sleeve's cap, a dart in a side seam) the
     other side gets a single notch for it. Notches on a back are double, unless it is sewn to a front.
 
+    A piece that is cut more than once is drawn once: each of its notches is one of all its copies, and what these are sewn to gets
+    notches for them too.
+
     Where one side's allowance is not cut (deep in a dart, where it meets that of the other leg), the place is moved
     towards the seam's start, on both sides.
     """
+    lines = [[SeamLine(side, pieces) for side in seam.sides] for seam in seams]
+    # Where each edge is sewn: number and side of the seam, place in that side.
+    sewn: dict[tuple[str, str], list[tuple[int, int, int]]] = {}
+    for number, seam in enumerate(seams):
+        for at, row in enumerate(seam.sides):
+            for place, side in enumerate(row):
+                sewn.setdefault((side.piece, side.edge), []).append((number, at, place))
+    groups = copied_together(seams)
+    #: By group of seams and edge the lengths along it at which it has a notch.
+    placed: dict[tuple[str, str, str], list[float]] = {}
     notches: dict[str, list[Notch]] = {}
-    for seam in seams:
-        first, second = (SeamLine(side, pieces) for side in seam.sides)
-        # A piece that is sewn to its own mirror image has one edge for both sides.
-        lines = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
+
+    def place_all(number: int, side: int, length: float, double: bool, clear: float) -> bool:
+        """Place a notch and all that meet it; none, and return False, if one cannot be cut or lies within `clear` of a joint."""
+        waiting, seen = [(number, side, length)], list[tuple[int, int, float]]()
+        found: dict[tuple[str, str, str], list[float]] = {}
+        made: list[tuple[str, Notch]] = []
+        while waiting:
+            number, side, length = waiting.pop()
+            seam, line = seams[number], lines[number][side]
+            apart = float(np.abs(line.joints - length).min())
+            if apart <= MEET or any((n, k) == (number, side) and abs(x - length) <= MEET for n, k, x in seen):
+                continue
+            seen.append((number, side, length))
+            part = line.index(length)
+            here, local = line.side[part], length - float(line.joints[part])
+            along = line.edges[part].length - local if here.reversed else local
+            key = groups[seam.name], here.piece, here.edge
+            copies = list[tuple[int, int, float, SeamSide]]()
+            for other, at, place in sewn[here.piece, here.edge]:
+                copy, beside = seams[other].sides[at][place], lines[other][at]
+                local = beside.edges[place].length - along if copy.reversed else along
+                if groups[seams[other].name] == key[0]:
+                    copies.append((other, at, float(beside.joints[place]) + local, copy))
+            if not any(abs(known - along) <= MEET for known in (*placed.get(key, ()), *found.get(key, ()))):
+                # It is called by the seam of the edge that is drawn.
+                other, at, there, _ = next((copy for copy in copies if copy[3].is_drawn), copies[0])
+                notch = lines[other][at].notch(seams[other].name, there, double)
+                if notch is None or apart <= clear or not line.fits_at(length):
+                    return False
+                made.append((here.piece, notch))
+                found.setdefault(key, []).append(along)
+            waiting.append((number, 1 - side, opposite_length(seam, lines[number], side, length)))
+            waiting += [copy[:3] for copy in copies if (copy[3].mirrored, copy[3].copy) != (here.mirrored, here.copy)]
+        for key, rows in found.items():
+            placed.setdefault(key, []).extend(rows)
+        for piece, notch in made:
+            notches.setdefault(piece, []).append(notch)
+        return True
+
+    for number, seam in enumerate(seams):
+        first, second = lines[number]
         # The fractions of the seam's length at which it is notched.
         if seam.notches is not None:
             fractions = list(seam.notches)
@@ -84,39 +154,43 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
             evenly = ((np.arange(count) + 0.42) / count).tolist()
             fractions = [f for f in evenly if np.abs(joints - f).min() * first.length > CLEAR]
         for fraction in fractions:
-            for piece, notch in _notch_pair(seam, lines, fraction):
-                notches.setdefault(piece, []).append(notch)
-        for line, other in ((first, second), (second, first)):
-            for joint in line.joints[1:-1] / line.length:
-                # The joint's share of one side's length, and that of the place on the other side opposite to it.
-                shares = np.linspace(0.0, 1.0, 1001)
-                reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
-                table = (shares, reached) if line is first else (reached, shares)
-                length = float(np.interp(float(joint), *table)) * other.length
-                if not other.is_marked:
-                    continue
-                if np.abs(other.joints - length).min() > CLEAR and other.is_drawn(length):
-                    single = other.notch(seam.name, length, double=False)
-                    if single is not None:
-                        notches.setdefault(other.piece_name(length), []).append(single)
+            for share in SHARES_FROM_START:
+                start = share * fraction * first.length
+                names = [
+                    line.piece_name(length).lower()
+                    for line, length in ((first, start), (second, opposite_length(seam, lines[number], 0, start)))
+                ]
+                back = any("back" in name for name in names) and not any("front" in name for name in names)
+                double = back if seam.double is None else seam.double
+                if place_all(number, 0, start, double, 0.0 if seam.notches is not None else CLEAR):
+                    break
+        for own, other in ((0, 1), (1, 0)):
+            if lines[number][other].is_marked:
+                for joint in lines[number][own].joints[1:-1]:
+                    place_all(number, other, opposite_length(seam, lines[number], own, float(joint)), False, CLEAR)
     return notches
 
 
-def _notch_pair(seam: Seam, lines: Sequence[SeamLine], fraction: float) -> list[tuple[str, Notch]]:
-    """Return the notches of both sides at a fraction of the seam's length, by piece; none if they cannot be cut."""
-    for share in SHARES_FROM_START:
-        at = share * fraction
-        opposite = seam.reach(at, 1.0) / (1.0 + seam.ease)
-        places = [(line, part * line.length) for line, part in zip(lines, (at, opposite), strict=False)]
-        names = [line.piece_name(length).lower() for line, length in places]
-        back = any("back" in name for name in names) and not any("front" in name for name in names)
-        double = back if seam.double is None else seam.double
-        places = [(line, length) for line, length in places if line.is_drawn(length)]
-        found = [(line.piece_name(length), line.notch(seam.name, length, double)) for line, length in places]
-        matched = [(piece, notch) for piece, notch in found if notch is not None]
-        if len(matched) == len(found):
-            return matched
-    return []
+def opposite_length(seam: Seam, lines: Sequence[SeamLine], side: int, length: float) -> float:
+    """Return the length [m] along the other side of a seam opposite to a length along one side."""
+    shares = np.linspace(0.0, 1.0, 1001)
+    reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
+    table = (shares, reached) if side == 0 else (reached, shares)
+    return float(np.interp(length / lines[side].length, *table)) * lines[1 - side].length
+
+
+def copied_together(seams: Sequence[Seam]) -> dict[str, str]:
+    """Return by seam the first of all seams that are sewn along copies of its edges, each of which is drawn once."""
+    first: dict[str, str] = {seam.name: seam.name for seam in seams}
+    at: dict[tuple[str, str], dict[tuple[bool, int], str]] = {}
+    for seam in seams:
+        for side in (side for row in seam.sides for side in row):
+            at.setdefault((side.piece, side.edge), {}).setdefault((side.mirrored, side.copy), seam.name)
+    for copies in at.values():
+        joined = {first[name] for name in copies.values()}
+        into = next(name for name in first if first[name] in joined)
+        first = {name: first[into] if group in joined else group for name, group in first.items()}
+    return first
 
 
 def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:
@@ -205,19 +279,34 @@ class SeamLine:
         """Return the piece at a length [m]."""
         return self.side[self.index(length)].piece
 
-    def is_drawn(self, length: float) -> bool:
-        """Return whether the edge at a length [m] is that of the piece itself, not of another copy."""
-        return self.side[self.index(length)].is_drawn
-
     @property
     def is_marked(self) -> bool:
-        """Whether places along it can be marked for joints of the other side.
+        """Whether places along it are marked for joints of the other side.
 
-        Not along several copies of a piece, which all have the mark of one, nor along pleats, which are not laid yet.
+        Not along panels, all of which would have the mark of one, nor along pleats, which are not laid yet.
         """
-        copies = {(side.piece, side.edge) for side in self.side}
         pleats = any("pleat fold" in name for piece in self.pieces for name in piece.piece.internal_lines)
-        return len(copies) == len(self.side) and not pleats
+        return not pleats and not any(side.copy for side in self.side)
+
+    def fits_at(self, length: float) -> bool:
+        """Return whether a length [m] means the same when pleats are laid: it does where one of them ends."""
+        part = self.index(length)
+        count = sum(name.startswith("pleat fold") for name in self.pieces[part].piece.internal_lines)
+        stretch = self.edges[part].length / max(count, 1)
+        local = length - float(self.joints[part])
+        return count == 0 or abs(local - stretch * round(local / stretch)) <= MEET
+
+    def marked(self, seams: Collection[str]) -> FloatArray:
+        """Return the lengths [m] along the side at which its edges have notches of some seams, those of turned copies included."""
+        import shapely
+
+        found = {
+            float(start + shapely.LineString(points).project(shapely.Point(notch.at)))
+            for piece, edge, points, start in zip(self.pieces, self.edges, self.lines, self.joints, strict=False)
+            for notch in piece.notches
+            if notch.edge == edge.name and notch.seam in seams
+        }
+        return np.array(sorted(found))
 
     def notch(self, seam: str, length: float, double: bool) -> Notch | None:
         """Return a notch at a length [m]; the two slits of a double one lie on either side of it.

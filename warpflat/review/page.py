@@ -198,18 +198,18 @@ def _page(
         "picture.png": f"{name} in space beside its pattern, coloured by strain energy",
         "drape.png": f"{name} worn: gap to the body and strain, from the front, the side and the back",
         "wear.png": "Strain of each piece when worn, along the warp and the weft",
-        "walked.png": "The two sides of every seam laid upon each other",
+        "walked.png": "The two sides of every seam laid along each other",
         "corrected.png": "Outlines before and after the correction",
     }
     images = []
     for file in sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file)):
         words = shows.get(file, file.removesuffix(".png").replace("_", " ").replace(".", " "))
-        images.append(f'<img alt="{escape(words)}" src="{shown[file]}">')
+        images.append(_thumbnail(escape(words), shown[file]))
     drawings = []
     for file in sorted(file for file in files if file.endswith(".svg")):
         text = base64.b64encode(_bytes(latest_file(folder / file))).decode("ascii")
         words = f"The pattern of {escape(name)}: cutting and sewing lines, notches and labels"
-        drawings.append(f'<img class="drawing" alt="{words}" src="data:image/svg+xml;base64,{text}">')
+        drawings.append(_thumbnail(words, f"data:image/svg+xml;base64,{text}"))
     pieces = metrics["pieces"].values()
     area = sum(piece["area_m2"] for piece in pieces)
     fits = [piece["wear"] for piece in pieces if piece.get("wear")]
@@ -253,8 +253,8 @@ def _page(
     if "drape.webp" in files:
         text = base64.b64encode(_bytes(latest_file(folder / "drape.webp"))).decode("ascii")
         worn = (
-            f'<img alt="The garment comes to rest on the body" src="data:image/webp;base64,{text}">'
-            "<p>Front, left side and back, coloured by the gap to the body; frames.usdc holds the same in space.</p>"
+            _thumbnail("The garment comes to rest on the body", f"data:image/webp;base64,{text}")
+            + "<p>Front, left side and back, coloured by the gap to the body; frames.usdc holds the same in space.</p>"
         )
     # The files lie beside the page.
     links = "".join(
@@ -266,8 +266,10 @@ def _page(
         ("Ease", ease_table(metrics)),
         ("From the development to rest", film),
         ("Worn: from the designed surface to rest", worn),
-        ("Pictures", "".join(images)),
-        ("Pattern", "".join(drawings)),
+        ("Pictures", f'<div class="thumbnails">{"".join(images + drawings)}</div>' if images or drawings else ""),
+    ]
+    # What few look for is one click away.
+    folded = [
         ("Cuts and darts", ledger_table(metrics)),
         ("Seams", seam_table(metrics)),
         ("Pieces", _table(head, rows)),
@@ -277,6 +279,7 @@ def _page(
         ("Files", f'<ul class="files">{links}</ul>'),
     ]
     body = "".join(f"<h2>{title}</h2>{content}" if title else content for title, content in sections if content)
+    body += "".join(f"<details><summary>{title}</summary>{content}</details>" for title, content in folded if content)
     script = f"<script>{_data('viewer.js')}</script>" if packed else ""
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(name)} - review</title>'
@@ -336,6 +339,11 @@ def verdict_words(metrics: Mapping[str, Any]) -> str:
         items = "".join(f"<li>{_typeset(words)}</li>" for words in list(dict.fromkeys(worst))[:5])
         html += f"<p><b>{title}</b></p><ul>{items}</ul>"
     return html
+
+
+def _thumbnail(words: str, source: str) -> str:
+    """Return a picture that is shown small, and whole after a click on it; `words` is HTML."""
+    return f'<label class="thumbnail"><input type="checkbox"><img alt="{words}" src="{source}"></label>'
 
 
 def _typeset(words: str) -> str:

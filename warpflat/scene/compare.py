@@ -48,12 +48,13 @@ def compare_fabrics(
         )
     # In the scene's own fabric, so that all patterns have the same darts.
     scene, _ = settle_shape(scene, device=device)
-    dressed = {}
+    dressed, known = {}, dict[str, str]()
     for name in fabrics:
         one = replace(scene, settings=scene.settings.model_copy(update={"fabric": name}))
         fabric = scene_fabric(one)
-        if fabric.name in dressed:
-            raise InputError(f"fabric {name!r} is given twice ({fabric.name}); compare different ones")
+        if fabric.name in known:
+            raise InputError(f"fabric {name!r} is given twice ({known[fabric.name]}); compare different ones")
+        known.update(dict.fromkeys((fabric.name, *fabric.aliases), fabric.name))
         dressed[fabric.name] = one
     plan = plan_scene(scene, device=device)
     if isinstance(plan, MeshPlan):

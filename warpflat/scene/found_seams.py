@@ -134,7 +134,13 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             notes.append(
                 f"{format_count(taken.joined, 'island')} of less than a thousandth of the cloth joined to a neighbour"
             )
-        cuts = [*by_hand, *_cuts_of_file(taken, read, layers, f"{path}")]
+        of_islands = _cuts_of_file(taken, read, layers, f"{path}")
+        cuts = [*by_hand, *of_islands]
+        if not of_islands and not of_file:
+            # They parted the inner shell from the outer one.
+            taken, given["find"] = None, "auto" if looked_for else "none"
+            if asked is None and not drawn and not by_itself:
+                return None
     waist = None
     if asked is not None and asked.body is not None:
         with errors_named(f"{scene.where}: find_seams.body"):
@@ -181,7 +187,10 @@ def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
 
 
 def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface], file: str) -> list[SeamCut]:
-    """Return a cut for each two islands that meet, along the edges that the layers still have after their repair."""
+    """Return a cut for each two islands that meet, along the edges that the layers still have within them after their repair.
+
+    What ran along an inner shell, or to it across a thickness, is gone with that, or lies on the border.
+    """
     from warpflat.seams.options import SeamCut
 
     place = weld_map(read.raw.vertices).astype(np.int64)
@@ -190,7 +199,11 @@ def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface]
         ends = np.sort(place[edges], axis=1)
         return ends[:, 0] * len(place) + ends[:, 1]
 
-    there = [layer.input_index[half_edges(layer.faces).edges].astype(np.int64) for layer in layers]
+    sides = [half_edges(layer.faces) for layer in layers]
+    there = [
+        layer.input_index[each.edges[each.count > 1]].astype(np.int64)
+        for layer, each in zip(layers, sides, strict=True)
+    ]
     edges = seams.edges[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))]
     beside = np.sort(seams.beside[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))], axis=1)
     return [

@@ -33,6 +33,11 @@ __all__ = ["Door"]
 _AUTHORITY = re.compile(r"(?:\[([0-9A-Fa-f:.]+)\]|([\w.-]+))(?::([1-9]\d{0,4}))?", re.ASCII)
 # The page's messages take some hundred bytes.
 _LONGEST_MESSAGE = 2**16
+# The page is dark where the system is; viser's own page would be light everywhere.
+_FOLLOW_SYSTEM = (
+    b"<script>window.__VISER_EMBED_CONFIG__="
+    b"{darkMode:matchMedia('(prefers-color-scheme: dark)').matches}</script></head>"
+)
 # How a connection ends whose client does not keep to the protocol: wrong frames, no UTF-8, too long.
 _UNREADABLE = (1002, 1007, 1009)
 
@@ -136,10 +141,17 @@ class Door:
 
             def answer(connection: ServerConnection, request: Request) -> Response | None:
                 refusal = self._refusal(connection, request)
+                if request.path == "/":
+                    # The page itself is changed below.
+                    request.headers.pop("Accept-Encoding", None)
                 try:
                     response = (
                         refusal or _saved(connection, request, saved_file) or process_request(connection, request)
                     )
+                    if response is not None and not refusal and request.path == "/":
+                        response.body = response.body.replace(b"</head>", _FOLLOW_SYSTEM, 1)
+                        del response.headers["Content-Length"]
+                        response.headers["Content-Length"] = str(len(response.body))
                 except Exception:  # whatever viser stumbles over in a request is the fault of who sent it
                     response = connection.respond(HTTPStatus.BAD_REQUEST, "no browser asks like this\n")
                 if response is not None:

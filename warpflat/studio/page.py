@@ -94,7 +94,7 @@ class Page:
         self._lines: tuple[Solution | None, dict[str, dict[str, IntArray]]] = (None, {})
         self._dirty, self._closed, self._told, self._drawing = threading.Event(), False, True, False
         self.stage = Stage(self.server)
-        self._choose_theme(dark=False)
+        self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         actions = Actions(
             choose_map=self._choose_map,
             choose_line=self._choose_line,
@@ -103,7 +103,6 @@ class Page:
             view=self.stage.show_all,
             undo=lambda: self._go(self.session.undo),
             redo=lambda: self._go(self.session.redo),
-            theme=self._choose_theme,
         )
         self._panel = Panel(self.server, self.session, actions, name=free_name(scene))
         self.server.on_client_connect(self._greet)
@@ -326,9 +325,6 @@ class Page:
                 self.session.tell('no line runs within 2 cm of the click; click nearer, or pick "two points"')
             else:
                 self._choose_line((hit.piece, line))
-
-    def _choose_theme(self, dark: bool) -> None:
-        self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False, dark_mode=dark)
 
     def _choose_mode(self, two_points: bool) -> None:
         self._two_points = two_points

@@ -43,7 +43,6 @@ class Actions:
         try_again: called with the part of the line, in shares.
         view: called with the client and the side from which it looks at the form [degrees].
         undo, redo: go through the changes.
-        theme: called with whether the page is dark.
     """
 
     choose_map: Callable[[str], None]
@@ -53,7 +52,6 @@ class Actions:
     view: Callable[[Any, float], None]
     undo: Callable[[], None]
     redo: Callable[[], None]
-    theme: Callable[[bool], None]
 
 
 class Panel:
@@ -128,8 +126,6 @@ class Panel:
         with self._gui.add_folder("Save"):
             self._name = self._gui.add_text("name", name)
             save = self._gui.add_button("Save and run", icon="device-floppy")
-        theme = self._gui.add_dropdown("page", ("light", "dark"))
-        _chosen(theme, lambda value: self._actions.theme(value == "dark"))
 
         @save.on_click
         def _(_: Any) -> None:
@@ -214,9 +210,11 @@ def _chosen(handle: Any, act: Callable[[Any], None]) -> None:
     """Call `act` with the value when somebody has chosen it on a page; a value that the program sets calls nothing."""
 
     @handle.on_update
-    def _(event: Any) -> None:
-        if event.client_id is not None and event.target.value not in (_OWN,):
-            act(event.target.value)
+    async def _(event: Any) -> None:
+        # Taken at once: a drawing that is under way sets all parts to what the scene still has.
+        value = event.target.value
+        if event.client_id is not None and value not in (_OWN,):
+            handle._impl.gui_api._thread_executor.submit(act, value)
 
 
 def _one_of(value: Any, options: Sequence[str]) -> str:
