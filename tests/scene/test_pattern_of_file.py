@@ -246,7 +246,7 @@ def test_islands_may_be_stacked(tmp_path: Path):
         for name, change in (("apart.obj", None), ("stacked.obj", stacked))
     )
     for name, lengths in edge_lengths(apart).items():
-        assert edge_lengths(together)[name] == pytest.approx(lengths, abs=1e-6)
+        assert edge_lengths(together)[name] == pytest.approx(lengths, abs=1e-3)
     assert [seam.sides for seam in together.seams] == [seam.sides for seam in apart.seams]
 
 
