@@ -129,8 +129,7 @@ def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
     for _ in range(_MOVES):
         vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh, whole)
     far = float(fit.distance[np.isfinite(fit.distance)].mean())
-    above = {level: levels[level].height - _landmark(level, vertices) for level in TRUNK}
-    return CommonBody(name=name, person=fit.person, vertices=vertices, above=above, far=far)
+    return CommonBody(name=name, person=fit.person, vertices=vertices, far=far)
 
 
 def _towards_armholes(vertices: FloatArray, mannequin: Mannequin) -> FloatArray:

@@ -42,7 +42,7 @@ def turned_outward(points: FloatArray, triangles: NDArray[np.int64]) -> tuple[ND
     faces = np.pad(triangles, ((0, 0), (0, 1)), constant_values=-1)
     # Torn scans may be one-sided somewhere: then each face is taken as it is wound.
     with contextlib.suppress(InputError):
-        faces = orient(faces)[0]
+        faces = orient(faces)[0].astype(np.int64)
     edges = half_edges(faces)
     part = components(edges, barrier=edges.edges[edges.count > 2])
     corners = points[faces[:, :3]]
