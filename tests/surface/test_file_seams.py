@@ -174,6 +174,12 @@ def test_islands_that_are_not_as_large_as_the_cloth_are_taken_only_when_asked(tm
     check_gores(found(path, find="uv"))
 
 
+def test_the_texture_can_be_left_alone(tmp_path: Path) -> None:
+    result = found(write_obj(tmp_path / "skirt.obj"), find="auto", no=["uv"])
+    assert result.along == ""
+    assert {seam.name for seam in result.seams} >= {"side left", "side right"}
+
+
 def test_islands_that_are_no_pattern_are_taken_only_when_asked(tmp_path: Path) -> None:
     # A ball in two halves, in a texture that keeps their area: as large as cut pieces, and far from flat.
     ball = trimesh.creation.icosphere(4, radius=0.15)
