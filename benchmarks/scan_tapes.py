@@ -2,7 +2,8 @@
 
 The four bodies as they are, turned, scaled, with noise, with holes, and with arms and legs bent by a skeleton of this
 program's own. `--copies NAME ...` picks some, `--worst` prints what is off only. `--mixes SEED ...` takes bodies that are
-random mixes of the four, of other breadth, depth and height, instead: nothing was tuned on those of a new seed.
+random mixes of the four, of other breadth, depth and height, instead: nothing was tuned on those of a new seed. `--published FILE ...`
+takes bodies of GarmentCode, whose measurements lie beside them (mean_all.obj and mean_all.yaml).
 """
 
 from __future__ import annotations
@@ -40,7 +41,10 @@ def by_tape(points: np.ndarray, faces: np.ndarray, tips: dict[str, int]) -> dict
     marks = Landmarks(faces)
     on_floor = points - [0.0, points[:, 1].min(), 0.0]
     mesh = trimesh.Trimesh(on_floor, triangles, process=False)
-    found: dict[str, tuple[float, float]] = {"head": head_tape(mesh), **tapes(on_floor, faces, marks.fold(on_floor))}
+    found: dict[str, tuple[float, float]] = {
+        "head": head_tape(mesh),
+        **tapes(on_floor, faces, marks.fold(on_floor), marks.bust(on_floor)),
+    }
     armpit, crotch, _ = armpit_and_crotch(mesh)
     for side in ("left", "right"):
         left = side == "left"
@@ -129,6 +133,25 @@ def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int, int]:
     return len(independent), off, said
 
 
+def report_published(path: Path) -> None:
+    """Print what is published of a body of GarmentCode [mm], and how far the package's tapes differ; `g` is a guess."""
+    rows = [row.partition(":") for row in path.with_suffix(".yaml").read_text().splitlines()]
+    cm = {name.strip(): float(value.partition("#")[0]) for name, _, value in rows if value.strip()}
+    vertices, faces = read_scan(path)
+    body = Mannequin.from_scan(np.asarray(vertices, float), np.asarray(faces), resolution_mm=20.0)
+    # Heights count from the floor, the bust's from the nape down.
+    known = {"bust height": cm["height"] - cm["head_l"] - cm["vert_bust_line"], "hip": cm["hips"]}
+    known |= {name: cm[name] for name in ("bust", "underbust", "waist")}
+    words = []
+    for name, value in known.items():
+        ours = body.measures[name.split(" ")[0]]
+        found = ours.height if name.endswith("height") else ours.girth
+        words.append(f"{name} {10 * value:.0f} {1000 * found - 10 * value:+.1f}{' g' if ours.guess else ''}")
+    chest = body.measures["chest, fullest"]
+    words.append(f"fullest chest {1000 * chest.girth:.0f} at {1000 * chest.height:.0f}{' g' if chest.guess else ''}")
+    print(f"{path.stem}: {', '.join(words)}", flush=True)
+
+
 def main() -> None:
     """Print, for each body and copy, height and girth by tape and how far the package's differ [mm]."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
@@ -136,7 +159,12 @@ def main() -> None:
     parser.add_argument("--mixes", nargs="+", type=int, metavar="SEED", help="random mixes of the four bodies instead")
     parser.add_argument("--copies", nargs="+", default=list(COPIES), choices=COPIES)
     parser.add_argument("--worst", action="store_true", help="tapes that are off only")
+    parser.add_argument("--published", nargs="+", type=Path, metavar="FILE", help="bodies of GarmentCode instead")
     options = parser.parse_args()
+    if options.published:
+        for path in options.published:
+            report_published(path)
+        return
     print("tape, height and girth by tape, and how far the package's height and girth differ [mm]")
     counts = {copy: np.zeros(3, dtype=int) for copy in options.copies}
     for body in mixed_bodies(options.mixes) if options.mixes else given_bodies(options.bodies):

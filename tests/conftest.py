@@ -55,7 +55,7 @@ def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
     from warpflat.pattern.tile_nesting import orders
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("warpflat.mannequin.scan.stand_body", stood)
+        patch.setattr("warpflat.mannequin.read_body.stand_body", stood)
         if request.path.parent.name != "mannequin":
             patch.setattr("warpflat.mannequin.mannequin.Mannequin.from_size", built_once)
             patch.setattr("warpflat.mannequin.common_body.common_body_of_mannequin", laid_once)

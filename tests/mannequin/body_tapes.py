@@ -61,17 +61,16 @@ def armpit_and_crotch(mesh: trimesh.Trimesh) -> tuple[float, float, float]:
     return float(y[armpit] - floor), float(crotch - floor), 0.5 * float(width[armpit])
 
 
-def tapes(points: np.ndarray, faces: np.ndarray, fold: float | None = None) -> dict[str, tuple[float, float]]:
-    """Return height above the floor and girth [m] of hip, waist, underbust and bust at the standard's places (ISO 8559-1).
+def tapes(points: np.ndarray, faces: np.ndarray, fold: float, bust_points: float) -> dict[str, tuple[float, float]]:
+    """Return height above the floor and girth [m] of hip, waist, underbust, bust and fullest chest at the standard's places (ISO 8559-1).
 
-    Sections every 2 mm: hip where the trunk reaches furthest back, waist where it is narrowest, bust where it is fullest
-    below the armpits, underbust at the fold under it, or else where two straight lines that fit the girth from waist to bust
-    best meet.
+    Sections every 2 mm: hip where the trunk reaches furthest back, waist where it is narrowest, chest where it is fullest
+    below the armpits, underbust at the fold, bust at its points.
 
     Args:
         points: #V by 3 [m], Y up, facing +Z, the midplane at x = 0.
         faces: #F by 4, -1 in the last column for a triangle.
-        fold: height of the fold under the bust [m], if it is known.
+        fold, bust_points: heights of the fold under the bust and of its points [m].
     """
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
     mesh = trimesh.Trimesh(points, triangles, process=False)
@@ -82,21 +81,11 @@ def tapes(points: np.ndarray, faces: np.ndarray, fold: float | None = None) -> d
     back = np.array([t[:, 1].min() for t in trunks])
     # Where the arms join, the section's width leaps.
     width = np.array([np.ptp(t[:, 0]) for t in trunks])
-    chest = np.flatnonzero(y > 0.69 * stature)
-    armpit = next(i for i in chest if width[i + 1] > 1.2 * width[i])
+    upper = np.flatnonzero(y > 0.69 * stature)
+    armpit = next(i for i in upper if width[i + 1] > 1.2 * width[i])
     hip = int(np.argmin(np.where(y < 0.57 * stature, back, np.inf)))
     waist = int(np.argmin(np.where((y > 0.57 * stature) & (y < 0.68 * stature), girth, np.inf)))
-    bust = int(waist + np.argmax(girth[waist : armpit + 1]))
-    bend = waist + _bend(y[waist : bust + 1], girth[waist : bust + 1])
-    under = bend if fold is None else int(np.argmin(np.abs(floor + y - fold)))
-    rows = {"hip": hip, "waist": waist, "underbust": under, "bust": bust}
+    chest = int(waist + np.argmax(girth[waist : armpit + 1]))
+    under, bust = (int(np.argmin(np.abs(floor + y - at))) for at in (fold, bust_points))
+    rows = {"hip": hip, "waist": waist, "underbust": under, "bust": bust, "chest, fullest": chest}
     return {name: (float(y[i]), float(girth[i])) for name, i in rows.items()}
-
-
-def _bend(y: np.ndarray, values: np.ndarray) -> int:
-    """Return the sample where the two joined straight lines bend that fit `values` best."""
-    misses = []
-    for at in range(2, len(y) - 2):
-        lines = np.column_stack([np.ones_like(y), y - y[at], np.maximum(y - y[at], 0.0)])
-        misses.append(np.linalg.norm(lines @ np.linalg.lstsq(lines, values, rcond=None)[0] - values))
-    return 2 + int(np.argmin(misses))

@@ -1,7 +1,8 @@
 """Landmarks of the test bodies by vertices of the mesh that they share: seen once, they hold on every mix, scaling and pose.
 
 Elbow and knee lie between the two rings of edges at which all four bodies bend most: the shape of one body's joint may
-mislead, its vertices do not. The fold under the bust is four vertices on the woman, and the same four on everybody.
+mislead, its vertices do not. The fold under the bust is four vertices on the woman, and the same four on everybody; bust points are the
+middles of two rings.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ _ARM = {
 }
 _KNEE = {"left": ((11237, 11239), (11218, 11220)), "right": ((4619, 4621), (4600, 4602))}
 _FOLD = (8538, 8539, 1866, 1867)
+# The rings around both bust points.
+_BUST = (*range(8450, 8466), *range(1778, 1794))
 
 
 class Landmarks:
@@ -44,6 +47,10 @@ class Landmarks:
     def fold(self, points: np.ndarray) -> float:
         """Return the height [m] of the fold under the bust."""
         return float(points[list(_FOLD), 1].mean())
+
+    def bust(self, points: np.ndarray) -> float:
+        """Return the height [m] of the bust points."""
+        return float(points[list(_BUST), 1].mean())
 
     def _ring(self, first: int, second: int) -> list[int]:
         """Return the closed ring of edges that starts with an edge and runs straight through vertices of four quads."""

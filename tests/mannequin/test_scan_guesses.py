@@ -63,7 +63,8 @@ def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
     (one, faces), (other, _) = scan("child"), scan("male_heavy")
     points = 0.5 * (one + other)
     body, marks = Mannequin.from_scan(points, faces, resolution_mm=40.0), Landmarks(faces)
-    assert body.measures["underbust"].guess is None
+    # Where no fold shows, its place is a guess, and near all the same.
+    assert body.measures["underbust"].guess == "no fold shows under the bust"
     assert abs(body.measures["underbust"].height - marks.fold(points)) < 0.004
     # Fat moves the crease behind the knee down, and the skin over it less.
     knee = body.measures["knee left"]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
-from warpflat.mannequin.scan_repair import close_holes, smooth_noise
+from warpflat.mannequin.scan_repair import close_holes, smooth_noise, turned_outward
 
 
 def ball() -> tuple[np.ndarray, np.ndarray]:
@@ -60,3 +61,44 @@ def test_noise_is_smoothed_and_a_smooth_mesh_left_alone() -> None:
     # It neither shrinks the ball nor keeps half the noise.
     assert abs(off.mean()) < 0.0003
     assert off.std() < 0.5 * (np.linalg.norm(noisy, axis=1) - 0.1).std()
+
+
+def _volume(points: np.ndarray, triangles: np.ndarray) -> float:
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    return float(np.einsum("ta,ta->", np.cross(a, b), c) / 6.0)
+
+
+def test_each_part_is_turned_by_its_own_volume() -> None:
+    points, triangles = ball()
+    two, inward = np.concatenate([points, points + np.array([0.3, 0.0, 0.0])]), triangles[:, ::-1]
+    for first, second, count in ((triangles, inward, 1), (inward, inward, 2), (triangles, triangles, 0)):
+        faces, turned = turned_outward(two, np.concatenate([first, second + len(points)]))
+        assert turned == count * len(triangles)
+        assert _volume(two, faces[: len(triangles)]) > 0.0
+        assert _volume(two, faces[len(triangles) :]) > 0.0
+    # A part of a mesh that hangs together, and one with an open end.
+    patch = points[triangles].mean(axis=1)[:, 0] > 0.04
+    faces, turned = turned_outward(points, np.where(patch[:, None], inward, triangles))
+    assert turned == patch.sum()
+    assert _volume(points, faces) == pytest.approx(_volume(points, triangles))
+    assert turned_outward(points, inward[~patch])[1] == (~patch).sum()
+
+
+def test_the_inner_side_of_a_wall_stays() -> None:
+    points, triangles = ball()
+    wall = np.concatenate([triangles, triangles[:, ::-1] + len(points)])
+    faces, turned = turned_outward(np.concatenate([points, 0.9 * points]), wall)
+    assert turned == 0
+    assert (faces == wall).all()
+
+
+def test_a_hole_of_many_edges_is_closed() -> None:
+    """Its patch has hundreds of vertices."""
+    mesh = trimesh.creation.icosphere(subdivisions=6, radius=0.1)
+    points, triangles = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
+    torn = triangles[np.linalg.norm(points[triangles].mean(axis=1) - [0.1, 0.0, 0.0], axis=1) > 0.019]
+    closed, faces, holes = close_holes(points, torn)
+    assert len(holes) == 1
+    assert len(closed) - len(points) > 200
+    assert is_closed(faces)
+    assert np.abs(np.linalg.norm(closed[len(points) :], axis=1) - 0.1).max() < 0.002

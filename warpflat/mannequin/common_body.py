@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -10,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
 from warpflat.mannequin.body_landmarks import model_places, near_level, value_at
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body
 from warpflat.mannequin.fit_body import Mesh, fit_body
 from warpflat.mannequin.fit_inside import fit_inside
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
-from warpflat.mannequin.stand_body import lay_on_scan, stand_body
+from warpflat.mannequin.read_body import read_body
+from warpflat.mannequin.scan_levels import TRUNK
+from warpflat.mannequin.scan_pose import ScanOptions
+from warpflat.mannequin.stand_body import lay_on_scan
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["CommonBody", "common_body_inside", "common_body_of_mannequin", "common_body_of_scan", "skin_triangles"]
@@ -38,6 +40,7 @@ class CommonBody:
         name: what it is called.
         person: of the body model.
         vertices: #V by 3 [m], the finer model's, laid on the body.
+        above: how far a level lies above the model's landmark of its name [m]; 0 of those left out.
         turn, shift: points of the body's file come here as points @ turn + shift.
         far: mean distance of the fitted model from the body [m].
     """
@@ -45,13 +48,14 @@ class CommonBody:
     name: str
     person: Person
     vertices: FloatArray
+    above: Mapping[str, float] = field(default_factory=dict)
     turn: FloatArray = field(default_factory=lambda: np.eye(3))
     shift: FloatArray = field(default_factory=lambda: np.zeros(3))
     far: float = 0.0
 
     def level(self, name: str) -> float:
-        """Return the height [m] of a level of the trunk: bust, underbust, waist or hip."""
-        return float(value_at(near_level(name), self.vertices[:, 1]))
+        """Return the height [m] of a level of the trunk: bust, underbust, waist or hip, where its mannequin has it."""
+        return _landmark(name, self.vertices) + self.above.get(name, 0.0)
 
     def in_pose_of(self, other: CommonBody) -> CommonBody:
         """Return this body as it stands where another one does, and with its joints bent as the other's."""
@@ -82,16 +86,21 @@ def common_body_of_scan(
     Raises:
         InputError: it is no standing body with arms and legs.
     """
-    options = options or ScanOptions()
-    scan, _ = turn_scan_upright(np.asarray(vertices, float), np.asarray(faces, dtype=np.int64), options)
-    laid = stand_body(scan.vertices, scan.triangles, scan.scanned, sits=scan.sits, landmarks=options.landmarks)
-    if laid.unsure is not None:
-        raise InputError(f"scan: {laid.unsure}; a body that stands with its arms off the trunk is needed")
-    turn, shift = scan.placed
-    about = np.array([-1.0, 1.0, -1.0]) if laid.turned else np.ones(3)
+    read = read_body(np.asarray(vertices, float), np.asarray(faces, dtype=np.int64), options or ScanOptions())
+    turn, shift = read.placed
     return CommonBody(
-        name=name, person=laid.fit.person, vertices=laid.posed, turn=turn * about, shift=shift * about, far=laid.far
+        name=name,
+        person=read.laid.fit.person,
+        vertices=read.posed,
+        above={level: read.found[level].height - _landmark(level, read.body.vertices) for level in TRUNK},
+        turn=turn,
+        shift=shift,
+        far=read.laid.far,
     )
+
+
+def _landmark(level: str, vertices: FloatArray) -> float:
+    return float(value_at(near_level(level), vertices[:, 1]))
 
 
 def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
-from warpflat.mannequin.body_landmarks import LEVELS
-from warpflat.mannequin.body_model import finer_body
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS, Layout
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.rays import ray_radii
+from warpflat.mannequin.read_body import read_body, whole_sections
 from warpflat.mannequin.scan_limbs import leg_curves, underarm_point, upper_curves
-from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, find_levels, guess_note, missing_note
-from warpflat.mannequin.scan_pose import LEVELS_UP, ScanOptions, turn_scan_upright
+from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, missing_note
+from warpflat.mannequin.scan_pose import ScanOptions
 from warpflat.mannequin.scan_sections import BodySections
-from warpflat.mannequin.slicer import Slicer
-from warpflat.mannequin.stand_body import StandingBody, stand_body
 from warpflat.mannequin.table_body import PRINCESS
 from warpflat.surface.normals import vertex_normals
 
@@ -37,12 +32,6 @@ _HARMONICS = 28
 _TOLD = 0.010
 # Beyond planes that lean so far outward from the armpits up, the scan is arm.
 _ARM_LEAN = np.radians(11.0)
-# A level of a body lies at most so far from where the mean body has it, as a share of the stature.
-_NEIGHBOUR = 0.06
-# An arm above the level of its shoulder [rad] draws the shoulder's flesh into the tapes around it.
-_OVERHEAD = np.radians(90.0)
-# What the flesh of a body that sits does not show.
-_SAT_ON = ("hip", "thigh", "knee")
 # How far a side seam follows the waves of front and back at the waist.
 _OFF_PLUMB = 0.5
 
@@ -81,57 +70,10 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     Raises:
         InputError: if the mesh is not a body that stands on two legs, or has a measure that no body has.
     """
-    from scipy.spatial import QhullError
-
-    scan, notes = turn_scan_upright(vertices, faces, options)
-    if scan.sits and options.landmarks:
-        raise InputError(
-            f"scan: landmark {next(iter(options.landmarks))}: the scan sits, and heights are those of standing bodies; leave it out"
-        )
-    turn, shift = scan.placed
-    # A landmark beyond its neighbours would pull the fit off the body.
-    stature = float(scan.vertices[:, 1].max())
-    about = {name: LEVELS[name][0] * stature for name in LEVELS_UP if name in LEVELS} | dict(options.landmarks)
-    for under, over in itertools.pairwise(name for name in LEVELS_UP if name in about):
-        if about[over] < about[under] - (0.0 if {under, over} <= set(options.landmarks) else _NEIGHBOUR * stature):
-            raise InputError(
-                f"scan: {over} ({about[over]:.3f} m) does not lie above {under} ({about[under]:.3f} m) on a body {stature:.2f} m tall; "
-                "give landmarks as heights above the floor"
-            )
-    laid = stand_body(
-        scan.vertices,
-        scan.triangles,
-        scan.scanned,
-        faces_ahead=options.facing is not None,
-        as_scanned=options.keep_pose and not scan.sits,
-        sits=scan.sits,
-        landmarks=options.landmarks,
-    )
-    if laid.unsure is not None:
-        given = ", ".join(f"{name} = {height:g} m" for name, height in options.landmarks.items())
-        raise InputError(
-            f"scan: {laid.unsure}{f', with {given} as given' if given else ''}; a body that stands with its arms off the trunk is needed"
-        )
-    if laid.turned:
-        scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise, scan.scanned)
-        turn, shift = turn * [-1.0, 1.0, -1.0], shift * [-1.0, 1.0, -1.0]
-        notes.append("the scan was found to face the other way by the body model")
-    sits = scan.sits
-    if sits:
-        # What a tape would measure on the person standing.
-        scan = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned)
-        laid = replace(laid, posed=laid.vertices)
-    try:
-        crotch = options.landmarks.get("crotch") or _crotch_height(scan, laid)
-        crotch -= float(laid.posed[laid.crotch, 1])
-        moved = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned) if laid.moved else scan
-        stands = BodySections(laid.vertices, laid, moved, crotch)
-        body = BodySections(laid.posed, laid, scan, crotch) if laid.moved else stands
-        found = find_levels(body, laid, scan.noise, options.landmarks)
-        levels = {name: level.height for name, level in found.items()}
-        if laid.undone:
-            heights = {name: laid.carried(name, height) for name, height in options.landmarks.items()}
-            levels = {name: level.height for name, level in find_levels(stands, laid, scan.noise, heights).items()}
+    read = read_body(vertices, faces, options)
+    body, stands = read.body, read.stands
+    levels = {name: level.height for name, level in read.levels.items()}
+    with whole_sections():
         underarms = {side: underarm_point(stands, side, levels["underbust"]) for side in ("left", "right")}
         profile = _profiles(stands, levels, underarms)
         quarters, arms, collar, neck = upper_curves(stands, levels, profile, underarms)
@@ -140,57 +82,18 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
             legs=leg_curves(stands, levels, profile(levels["hip"])), neck=neck, collar=collar,
             attract=_attractor(stands, levels),
         )  # fmt: skip
-        measures = body_measures(scan, body, laid, found, neck, options.landmarks)
-    except InputError:
-        raise
-    except (ValueError, IndexError, QhullError) as error:
-        # Sections of a torn or twisted mesh may hold too few points for any step of the way.
-        raise InputError(f"scan: its plane sections are too broken to be measured ({error}); repair the mesh") from None
+        measures = body_measures(read, neck, options.landmarks)
     t = stands.trunk
-    if laid.undone:
-        # Raised arms lift the chest, and a bent trunk has folds.
-        for name in ("bust", "underbust", "waist", "hip"):
-            girth = float(np.interp(levels[name], t.y, t.girth))
-            measures[name] = ScanMeasure(height=found[name].height, girth=girth, guess=measures[name].guess)
-    if laid.raised > _OVERHEAD:
-        for name in measures:
-            if name.startswith(("biceps", "elbow")) and measures[name].guess is None:
-                measures[name] = replace(measures[name], guess="the arms are raised above the shoulders")
-    if laid.together is not None:
-        more = [_around(vertices, levels["hip"]) for vertices in (laid.together, laid.vertices)]
-        hip = measures["hip"]
-        measures["hip, legs together"] = replace(hip, girth=hip.girth + more[0] - more[1])
-    if sits:
-        for name in measures:
-            if name.startswith(_SAT_ON):
-                measures[name] = replace(measures[name], guess="the scan sits")
     told = [f"{name} was given: {height:.3f} m" for name, height in options.landmarks.items()]
     return ScanFound(
         blueprint=blueprint,
-        source=f"scan of a body {body.stature:.3f} m tall; the body model lies {1000.0 * laid.far:.1f} mm off it in the mean",
-        notes=(*notes, *laid.notes, *told, *guess_note(measures, found), *missing_note(measures)),
+        source=f"scan of a body {body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
+        notes=(*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures)),
         sections={level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
         measures=measures,
-        scan=(moved.vertices, scan.triangles),
-        placed=(turn, shift),
+        scan=(stands.scan.vertices, read.scan.triangles),
+        placed=read.placed,
     )
-
-
-def _around(vertices: FloatArray, height: float) -> float:
-    """Return the girth [m] of the finer body model's trunk at a height [m]."""
-    parts = [p.points for p in Slicer(vertices, finer_body()[1]).cut(np.array([0.0, 1.0, 0.0]), height)]
-    return convex_girth(max((p[:, [0, 2]] for p in parts), key=lambda p: float(np.ptp(p[:, 0]))))
-
-
-def _crotch_height(scan: Slicer, laid: StandingBody) -> float:
-    """Return the height [m] of the first level section of a scan, near the body's crotch, of which the largest part is of both legs."""
-    vertex, size = float(laid.posed[laid.crotch, 1]), float(laid.posed[:, 1].max())
-    for y in np.arange(vertex - 0.010 * size, vertex + 0.012 * size, 0.001):
-        parts = scan.cut(np.array([0.0, 1.0, 0.0]), float(y))
-        largest = max((p.points for p in parts), key=lambda p: float(np.ptp(p[:, 0]) * np.ptp(p[:, 2])), default=None)
-        if largest is not None and largest[:, 0].min() < -0.02 * size and largest[:, 0].max() > 0.02 * size:
-            return float(y)
-    return vertex
 
 
 def _profiles(
@@ -304,7 +207,8 @@ def _attractor(body: BodySections, levels: Mapping[str, float]) -> Callable[[Flo
         place = np.asarray(np.einsum("nk,nkd->nd", weights, closest.corners[triangle]))
         at = place[:, [1, 0]]
         share = np.clip((levels["front_neck"] - place[:, 1]) / (levels["front_neck"] - levels["bust"]), 0.0, 1.0)
-        share = share * share * (3.0 - 2.0 * share) * (np.abs(place[:, 0]) < reach)
+        # Towards the armholes the bridge fades out.
+        share = share * share * (3.0 - 2.0 * share) * np.clip((1.0 - np.abs(place[:, 0]) / reach) / 0.1, 0.0, 1.0)
         ahead, behind = front(at), back(at)
         is_front = place[:, 2] > 0.5 * (ahead + behind)
         bridge = np.where(is_front, np.maximum(ahead - place[:, 2], 0.0), np.minimum(behind - place[:, 2], 0.0))

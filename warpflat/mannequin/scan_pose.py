@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.mannequin.scan_repair import close_holes, smooth_noise
+from warpflat.mannequin.scan_repair import close_holes, smooth_noise, turned_outward
 from warpflat.mannequin.slicer import Slicer
 from warpflat.mannequin.summit import summit
 from warpflat.surface.connectivity import join_labels
@@ -105,9 +105,12 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     """
     options.check()
     welded, scanned, loose = _without_loose_pieces(*_welded(vertices, faces))
+    scanned, turned = turned_outward(welded, scanned)
     points, triangles, holes = close_holes(welded, scanned)
     points, noise = smooth_noise(points, triangles)
     notes = [f"loose pieces of less than 1 % of the scan's faces were left out: {loose}"] if loose else []
+    if turned:
+        notes.append(f"faces of the scan that were wound inward were turned: {turned} of {len(scanned)}")
     candidates = [options.up] if options.up else list(_AXES)
     slicer = Slicer(points, triangles)
     rated = [(find_legs(slicer, _AXES[a]), a) for a in candidates]

@@ -1,14 +1,19 @@
-"""A scan's mesh repaired: holes closed by patches that carry on the curvature of the skin around them, and noise smoothed."""
+"""A scan's mesh repaired: parts turned outward, holes closed by patches that carry on the skin's curvature, noise smoothed."""
 
 from __future__ import annotations
+
+import contextlib
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import components, orient
+from warpflat.surface.half_edges import half_edges
 
-__all__ = ["close_holes", "smooth_noise"]
+__all__ = ["close_holes", "smooth_noise", "turned_outward"]
 
 # Skin around a hole faces one way; around the open end of a limb it faces all ways. Borders up to so long, as a share of the
 # scan's greatest extent, are holes if the mean unit normal beside them is so long. The second is a face that is torn all over.
@@ -18,8 +23,54 @@ _LEAST_WEIGHT = 0.05
 # A scan is noisy if its vertices waver off the skin by more than this share of their distance: smooth meshes of bodies by
 # 0.03, those with 2 mm of noise on each coordinate by 0.18.
 _WAVERS = 0.08
+# A part tells which way it is wound if it has this share of the surface, and this volume for the 3/2 power of its area; a ball has 0.094.
+_PART, _BULKY = 0.01, 0.004
 # Taubin's shares of a step towards the neighbours' mean and of the step back, and how many of both.
 _SHRINK, _GROW, _STEPS = 0.50, -0.53, 10
+
+
+def turned_outward(points: FloatArray, triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
+    """Return triangles that all face outward, and how many of them did not.
+
+    A part hangs together over edges of two triangles. Its own signed volume tells how it is wound; parts that are flat or small follow the
+    most. One inside the others is the inner side of a wall, and stays.
+
+    Args:
+        points: #P by 3, any unit.
+        triangles: #T by 3.
+    """
+    faces = np.pad(triangles, ((0, 0), (0, 1)), constant_values=-1)
+    # Torn scans may be one-sided somewhere: then each face is taken as it is wound.
+    with contextlib.suppress(InputError):
+        faces = orient(faces)[0].astype(np.int64)
+    edges = half_edges(faces)
+    part = components(edges, barrier=edges.edges[edges.count > 2])
+    corners = points[faces[:, :3]]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(cross, axis=1)
+    areas = np.maximum(np.bincount(part, area), 1e-300)
+    middle = np.stack([np.bincount(part, area * along) for along in corners.mean(axis=1).T], axis=1) / areas[:, None]
+    volume = np.bincount(part, np.einsum("ta,ta->t", cross, corners[:, 0] - middle[part]) / 6.0)
+    inward = volume < 0.0
+    told = (areas > _PART * areas.sum()) & (np.abs(volume) > _BULKY * areas**1.5)
+    for one in np.flatnonzero(told & inward & (areas < areas.max())):
+        around = corners[part != one] - corners[part == one][0].mean(axis=0)
+        inward[one] = abs(_winding_number(around)) < 0.5
+    inward[~told] = areas[told & inward].sum() > 0.5 * areas[told].sum()
+    turned = np.where(inward[part][:, None], faces[:, 2::-1], faces[:, :3]).astype(np.int64)
+    # A triangle that is turned has its corners in the other order.
+    first = np.argmax(turned == triangles[:, :1], axis=1)
+    after = turned[np.arange(len(turned)), (first + 1) % 3]
+    return turned, int((after != triangles[:, 1]).sum())
+
+
+def _winding_number(corners: FloatArray) -> float:
+    """Return how often triangles (#T by 3 by 3) go around the origin (Van Oosterom and Strackee 1983)."""
+    a, b, c = corners.transpose(1, 0, 2)
+    la, lb, lc = np.linalg.norm(corners, axis=2).T
+    dots = [np.einsum("ta,ta->t", *pair) for pair in ((a, b), (b, c), (c, a))]
+    below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
+    return float(np.arctan2(np.einsum("ta,ta->t", a, np.cross(b, c)), below).sum() / (2.0 * np.pi))
 
 
 def close_holes(
@@ -107,7 +158,7 @@ def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.
 
     None where the rim's shadow along `facing` crosses itself.
     """
-    from scipy.spatial import Delaunay, QhullError
+    from scipy.spatial import Delaunay, QhullError, cKDTree
 
     middle = rim.mean(axis=0)
     first = np.eye(3)[int(np.argmin(np.abs(facing)))]
@@ -128,8 +179,7 @@ def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.
     grid = grid[_inside(grid, flat)]
     # On the rim's edges, too, or a long edge would lie close to a vertex of the grid.
     halves = np.concatenate([flat, 0.5 * (flat + np.roll(flat, 1, axis=0))])
-    away = np.linalg.norm(grid[:, None] - halves, axis=2).min(axis=1) if len(grid) else np.empty(0)
-    grid = grid[away > 0.55 * step]
+    grid = grid[cKDTree(halves).query(grid)[0] > 0.55 * step]
     try:
         cells = Delaunay(np.concatenate([flat, grid])).simplices
     except (QhullError, ValueError):
@@ -166,6 +216,8 @@ def _fair(
         inner: #I by 3, a first guess.
         filled: the patch's triangles, of the rim's vertices and then the inner ones.
     """
+    from scipy.sparse.linalg import splu
+
     outer = np.setdiff1d(around, loop)
     place = np.empty(len(points), dtype=np.int64)
     place[loop] = np.arange(len(loop))
@@ -177,24 +229,24 @@ def _fair(
     known = np.setdiff1d(np.arange(len(where)), free)
     for _ in range(3):
         bending = _laplacian(where, faces)[:rows]
-        where[free] = np.linalg.lstsq(bending[:, free], -bending[:, known] @ where[known], rcond=None)[0]
+        of_free = bending[:, free]
+        where[free] = splu((of_free.T @ of_free).tocsc()).solve(-(of_free.T @ (bending[:, known] @ where[known])))
     return where[free]
 
 
-def _laplacian(where: FloatArray, faces: NDArray[np.int64]) -> FloatArray:
-    """Return the mean-curvature operator of a small mesh, each row over the square root of its vertex's area."""
-    weights = np.zeros((len(where), len(where)))
-    area = np.zeros(len(where))
-    for k in range(3):
-        i, j, tip = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
-        a, b = where[i] - where[tip], where[j] - where[tip]
-        twice = np.linalg.norm(np.cross(a, b), axis=1)
-        cotangent = np.clip((a * b).sum(axis=1) / np.maximum(twice, 1e-300), _LEAST_WEIGHT, 1.0 / _LEAST_WEIGHT)
-        np.add.at(weights, (i, j), cotangent)
-        np.add.at(weights, (j, i), cotangent)
-        np.add.at(area, tip, twice / 6.0)
-    matrix = np.diag(weights.sum(axis=1)) - weights
-    return np.asarray(matrix / np.sqrt(np.maximum(area, 1e-300))[:, None])
+def _laplacian(where: FloatArray, faces: NDArray[np.int64]) -> csr_array:
+    """Return the mean-curvature operator of a mesh, each row over the square root of its vertex's area."""
+    from scipy.sparse import coo_array, diags_array
+
+    size = len(where)
+    i, j, tip = np.concatenate([np.roll(faces, -k, axis=1) for k in range(3)]).T
+    a, b = where[i] - where[tip], where[j] - where[tip]
+    twice = np.linalg.norm(np.cross(a, b), axis=1)
+    cotangent = np.clip((a * b).sum(axis=1) / np.maximum(twice, 1e-300), _LEAST_WEIGHT, 1.0 / _LEAST_WEIGHT)
+    half = coo_array((cotangent, (i, j)), shape=(size, size)).tocsr()
+    weights = half + half.T
+    area = np.bincount(tip, twice / 6.0, size)
+    return (diags_array(np.maximum(area, 1e-300) ** -0.5) @ (diags_array(weights.sum(axis=1)) - weights)).tocsr()
 
 
 def smooth_noise(points: FloatArray, triangles: NDArray[np.int64]) -> tuple[FloatArray, float]:

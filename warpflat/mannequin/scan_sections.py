@@ -20,7 +20,7 @@ from warpflat.mannequin.stand_body import StandingBody
 __all__ = ["OUTLINES", "ArmSections", "BodySections", "LegSections", "TrunkSections", "smooth", "tape_around"]
 
 #: Distances from the midplane at which the outline of the front is followed, as shares of the stature.
-OUTLINES = np.linspace(0.03, 0.08, 6)
+OUTLINES = np.linspace(0.03, 0.08, 11)
 _UP = np.array([0.0, 1.0, 0.0])
 # A section runs over a hole if more than this share of it lies on what the scan does not show.
 _HOLED = 0.1
@@ -59,7 +59,7 @@ class TrunkSections:
         left, right: #S, extent towards +x and -x [m].
         front, back: #S, extent forward and backward [m].
         apex: #S, distance of the foremost points from the midplane [m].
-        outlines: #S by 6, z of the front at six distances OUTLINES of the stature from the midplane, the mean of left and right [m].
+        outlines: #S by 11, z of the front at the distances OUTLINES of the stature from the midplane, the mean of left and right [m].
         hulls: for each section its hull, counter-clockwise seen from below, #P by 2 (x, z) [m].
         holed: #S, whether the section runs over what the scan does not show.
     """

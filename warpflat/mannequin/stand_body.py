@@ -53,6 +53,8 @@ _PARTS = {
     "spine03": "the chest", "pelvis": "the pelvis", "clavicle": "two shoulders", "upperarm01": "two upper arms",
     "upperleg01": "two thighs", "lowerleg01": "two calves",
 }  # fmt: skip
+# A place is a guess where the body model lies farther off the scan [m] in the mean, or the scan shows less than a share of it.
+_OFF, _SHOWN = 0.015, 0.75
 # Surfaces face the same way where their normals' product is larger than this.
 _ALIKE = 0.5
 
@@ -108,13 +110,13 @@ class StandingBody:
         """Return whether the scan shows the most of some vertices."""
         return bool(self.seen[rows].mean() > 0.5)
 
-    def unsure_near(self, rows: NDArray[np.int64], far: float, shown: float) -> str | None:
-        """Return why a place amid some vertices is a guess: the scan shows less than a share of them, or the model lies `far` [m] off."""
-        if self.seen[rows].mean() < shown:
+    def unsure_near(self, rows: NDArray[np.int64]) -> str | None:
+        """Return why a place amid some vertices is a guess: the scan shows too few of them, or the model lies far off; None if neither."""
+        if self.seen[rows].mean() < _SHOWN:
             return "the scan does not show the body there"
         distance = self.fit.distance[rows[rows < len(self.fit.distance)]]
-        mean = float(np.mean(np.minimum(distance, 2.0 * far))) if len(distance) else 0.0
-        return f"the body model lies {1000.0 * mean:.0f} mm off the scan there" if mean > far else None
+        mean = float(np.mean(np.minimum(distance, 2.0 * _OFF))) if len(distance) else 0.0
+        return f"the body model lies {1000.0 * mean:.0f} mm off the scan there" if mean > _OFF else None
 
     def carried(self, name: str, height: float) -> float:
         """Return the height [m] at which a landmark at a height of the scan lies on the mannequin."""
@@ -205,16 +207,13 @@ def stand_body(
 
     Args:
         vertices: #V by 3 [m].
-        triangles: #T by 3, their normals all outward or all inward.
+        triangles: #T by 3, their normals outward.
         scanned: triangles from this one on close holes.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
         as_scanned: whether the mannequin keeps the scan's pose.
         sits: whether the scan does.
         landmarks: known heights [m], which the fit follows.
     """
-    corners = vertices[triangles]
-    if np.einsum("ta,ta->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) < 0.0:
-        triangles = triangles[:, ::-1]
     found = _stand(fit_body(vertices, triangles, landmarks, sits=sits), vertices, triangles, scanned, as_scanned)
     if found.doubtful and not faces_ahead and not sits:
         vertices = vertices * [-1.0, 1.0, -1.0]

@@ -9,14 +9,10 @@ import numpy as np
 from warpflat.core.errors import InputError
 from warpflat.mannequin.body_model import finer_body
 from warpflat.mannequin.common_body import common_body_of_scan
-from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.slicer import Slicer
 from warpflat.surface.io.read import read_scan
 
 __all__ = ["waist_of_body"]
-
-# The trunk is narrowest so near to where the body model has its waist, as a share of the stature; so many levels are tried.
-_REACH, _LEVELS = 0.035, 15
 
 
 def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
@@ -34,12 +30,7 @@ def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
         body = common_body_of_scan(vertices, faces, name=path.stem)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    upward, skin = np.array([0.0, 1.0, 0.0]), Slicer(body.vertices, finer_body()[1])
-    levels = body.level("waist") + _REACH * float(np.ptp(body.vertices[:, 1])) * np.linspace(-1.0, 1.0, _LEVELS)
-    trunks = [
-        max((part.points for part in skin.cut(upward, level)), key=lambda one: float(np.ptp(one[:, 0])))
-        for level in levels
-    ]
-    trunk = min(trunks, key=lambda one: convex_girth(one[:, [0, 2]]))
+    cut = Slicer(body.vertices, finer_body()[1]).cut(np.array([0.0, 1.0, 0.0]), body.level("waist"))
+    trunk = max((part.points for part in cut), key=lambda points: float(np.ptp(points[:, 0])))
     x, y, z = (scale * ((trunk.mean(axis=0) - body.shift) @ np.linalg.inv(body.turn))).tolist()
     return x, y, z
