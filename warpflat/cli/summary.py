@@ -68,7 +68,11 @@ def summary_lines(
     energy = energy_words(sum(piece["strain_energy_j"] for piece in pieces.values()))
     # With what was drafted beside them, such as collars and bands.
     titles = {each["title"] for part in metrics.get("cloths", ()) for each in part["pieces"]} or pieces
-    what = [f"{format_count(len(titles), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"] if pieces else []
+    what = (
+        [f"{format_count(len(titles), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"]
+        if pieces
+        else []
+    )
     what += [size] if size else []
     what += openings or (["it goes on without a further opening"] if metrics.get("rings") else [])
     lines.append("; ".join(what))
