@@ -270,9 +270,8 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
             ]
             for measure in measures
         ]
-        heads = ("body", "finished", "ease", *(["asked for"] if missed else []))
-        widths = (0.28, *(0.72 / len(heads) for _ in heads))
-        page.table(["", *map(translate, heads)], rows, widths)
+        titles = ("body", "finished", "ease", *(["asked for"] if missed else []))
+        page.table(["", *map(translate, titles)], rows, (0.28, *(0.72 / len(titles) for _ in titles)))
     page.y -= 0.006
     for kind in worn.failing:
         page.paragraph(translate(FAILING[kind]))

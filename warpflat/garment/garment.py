@@ -367,7 +367,7 @@ def flatten_form(
     near = np.linalg.norm(form.vertices - mannequin.vertices, axis=1) <= TOUCHING
     for name, piece in form.pieces.items():
         faces = piece.surface.faces
-        close = np.where(faces >= 0, near[piece.grid_vertices[faces]], True).all(axis=1)
+        close = np.asarray((near[piece.grid_vertices[faces]] | (faces < 0)).all(axis=1))
         pieces[name] = replace(pieces[name], close=close)
     garment = Garment(
         name=form.name,
