@@ -113,9 +113,9 @@ def foreign_words(path: Path) -> str:
 
 
 def other_kind_words(path: Path, wanted: str) -> str:
-    """Return which command reads a file that is given where another kind is wanted; "" of a kind that is not in the table."""
+    """Return which command reads a file that is given where another kind is wanted; "" of that kind, or of one not in the table."""
     ending = path.suffix.lower()
     for what, (endings, command) in _OWN.items():
-        if ending in endings:
+        if ending in endings and what != wanted:
             return f"is {what}, not {wanted}: {command}"
     return ""
