@@ -250,7 +250,7 @@ class Relaxation:
         """Return the sum of an array on the device, or of so many entries from the first on."""
         end = len(values) if count is None else first + count
         if self.network.device.is_cpu:
-            return float(self._on_host(values)[first:end].sum())
+            return float(np.sum(self._on_host(values)[first:end]))
         return float(wp.utils.array_sum(values[first:end]))
 
     def positions(self) -> FloatArray:
