@@ -12,9 +12,9 @@ Under compression cloth wrinkles: W = f W_sheet + (1 - f) W_wrinkled, with W_wri
 may shorten freely (Pipkin 1986).
 
 The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have been sheared as far as
-the fabric lets them lie against each other and lock, from gamma_on on, the sine of that angle. gamma cannot exceed 1, so G
-alone would resist full shear with at most 1/2 G per area. Threads of soft cloth would then come to lie side by side, and a
-tiny face of the body would become a hand's breadth of cloth.
+the fabric lets them lie against each other and lock, from gamma_on on, the sine of that angle. gamma cannot exceed 1, so G alone would
+resist full shear with at most 1/2 G per area. Threads of soft cloth would then come to lie side by side, and a tiny face of the
+body would become a hand's breadth of cloth.
 """
 
 import warp as wp

@@ -23,7 +23,7 @@ ModelChoice = Literal["auto", "springs", "membrane"]
 MODELS: tuple[ModelChoice, ...] = ("auto", "springs", "membrane")
 
 # What locked threads add to the shear stiffness, over that. With 10, a shirt, trousers and a bodice of denim, a weave and a knit are
-# sheared to 1.0 to 1.3 times the limit at 95 % of their area, and their threads are strained by what they bear. 5 and 20 differ little.
+# sheared to .9 to 1.3 times the limit at 95 % of their area, and their threads bear the rest. 5 and 20 differ little.
 _LOCKING = 10.0
 # Edges of quads count as threads where they run within this angle of the grain [degrees], on average, and are spread about that by less
 # than what leaves so much of their mean of exp(4i a): 17 degrees.
