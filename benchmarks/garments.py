@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -129,10 +130,15 @@ def stretches(garment: Garment) -> str:
 
 
 def left_and_right_apart(found: FoundSeams) -> float:
-    """Return how much the lengths of left and right seams of one name differ, at most [mm]."""
-    length = {seam.name: seam.length for seam in found.seams}
-    pairs = [(one, re.sub(r"\bleft\b", "right", one)) for one in length if re.search(r"\bleft\b", one)]
-    return 1e3 * max((abs(length[one] - length.get(other, 0.0)) for one, other in pairs), default=0.0)
+    """Return how much the lengths of left and right seams of one name differ in a layer, at most [mm]; a missing one has none."""
+    lengths: dict[str, list[float]] = {}
+    for seam in found.seams:
+        lengths.setdefault(seam.name, []).append(1e3 * seam.length)
+    lefts = {re.sub(r"\bright\b", "left", name) for name in lengths}
+    pairs = [(name, re.sub(r"\bleft\b", "right", name)) for name in lefts if re.search(r"\bleft\b", name)]
+    # Layers come one after the other, and so do their seams.
+    both = (zip_longest(lengths.get(one, []), lengths.get(other, []), fillvalue=0.0) for one, other in pairs)
+    return max((abs(left - right) for pair in both for left, right in pair), default=0.0)
 
 
 def draped(garment: Garment, layers: list[Surface]) -> str:
@@ -164,7 +170,8 @@ def whole_command(layers: list[Surface], fabric: str) -> str:
 def measure(path: str, fabric: str, wanted: warpflat.SeamOptions, *, quick: bool) -> list[str]:
     """Return a row of the table."""
     layers = read(path)
-    plain = sewn(warpflat.find_seams(layers), fabric)
+    parted = warpflat.find_seams(layers)
+    plain = sewn(parted, fabric)
     found = warpflat.find_seams(layers, wanted, fabric=fabric)
     garment = sewn(found, fabric)
     by_name = {piece.name: piece.vertices for piece in found.pieces}
@@ -182,7 +189,7 @@ def measure(path: str, fabric: str, wanted: warpflat.SeamOptions, *, quick: bool
         *strain(plain),
         *strain(garment),
         stretches(garment),
-        f"{left_and_right_apart(found):.1f}",
+        f"{max(map(left_and_right_apart, (parted, found))):.1f}",
         f"{max((1e3 * abs(seam.lengths[0] - seam.lengths[1]) for seam in garment.seams), default=0.0):.2f}",
         *(["", ""] if quick else [whole_command(layers, fabric), draped(garment, layers)]),
     ]

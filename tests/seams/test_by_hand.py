@@ -356,3 +356,22 @@ def test_the_command_refuses_what_is_no_seam(
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line
     assert not (tmp_path / "out").exists()
+
+
+def test_a_sleeve_above_a_cuff_is_told_by_its_armhole_and_has_its_grain_along_the_arm() -> None:
+    surface = solids.shirt()
+    wrist = float(surface.vertices[:, 0].max())
+    planes = {"armhole": 0.2, "cuff": wrist - 0.05}
+    drawn = [
+        warpflat.SeamCut(name=f"{name} {side}", plane=((sign * x, 0.5, 0), (1, 0, 0)), nearest=True)
+        for name, x in planes.items()
+        for side, sign in (("left", 1), ("right", -1))
+    ]
+    rib = warpflat.SeamCut(name="rib", plane=((0, 0.05, 0), (0, 1, 0)))
+    found = cut(surface, *drawn, rib)
+    pieces = {piece.name: piece for piece in found.pieces}
+    assert {"left_sleeve", "right_sleeve", "left_cuff", "right_cuff", "hem_band"} <= set(pieces)
+    for name in ("left_sleeve", "right_sleeve"):
+        grain = pieces[name].vertices[pieces[name].lines["grain"][[0, -1]]]
+        along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+        assert abs(along[0]) > 0.98

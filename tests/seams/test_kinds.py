@@ -184,3 +184,31 @@ def test_armholes_are_sleeves_on_both_sides_or_on_none() -> None:
     # What there is of its sleeves is as long as the shortest sleeve on one side, and a little shorter on the other.
     anatomy = anatomy_of(solids.shirt(arm=0.0, sleeve=0.18, step=0.045))
     assert {limb.side for limb in anatomy.limbs} in (set(), {1, -1})
+
+
+@pytest.mark.parametrize("make", [solids.shirt, solids.trousers, solids.jumpsuit, solids.skirt, poncho])
+def test_what_stands_on_its_head_is_turned_upright(make: Callable[[], Surface]) -> None:
+    plain = make()
+    turned = warpflat.make_surface(plain.vertices * [1.0, -1.0, -1.0], plain.faces, closed=True)
+    upright, upset = anatomy_of(plain), anatomy_of(turned)
+    assert axis_name(upright.up) == "+y"
+    assert describe(upset) == describe(upright)
+    assert axis_name(upset.up) == "-y"
+    assert any("--up says otherwise" in note for note in upset.notes)
+
+
+@pytest.mark.parametrize(("make", "least"), [(solids.trousers, 0.4), (solids.shirt, 0.5), (solids.jumpsuit, 0.5)])
+def test_a_toys_clothes_are_no_garments_and_a_childs_are(make: Callable[[], Surface], least: float) -> None:
+    plain = make()
+    child, toy = (
+        anatomy_of(warpflat.make_surface(share * plain.vertices, plain.faces, closed=True)) for share in (least, 0.15)
+    )
+    assert child.kind == anatomy_of(plain).kind
+    assert toy.kind == "other"
+
+
+def test_a_cap_with_holes_over_the_ears_is_no_pair_of_trousers() -> None:
+    ways = ([0.0, -1.0, 0.0], 0.0), ([1.0, -0.5, 0.0], 0.085), ([-1.0, -0.5, 0.0], 0.085)
+    openings = [(np.array(way) / np.linalg.norm(way) * at, way) for way, at in ways]
+    cap = solids.skin(lambda points: np.linalg.norm(points, axis=1) - 0.095, [-0.12] * 3, [0.12] * 3, 0.012, openings)  # type: ignore[arg-type]
+    assert anatomy_of(cap).kind in ("hat", "other")

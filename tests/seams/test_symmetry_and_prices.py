@@ -12,7 +12,10 @@ import seam_solids as solids
 import warpflat
 from warpflat.cli.main import main
 from warpflat.scene.found_seams import found_seams
-from warpflat.seams.find import FoundSeams
+from warpflat.seams.anatomy import find_anatomy
+from warpflat.seams.fields import Operators
+from warpflat.seams.find import FoundSeams, cloth_of
+from warpflat.seams.symmetric import mirrored
 from warpflat.surface.mesh import Surface
 from warpflat.surface.mirror import mirror_images
 
@@ -43,6 +46,29 @@ def test_left_and_right_are_cut_alike_within_a_millimetre(by: float) -> None:
     assert {name: mate for name, (mate, _) in images.items()} == {
         "front": "front", "back": "back", "left_sleeve": "right_sleeve", "right_sleeve": "left_sleeve",
     }  # fmt: skip
+
+
+def test_wrinkles_that_cross_the_middle_to_and_fro_leave_both_sides_alike() -> None:
+    plain = solids.skirt(rows=24, around=150)
+    x, y, z = plain.vertices.T
+    turn, out = np.arctan2(x, z) + 0.4 * np.pi / 75, np.hypot(x, z)
+    x, z = out * np.sin(turn), out * np.cos(turn)
+    near = 0.02 * np.exp(-((x / 0.05) ** 2)) * (z > 0.0)
+    phase = 150.0 * x + 20.0 * y
+    wrinkled = np.column_stack([x + near * np.sin(phase), y, z + near * np.cos(phase)])
+    found = warpflat.find_seams(warpflat.make_surface(wrinkled, plain.faces, name="skirt"))
+    length = {seam.name: seam.length for seam in found.seams}
+    assert length["side left"] == pytest.approx(length["side right"], rel=1e-9)
+    assert any(note.startswith("both sides are averaged and cut alike") for note in found.notes)
+
+
+def test_a_seam_on_one_side_alone_keeps_the_sides_apart() -> None:
+    cloth = cloth_of(solids.skirt())
+    anatomy = find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+    cloth = cloth.with_seam("pocket left", cloth.half_edges.edges[:1].astype(np.int64))
+    kept, why = mirrored(cloth, anatomy)
+    assert kept is cloth
+    assert why == "pocket left is on one side alone"
 
 
 def test_what_is_not_nearly_symmetric_keeps_its_sides() -> None:

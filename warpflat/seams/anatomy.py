@@ -68,6 +68,9 @@ _WAISTED, _BELOW_WAIST = 0.93, 0.3
 _WAVES, _LONG = 1.25, 0.8
 # Around a neck that is no longer [m], this upper share of a poncho lies level by this (mean cosine).
 _NECKS, _SHOULDERS, _LIES = 0.62, 0.35, 0.5
+# The trunk of a newborn is so long, and so far around its widest opening [m]. What is shorter than the third ends at the thigh, where a
+# leg's girth is this share of the waist's.
+_LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
 # Openings around heads, and around wrists and ankles, are so long [m]; a hand is no thicker than this share of its width.
 _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
 # A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
@@ -75,6 +78,10 @@ _SLANT, _ENOUGH_ABOVE = 0.15, 0.2
 # A front opening's area vector is less than this of a ring's; a hem's lies along the height by this cosine; cloth that goes on from all its
 # hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a ball's from 1.2 on).
 _RING, _DOWN, _TUBE = 0.6, 0.5, 1.16
+# It is turned around if it can be worn better by this; an opening in front ends in such a share of the garment's height.
+_SURELY, _END = 0.25, 0.15
+# A garment lies on its back if the way through it is upright by this (cosine).
+_LIES_ON_BACK = 0.8
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
 
@@ -129,6 +136,7 @@ class Anatomy:
         up, front, left: directions in space.
         normal, offset: the plane of symmetry, normal . x = offset; the normal points to the left.
         asymmetry: median distance of the mirrored cloth from the cloth [m].
+        symmetric: whether it is its own mirror image in that plane.
         mirror: the mirror images of its vertices; None without symmetry.
         borders: by length.
         limbs: sleeves and legs.
@@ -144,6 +152,7 @@ class Anatomy:
     normal: FloatArray
     offset: float
     asymmetry: float
+    symmetric: bool
     mirror: MirrorMap | None
     borders: tuple[Border, ...]
     limbs: tuple[Limb, ...]
@@ -168,13 +177,78 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
         operators: of its mesh.
         up, front: directions as "+y", "-z", where the user says them; +y and +z are tried first otherwise.
     """
+    loops = [_measured(cloth.vertices, loop) for loop in cloth.borders()]
+    if up:
+        made = _worn(cloth, operators, loops, AXES[up], front)
+    else:
+        size = float(np.sqrt(cloth.face_areas.sum()))
+        first = _upward([one for one in loops if one[1] >= HOLE * size], cloth.vertices)
+        made = _worn(cloth, operators, loops, first, front)
+        turned = _worn(cloth, operators, loops, -first, front)
+        made = turned if _wearable(cloth, turned) > _wearable(cloth, made) + _SURELY else made
+        if made.up[1] < 0.5 and len(loops) > 1:
+            why = "as its openings lie" if made.up @ first > 0.5 else "as nobody could wear it the other way up"
+            words = f"up is taken as {axis_name(made.up)}, {why}; --up says otherwise"
+            made = replace(made, notes=(words, *made.notes))
+    if made.symmetric:
+        mirror = mirror_map(cloth.vertices, cloth.faces, made.normal, made.offset, reach=0.05 * made.size)
+        made = replace(made, mirror=mirror)
+    return made
+
+
+def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
+    """Return how well a body could wear a garment this way up, from about -1 to 2.
+
+    A head needs an opening. A neck is shorter than a hem, and a waist, too; sleeves begin near the neck and hang.
+    """
+    heights = cloth.vertices @ anatomy.up
+    low, tall = float(heights.min()), max(float(np.ptp(heights)), 1e-300)
+
+    def end(role: str, highest: bool) -> float:
+        """Return the girth of the trunk's end [m]: of a circle as large as its border; of an opening in front, the length there."""
+        own = anatomy.border(role)
+        if own is not None:
+            return own.length * float(np.sqrt(np.linalg.norm(own.normal)))
+        opening = anatomy.border("opening")
+        if opening is None:
+            return 0.0
+        ring = cloth.vertices[np.append(opening.vertices, opening.vertices[0])]
+        level = heights[opening.vertices]
+        at_end = (level > level.max() - _END * tall) if highest else (level < level.min() + _END * tall)
+        return float(np.linalg.norm(np.diff(ring, axis=0), axis=1)[at_end].sum())
+
+    if anatomy.kind not in ("top", "dress", "skirt", "trousers", "jumpsuit"):
+        return -0.5
+    if anatomy.kind == "trousers":
+        return 0.0
+    if anatomy.kind == "jumpsuit":
+        neck = anatomy.border("neck") or anatomy.border("opening")
+        return 2.0 * float(heights[neck.vertices].max() - low) / tall - 1.0 if neck is not None else -1.0
+    above, below = end("waist" if anatomy.kind == "skirt" else "neck", True), end("hem", False)
+    if not above or not below:
+        return -1.0
+    sleeves = anatomy.limbs_of("sleeve")
+    # One that leads to the other side begins elsewhere.
+    outward = [float(limb.along @ anatomy.normal) * limb.side > 0.0 for limb in sleeves]
+    hangs = [-float(limb.along @ anatomy.up) if out else -1.0 for limb, out in zip(sleeves, outward, strict=True)]
+    hang = sum(hangs) / max(len(sleeves), 1)
+    begin = sum((float(limb.fork @ anatomy.up) - low) / tall - 0.5 for limb in sleeves) / max(len(sleeves), 1)
+    return (below - above) / (below + above) + hang + begin
+
+
+def _worn(
+    cloth: Cloth,
+    operators: Operators,
+    raw: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
+    upward: FloatArray,
+    front: str | None,
+) -> Anatomy:
+    """Return what a garment is that is worn with `upward` up, without its mirror images; see `find_anatomy`.
+
+    `raw` are its borders, measured.
+    """
     size = float(np.sqrt(cloth.face_areas.sum()))
-    loops = cloth.borders()
     notes: list[str] = []
-    raw = [_measured(cloth.vertices, loop) for loop in loops]
-    upward = AXES[up] if up else _upward([one for one in raw if one[1] >= HOLE * size])
-    if up is None and abs(upward[1]) < 0.5 and len(loops) > 1:
-        notes.append(f"up is taken as {axis_name(upward)}, as its openings lie; --up says otherwise")
     normal, offset, asymmetry = _plane_of_symmetry(
         cloth.vertices, _above_slanted_hem(cloth.vertices, operators.mass, upward, raw, size), upward, size
     )
@@ -233,12 +307,9 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
             forward, left, normal, offset = -forward, -left, -normal, -offset
             borders = [replace(border, side=-border.side) for border in borders]
             limbs = [replace(limb, side=-limb.side) for limb in limbs]
-    mirror = None
-    if holds:
-        mirror = mirror_map(cloth.vertices, cloth.faces, normal, offset, reach=0.05 * size)
-    elif one_sleeve:
+    if one_sleeve:
         notes.append("it has a sleeve on one side alone: each side has its own lines")
-    else:
+    elif not holds:
         notes.append(
             f"it has no plane of symmetry (mirrored, it is {1e3 * asymmetry:.0f} mm off): each side has its own lines"
         )
@@ -250,7 +321,8 @@ def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, f
         normal=normal,
         offset=offset,
         asymmetry=asymmetry,
-        mirror=mirror,
+        symmetric=holds,
+        mirror=None,
         borders=tuple(borders),
         limbs=tuple(limbs),
         open_front=open_front,
@@ -282,12 +354,17 @@ def _measured(vertices: FloatArray, loop: Ids) -> tuple[FloatArray, float, Float
     return middle, length, area * (4.0 * np.pi / max(length, 1e-300) ** 2), loop
 
 
-def _upward(loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]]) -> FloatArray:
-    """Return +y, or +z where the openings lie level in z and not in y."""
+def _upward(loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]], vertices: FloatArray) -> FloatArray:
+    """Return +y, or +z where the openings lie level in z and not in y, or a garment that is open in front lies on its back."""
     if not loops:
         return AXES["+y"]
     level = sum(length * np.abs(normal) for _, length, normal, _ in loops)
     assert isinstance(level, np.ndarray)
+    _, longest, facing, _ = max(loops, key=lambda one: one[1])
+    if np.linalg.norm(facing) < _RING and longest > 0.5 * sum(one[1] for one in loops):
+        # The thinnest way through it is from back to front.
+        through = np.linalg.eigh(np.cov(vertices.T))[1][:, 0]
+        return AXES["+z"] if abs(through[1]) > _LIES_ON_BACK else AXES["+y"]
     return AXES["+z"] if level[2] > 2.0 * level[1] and level[2] > level[0] else AXES["+y"]
 
 
@@ -422,7 +499,17 @@ def _kind(
     """Return the kind, the borders with their roles, and whether the front is open."""
     low, high = float(heights.min()), float(heights.max())
     tall = max(high - low, 1e-300)
-    limbs = [i for i, border in enumerate(borders) if border.role == "limb"]
+    around = [border.length for border in borders if border.role == "middle"]
+    # No arm and no leg is as thin as that; what has one more opening alone, and ends at the thigh, is as wide as a thigh.
+    thigh = _THIGH * around[0] if len(around) == 1 and tall < _TO_THE_THIGH else 0.0
+    thin = max(_HANDS[0], thigh)
+    limbs = [i for i, border in enumerate(borders) if border.role == "limb" and border.length > thin]
+    if tall < _LEAST_BODY[0] or (len(limbs) < 4 and max(around, default=0.0) < _LEAST_BODY[1]):
+        limbs = []
+    borders = [
+        replace(border, role="hole", side=0) if border.role == "limb" and i not in limbs else border
+        for i, border in enumerate(borders)
+    ]
     middles = [i for i, border in enumerate(borders) if border.role == "middle"]
     roles = {i: border.role for i, border in enumerate(borders)}
     level = {i: float(borders[i].middle @ upward) for i in range(len(borders))}
@@ -562,6 +649,9 @@ def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArra
 def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -> Kind:
     """Return what a thing with one border is: a hat, a sock or a glove if its size and its shape say so, else "other"."""
     holes = len(border_loops(cloth.faces.astype(np.int32)))
+    others = [loop for loop in cloth.borders() if not np.array_equal(np.sort(loop), np.sort(border.vertices))]
+    if sum(_measured(cloth.vertices, loop)[1] for loop in others) > 0.5 * border.length:
+        return "other"
     if border.length > 3.0 * size or euler_characteristic(cloth.faces.astype(np.int32)) != 2 - holes:
         # A disk that is no deeper than a panel, or a thing with a handle, as a mug.
         return "other"

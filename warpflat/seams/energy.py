@@ -24,7 +24,7 @@ from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.sew_pieces import sew_pieces
-from warpflat.seams.anatomy import Anatomy
+from warpflat.seams.anatomy import ROLES, Anatomy
 from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
 from warpflat.seams.solid import NARROW, SEWABLE, SOLID, LaidFlat, parts_within
@@ -79,10 +79,12 @@ _SAME = 1e-6
 _NOTHING, _NO_ENERGY, _NO_DENSITY = 1.5e-3, 0.02, 1e-2
 # Seams of a closed thing are alike if their lengths agree within this share.
 _EQUAL = 0.015
-# Seams that a garment keeps even so: it is put together at them.
-_STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm")
+# Seams that a garment keeps even so: it is put together at them. A leg can do without a side seam, a trunk cannot.
+_STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm", "side")
 # Labels of faces: the number that each had when its piece was measured, and that piece's.
 _FACE, _OWNER = "face before", "piece before"
+# The hem of what opens in front is the lowest share of its height.
+_HEM = 0.15
 # Names of a seam on trial, and of its mirror image.
 _TRIAL, _MATE = "on trial", "on trial, mirrored"
 # Prices are known to this share, what is made to the second.
@@ -335,7 +337,8 @@ def _priced(
             found |= {one: replace(trial, name=one) for one in of_equal_price(name)}
             # What closed things are made of must lie within its limit, no more.
             most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
-            kept = name.startswith(_STRUCTURAL) or any(options.keeps(one) for one in both)
+            of_leg = name.startswith("side") and anatomy.kind == "trousers"
+            kept = (name.startswith(_STRUCTURAL) and not of_leg) or any(options.keeps(one) for one in both)
             if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
                 continue
             # Before it is closed, it is known well: the layout of what is joined is far from rest.
@@ -749,6 +752,7 @@ def _candidates(
                     )
     loop = border_loops(surface.faces)[0]
     rim = surface.vertices[loop]
+    hem = _at_hem(cloth, piece.mesh.vertex_of[loop], anatomy)
     normals = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
     heard = sum(misfit.area for misfit in misfits)
     for misfit in sorted(misfits, key=lambda one: -one.area)[:_PLACES]:
@@ -757,11 +761,13 @@ def _candidates(
         place = surface.vertices[misfit.vertex]
         beside = (surface.faces[:, :3] == misfit.vertex).any(axis=1)
         normal = normals[beside].mean(axis=0)
-        away = np.linalg.norm(rim - place, axis=1)
+        away = np.where(hem, np.inf, np.linalg.norm(rim - place, axis=1))
+        if not np.isfinite(away).any():
+            continue
         # The nearest places of the border, each in another direction.
         nearest = list[int]()
-        open_to = np.ones(len(rim), dtype=bool)
-        directions = (rim - place) / np.maximum(away, 1e-300)[:, None]
+        open_to = ~hem
+        directions = (rim - place) / np.maximum(np.linalg.norm(rim - place, axis=1), 1e-300)[:, None]
         while open_to.any() and len(nearest) < _STRETCHES:
             k = int(np.where(open_to, away, np.inf).argmin())
             nearest.append(k)
@@ -807,6 +813,20 @@ def _candidates(
                     end=rim[k] + reach * size * way,
                     parts=False,
                 )
+
+
+def _at_hem(cloth: Cloth, vertices: Ids, anatomy: Anatomy) -> BoolArray:
+    """Return which vertices are at a free end below: a hem, the end of a sleeve or a leg, the lower end of an opening in front.
+
+    No dart begins there: what hangs is shaped from above.
+    """
+    if "role" not in cloth.values:
+        return np.zeros(len(vertices), dtype=bool)
+    role = np.round(cloth.values["role"][vertices])
+    heights = cloth.vertices @ anatomy.up
+    low = heights[vertices] < heights.min() + _HEM * np.ptp(heights)
+    ends = np.isin(role, [1 + ROLES.index(name) for name in ("hem", "sleeve", "leg")])
+    return np.asarray(ends | (low & (role == 1 + ROLES.index("opening"))))
 
 
 def _is_lopsided(candidate: _Candidate, anatomy: Anatomy) -> bool:

@@ -43,7 +43,7 @@ _BAND_AREA, _BAND = 0.12, 27.0
 # It runs along an opening by at least this share of its border: a panel of a leg only ends there.
 _ALONG = 0.2
 #: What a band is called, by the border along which it runs.
-BANDS = {"waist": "waistband", "neck": "neck_band", "sleeve": "cuff", "leg": "cuff"}
+BANDS = {"waist": "waistband", "neck": "neck_band", "hem": "hem_band", "sleeve": "cuff", "leg": "cuff"}
 
 # Pieces are alike if sizes, outlines and extents agree within this share.
 _ALIKE = 0.015
@@ -144,10 +144,9 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         turned = [words, *turned]
         operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
-    even = False
+    even, moved, why = False, "", ""
     if not options.cuts:  # what the user draws on one side is on that side alone
         cloth, moved, even = averaged(cloth, anatomy, operators)
-        turned = [*turned, *moved]
         operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     anatomy = replace(anatomy, limbs=averaged_limbs(anatomy, alike=even))
     role = np.zeros(len(cloth.vertices))
@@ -172,18 +171,21 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
     notes += [*left, *kept, *inside]
     if auto:
         shape = anatomy.kind not in TAILORED and not is_panel(cloth)
-        both = mirrored(cloth, anatomy) if even and shape else None
+        alike = even and shape
+        if alike:
+            cloth, why = mirrored(cloth, anatomy)
         cloth, more = part_solids(
-            both or cloth,
+            cloth,
             shape=shape,
-            mirror=None if both is None else anatomy,
+            mirror=anatomy if alike and not why else None,
             most=options.most_pieces,
             measure=None
             if fabric is None or anatomy.kind in TAILORED
             else lambda trial, mesh, width: laid_flat(_surface_of(trial, anatomy, mesh, surface), fabric, width),
         )
         notes += more
-    cloth = (mirrored(cloth, anatomy) if even else None) or cloth
+    if even:
+        cloth, why = mirrored(cloth, anatomy)
     for name in list(cloth.seams):
         if not name.startswith(HAND) and options.forbids(name):
             cloth = cloth.without_seam(name)
@@ -201,9 +203,14 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
             )
         except InputError as reason:
             notes.append(f"no further seams were looked for: {reason}")
-        cloth = (mirrored(cloth, anatomy) if even else None) or cloth
+        if even:
+            cloth, why = mirrored(cloth, anatomy)
         if closed := sorted(basic - cloth.seams.keys()):
             notes.append(f"{', '.join(closed)} closed again: the cloth lies flat without, within its limit")
+    if why:
+        moved = f"both sides are averaged, but each is cut by itself, as {why}{'; ' if moved else ''}{moved}"
+    elif even and moved:
+        moved = f"both sides are averaged and cut alike: {moved}"
     price = {trial.name: trial for trial in trials}
     pieces = _as_surfaces(cloth, anatomy, surface)
     return FoundSeams(
@@ -220,7 +227,13 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         what=describe(anatomy),
         up=axis_name(anatomy.up),
         front=axis_name(anatomy.front),
-        notes=(*notes, *turned, *(() if anatomy.kind in TAILORED else _alike(pieces)), *anatomy.notes),
+        notes=(
+            *notes,
+            *turned,
+            *([moved] if moved else []),
+            *(() if anatomy.kind in TAILORED else _alike(pieces)),
+            *anatomy.notes,
+        ),
     )
 
 

@@ -256,7 +256,7 @@ def _cut(cloth: Cloth, mesh: PieceMesh, field: FloatArray, name: str, mirror: An
     made = replace(made, values=values, labels=labels)
     if mirror is not None:
         # Vertices that moved onto the line have moved alike on both sides.
-        made = mirrored(made, mirror) or made
+        made, _ = mirrored(made, mirror)
     return made if int(made.parts.max()) > int(cloth.parts.max()) else None
 
 

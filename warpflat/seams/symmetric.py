@@ -25,8 +25,14 @@ _MEAN, _FARTHEST = 0.01, 0.035
 _FADE = 0.05
 # A seam that keeps so near to the plane of symmetry is in it.
 _IN_PLANE = 0.008
-# What is mirrored has the area of what it was made from within this.
-_SAME_AREA = 0.02
+# Cloth that is so far from the plane, as a share of what is the farthest at its height, one of so many levels, is of its side.
+_FAR, _LEVELS = 0.5, 32
+# What is mirrored has the area of what it was made from within this: sides that lie as near as that to each other differ by wrinkles.
+_SAME_AREA = 0.05
+# Cloth that moves by less is not worth a word [m].
+_TOLD = 5e-4
+# The name of the field between the sides.
+_ACROSS = "across"
 
 
 def other_side(name: str) -> str:
@@ -34,19 +40,17 @@ def other_side(name: str) -> str:
     return re.sub(r"\b(left|right)\b", lambda word: "right" if word[0] == "left" else "left", name)
 
 
-def averaged(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> tuple[Cloth, list[str], bool]:
-    """Return the cloth with both sides moved half way to each other, a note on how far, and true; as it was where they differ too much.
+def averaged(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> tuple[Cloth, str, bool]:
+    """Return the cloth with both sides moved half way to each other, how far in words, and true; as it was where they differ too much.
 
     Borders move to the mirror images of borders: a sleeve that is longer by a centimetre becomes half a centimetre shorter.
     """
     mirror, normal, offset, size = anatomy.mirror, anatomy.normal, anatomy.offset, anatomy.size
     if mirror is None:
-        return cloth, [], False
-    apart = []
+        return cloth, "", False
+    apart = ""
     if anatomy.asymmetry > 1e-3:
-        apart = [
-            f"left and right differ by {1e3 * anatomy.asymmetry:.0f} mm in the middle: lines are averaged over both sides"
-        ]
+        apart = f"left and right differ by {1e3 * anatomy.asymmetry:.0f} mm in the middle: lines are averaged over both sides"
 
     def image(points: FloatArray) -> FloatArray:
         return np.asarray(points - 2.0 * (points @ normal - offset)[:, None] * normal)
@@ -75,13 +79,8 @@ def averaged(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> tuple[Clot
     if float(share @ away) > _MEAN * size or float(np.quantile(away, 0.99)) > _FARTHEST * size:
         return cloth, apart, False
     moved = 0.5 * away
-    if moved.max() < 5e-4:
-        return replace(cloth, vertices=vertices + 0.5 * gap), [], True
-    words = (
-        f"both sides are averaged and cut alike: the cloth moved by {1e3 * float(share @ moved):.1f} mm in the mean, "
-        f"{1e3 * moved.max():.0f} mm at most"
-    )
-    return replace(cloth, vertices=vertices + 0.5 * gap), [words], True
+    words = f"the cloth moved by {1e3 * float(share @ moved):.1f} mm in the mean, {1e3 * moved.max():.0f} mm at most"
+    return replace(cloth, vertices=vertices + 0.5 * gap), words if moved.max() >= _TOLD else "", True
 
 
 def _nearest_on_loop(loop: FloatArray, points: FloatArray) -> FloatArray:
@@ -93,30 +92,33 @@ def _nearest_on_loop(loop: FloatArray, points: FloatArray) -> FloatArray:
     return np.asarray(foot[np.arange(len(points)), nearest])
 
 
-def mirrored(cloth: Cloth, anatomy: Anatomy) -> Cloth | None:
-    """Return the left half of an averaged cloth with its seams, and its mirror image, vertex by vertex; None where that is another one.
+def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
+    """Return the left half of an averaged cloth with its seams, and its mirror image, vertex by vertex; else the cloth, and why.
 
-    It is another one where fronts overlap, a pocket lies on one side, or a seam has no counterpart.
+    The halves meet where a harmonic field between the sides is zero, which is one line even in folds and at a crotch; it moves into the
+    plane of symmetry, and the cloth beside it by less and less.
     """
-    if anatomy.mirror is None or any(other_side(name) not in cloth.seams for name in cloth.seams):
-        return None
-    normal, offset = anatomy.normal, anatomy.offset
-    across = cloth.vertices @ normal - offset
-    # What is off by rounding is in the plane.
-    across[np.abs(across) < 1e-6 * anatomy.size] = 0.0
-    for part in (part for edges in cloth.seams.values() for part in edge_components(edges)):
-        if np.abs(across[part]).max() < _IN_PLANE * anatomy.size:
-            across[part] = 0.0
-    vertices = cloth.vertices + (across - (cloth.vertices @ normal - offset))[:, None] * normal
-    split, left = replace(cloth, vertices=vertices, values={**cloth.values, "across": across}).split(
-        "across", np.ones(len(cloth.faces), dtype=bool)
+    if anatomy.mirror is None:
+        return cloth, "it has no plane of symmetry"
+    if lone := sorted(name for name in cloth.seams if other_side(name) not in cloth.seams):
+        return cloth, f"{lone[0]} is on one side alone"
+    normal, offset, size = anatomy.normal, anatomy.offset, anatomy.size
+    split, left = replace(cloth, values={**cloth.values, _ACROSS: _between_sides(cloth, anatomy)}).split(
+        _ACROSS, np.ones(len(cloth.faces), dtype=bool)
     )
+    if not left.any() or left.all():
+        return cloth, "one side has no cloth"
     used, place = np.unique(split.faces[left], return_inverse=True)
     faces = place.reshape(-1, 3).astype(np.int64)
     half = split.vertices[used]
-    height = np.where(split.values["across"][used] == 0.0, 0.0, half @ normal - offset)
+    height = half @ normal - offset
+    middle = np.flatnonzero(split.values[_ACROSS][used] == 0.0)
+    still = np.zeros(len(half))
+    moved = Operators(vertices=half, faces=faces).solve(middle, -height[middle], data=still, length=_FADE * size)
+    height = height + moved
+    height[middle] = 0.0
     half = half + (height - (half @ normal - offset))[:, None] * normal
-    off = np.flatnonzero(height != 0.0)
+    off = np.setdiff1d(np.arange(len(used)), middle)
     twin = np.arange(len(used))
     twin[off] = len(used) + np.arange(len(off))
     place_of = np.full(len(split.vertices), -1, dtype=np.int64)
@@ -135,7 +137,7 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> Cloth | None:
     values = {
         name: np.concatenate([value[used], (-1.0 if name == "left" else 1.0) * value[used][off]])
         for name, value in split.values.items()
-        if name != "across"
+        if name != _ACROSS
     }
     labels = {}
     for name, label in split.labels.items():
@@ -148,7 +150,46 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> Cloth | None:
         labels=labels,
         seams=seams,
     )
-    return made if _is_alike(made, cloth) else None
+    why = _unlike(made, cloth)
+    return (cloth, why) if why else (made, "")
+
+
+def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
+    """Return a harmonic field, #V: the distance from the plane of symmetry [m] far from it, and 0 along seams in the plane."""
+    operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    lateral = cloth.vertices @ anatomy.normal - anatomy.offset
+    heights = cloth.vertices @ anatomy.up
+    level = np.clip(
+        ((heights - heights.min()) / max(np.ptp(heights), 1e-300) * _LEVELS).astype(np.int64), 0, _LEVELS - 1
+    )
+    farthest = np.zeros(_LEVELS)
+    np.maximum.at(farthest, level, np.abs(lateral))
+    far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], _FADE * anatomy.size))
+    edges = cloth.half_edges.edges.astype(np.int64)
+    # Where edges lie in the plane but for rounding, and along seams that keep near to it.
+    exact = edges[(np.abs(lateral[edges]) < 1e-6 * anatomy.size).all(axis=1)]
+    parts = [part for line in (exact, *cloth.seams.values()) for part in edge_components(line)]
+    parts = [part for part in parts if np.abs(lateral[part]).max() < _IN_PLANE * anatomy.size]
+    while True:
+        inner = np.setdiff1d(np.concatenate([np.empty(0, dtype=np.int64), *(part.ravel() for part in parts)]), far)
+        fixed = np.concatenate([far, inner])
+        field = operators.solve(fixed, np.concatenate([lateral[far], np.zeros(len(inner))]))
+        # One that has the same side of the garment on both of its sides, is not in it.
+        between = [part for part in parts if _changes_sign(cloth, field, part)]
+        if len(between) == len(parts):
+            return field
+        parts = between
+
+
+def _changes_sign(cloth: Cloth, field: FloatArray, line: Ids) -> bool:
+    """Return whether a field (#V) has different signs on both sides of most of a line's edges (#E by 2)."""
+    he, stride = cloth.half_edges, np.int64(len(cloth.vertices))
+    own = np.sort(line, axis=1)
+    key = he.edges[:, 0] * stride + he.edges[:, 1]
+    beside = np.flatnonzero(np.isin(key, own[:, 0] * stride + own[:, 1])[he.edge])
+    third = cloth.faces[he.face[beside]].sum(axis=1) - he.tail[beside] - he.head[beside]
+    left, right = (np.unique(he.edge[beside[chosen]]) for chosen in (field[third] > 0.0, field[third] < 0.0))
+    return 2 * len(np.intersect1d(left, right)) > len(own)
 
 
 def _sleeve_mates(anatomy: Anatomy) -> dict[int, int]:
@@ -161,13 +202,13 @@ def _sleeve_mates(anatomy: Anatomy) -> dict[int, int]:
     }
 
 
-def _is_alike(made: Cloth, cloth: Cloth) -> bool:
-    """Return whether a cloth has the area, the borders, the seams and the pieces of another one."""
+def _unlike(made: Cloth, cloth: Cloth) -> str:
+    """Return in what a cloth differs from another one: in how its faces meet, its area, its borders and seams, or its pieces; or ""."""
     if (made.half_edges.count > 2).any():
-        return False
+        return "its halves meet at more than the middle"
     areas = [float(one.face_areas.sum()) for one in (made, cloth)]
     if abs(areas[0] - areas[1]) > _SAME_AREA * areas[1]:
-        return False
+        return "one side has more cloth than the other"
     shapes = []
     for one in (made, cloth):
         whole = len(one.borders()), euler_characteristic(one.faces.astype(np.int32))
@@ -176,4 +217,4 @@ def _is_alike(made: Cloth, cloth: Cloth) -> bool:
             for mesh in one.pieces()
         )
         shapes.append((whole, pieces))
-    return shapes[0] == shapes[1]
+    return "" if shapes[0] == shapes[1] else "one side has openings, seams or pieces that the other has not"

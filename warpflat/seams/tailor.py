@@ -311,8 +311,15 @@ def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = Fal
     """
     cloth, part = fields.cloth, fields.cloth.parts
     label = np.full(len(cloth.faces), -1, dtype=np.int64)
+    whole = np.bincount(part, cloth.face_areas)
     for number, (name, limb) in enumerate(fields.sleeves.items()):
-        own = np.isin(part, part[np.isin(cloth.faces, anatomy.borders[limb.border].vertices).any(axis=1)])
+        rim = anatomy.borders[limb.border].vertices
+        if anywhere:
+            # Parts that lie outside of the armhole, most of them: a cuff does, and the sleeve above it.
+            beyond = _reached(cloth.faces, cloth.values[name] > 0.0, rim)[cloth.faces].mean(axis=1) * cloth.face_areas
+            own = (np.bincount(part, beyond) > 0.5 * whole)[part]
+        else:
+            own = np.isin(part, part[np.isin(cloth.faces, rim).any(axis=1)])
         line = np.intersect1d(cloth.faces[own], cloth.faces[~own])
         others = [b for k, b in enumerate(anatomy.borders) if k != limb.border and b.role != "hole"]
         most = max((float(np.isin(border.vertices, cloth.faces[own]).mean()) for border in others), default=0.0)
