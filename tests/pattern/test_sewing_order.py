@@ -84,8 +84,8 @@ def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
             "facings": "Sew the facings to their edges",
             "linings": "(centre back of the lining: back right lining to back left lining, open beside the zip)",
             "at the zip": "At the zip, turn in the edges and sew them to its tape by hand: back right neck right facing",
-            "ends": "Join the ends of bands and bindings",
             "baste": "Baste the lining to the shell, wrong sides together: armhole (front lining",
+            "ends": "Join the ends of bands and bindings",
             "bind": "Sew the bindings on, right sides together, notch to notch",
             "hems": "Turn up and sew the hems: 3 cm (front, back right, back left)",
         }.items()

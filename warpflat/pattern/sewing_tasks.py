@@ -114,6 +114,7 @@ class SewingTasks:
         drafted, pieces, titles: the pieces by name, and what they are called.
         order: the edges of each piece in their order.
         seams: of the garment.
+        above: the half that lies above where it buttons, "right" or "left".
         lengths: of both sides of each seam [mm].
         tasks: each seam with its mirror images, and each finishing; every free edge is used up by one of them.
     """
@@ -125,6 +126,7 @@ class SewingTasks:
         self.pieces = {piece.name: piece for piece in garment.garment.pieces[size]}
         self.titles = piece_titles(list(self.pieces.values()))
         self.seams = garment.garment.seams
+        self.above = "right" if garment.garment.worn is None else garment.garment.worn.buttonholes
         self.order = {name: [edge.name for edge in piece.edges] for name, piece in self.pieces.items()}
         self.lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
         self.tasks = [Task(technique=self._technique(group), seams=group) for group in _mirror_groups(self.seams)]
@@ -286,7 +288,7 @@ class SewingTasks:
         add("strap", straps, of(straps))
         plackets = [name for name in loose if role[name] == "placket"]
         buttoned = [name for name in plackets if "button" in self.pieces[name].marks]
-        add("neck_placket", buttoned, of(buttoned), strip=translate("right strip"))
+        add("neck_placket", buttoned, of(buttoned), strip=translate(f"{self.above} strip"))
         slits = [name for name in plackets if name not in buttoned]
         add("bound_slit", slits, of(slits))
         fly = [name for name in role if role[name] == "fly"]
@@ -413,6 +415,7 @@ class SewingTasks:
                     "all along" if opening.whole else where, begin=length_words(opening.begin, self.units)
                 ),
                 "below": "" if opening.whole else translate(closed),
+                "front": translate(f"{self.above} front"),
             }
         ended = [piece for piece in drafted if _buttons_at_one_end(piece)]
         counts: dict[str, list[DraftedPiece]] = {}
@@ -426,7 +429,7 @@ class SewingTasks:
             if holes:
                 length = length_words(polyline_length(holes[0]), self.units)
                 words += translate(", for buttonholes of {length}", length=length)
-            values = {"count": count, "half": translate("right half")}
+            values = {"count": count, "half": translate(f"{self.above} half")}
             self.tasks.append(
                 Task(technique="buttonholes", pieces=[p.name for p in pieces], values=values, notions=[words])
             )
