@@ -2,6 +2,9 @@
 
     WARPFLAT_DATA=DIR python benchmarks/goldens.py [--only NAME ...] [--jobs 2]     compare with benchmarks/goldens.json.gz
     WARPFLAT_DATA=DIR python benchmarks/goldens.py --record FILE [--only NAME ...]  record; cases that FILE has besides stay
+    WARPFLAT_DATA=DIR python benchmarks/goldens.py --rounding 1 2 3                 compare runs that round as other processors might
+
+With `--rounding` each case runs once for each seed, under the noise of `tests/rounding.py`; its name is followed by the seed.
 
 Cases: every scene and the batch, as commands; the meshes of WARPFLAT_DATA, flattened in an isotropic and in a woven cloth; its
 bodies, as mannequins; twelve scripts. Each is a process of its own on one thread. Columns: model energy before and after, its
@@ -44,6 +47,10 @@ import shapely
 from scipy.optimize import least_squares
 
 import warpflat
+
+ROUNDING = Path(__file__).parents[1] / "tests" / "rounding.py"
+sys.path.insert(0, str(ROUNDING.parent))
+from rounding import disturb  # noqa: E402
 
 RECORD = Path(__file__).with_suffix(".json.gz")
 SCENES = Path(__file__).parents[1] / "scenes"
@@ -106,11 +113,19 @@ def folder_record(folder: Path) -> Record:
     return {"pieces": pieces, "together": "sewing" in metrics, "lengths": lengths, "numbers": {}}
 
 
-def command(arguments: Sequence[str], folder: Path) -> Record:
-    """Run a command of the program into a new folder, and return the record of all that it leaves there."""
+def command(arguments: Sequence[str], folder: Path, *, seed: int | None) -> Record:
+    """Run a command of the program into a new folder, and return the record of all that it leaves there.
+
+    Args:
+        arguments: of the command.
+        folder: an empty one.
+        seed: of rounding noise, if there is any.
+    """
     out = folder / "out"
-    asked = [sys.executable, "-m", "warpflat", *arguments, "--out", str(out), "-q"]
-    run = subprocess.run(asked, capture_output=True, text=True)
+    program = ["-m", "warpflat"] if seed is None else [str(ROUNDING), str(seed)]
+    run = subprocess.run(
+        [sys.executable, *program, *arguments, "--out", str(out), "-q"], capture_output=True, text=True
+    )
     record: Record = {"code": run.returncode, "runs": {}, "files": []}
     if run.returncode not in (0, 1):
         words = run.stderr.strip().rpartition("\n")[2].split(" ")
@@ -127,7 +142,7 @@ def command(arguments: Sequence[str], folder: Path) -> Record:
     return record
 
 
-def flatten_mesh(mesh: Path, fabric: str, folder: Path) -> Record:
+def flatten_mesh(mesh: Path, fabric: str, folder: Path, *, seed: int | None) -> Record:
     """Flatten all pieces of a mesh. The suits are in decimetres, which is no unit of the program."""
     if "suit" in mesh.name:
         rows = [line.split() for line in mesh.read_text(encoding="utf-8").splitlines()]
@@ -136,7 +151,7 @@ def flatten_mesh(mesh: Path, fabric: str, folder: Path) -> Record:
         mesh.write_text("".join(f"{' '.join(row)}\n" for row in rows), encoding="utf-8")
     units = [] if mesh.suffix == ".usd" else ["--units", "m"]
     how = ["--component", "all", "--fabric", fabric, "--frames", "0", "--no-picture"]
-    return command(["flatten", str(mesh), *units, *how], folder)
+    return command(["flatten", str(mesh), *units, *how], folder, seed=seed)
 
 
 def flat_bodice(resolution: int = 33) -> warpflat.Flattening:
@@ -270,13 +285,15 @@ SCRIPTS = (
 )  # fmt: skip
 
 
-def all_cases() -> dict[str, Callable[[Path], Record]]:
-    """Return the cases by name, without those that need WARPFLAT_DATA where that is not set."""
+def all_cases(seed: int | None) -> dict[str, Callable[[Path], Record]]:
+    """Return the cases by name, without those that need WARPFLAT_DATA where that is not set; commands have the noise of a seed."""
     cases: dict[str, Callable[[Path], Record]] = {}
     for scene in sorted(SCENES.glob("*.toml")):
         text = scene.read_text(encoding="utf-8")
         if DATA or "${WARPFLAT_DATA}" not in text:
-            cases[f"scene {scene.stem}"] = partial(command, ["batch" if "\nscenes = [" in text else "run", str(scene)])
+            cases[f"scene {scene.stem}"] = partial(
+                command, ["batch" if "\nscenes = [" in text else "run", str(scene)], seed=seed
+            )
     for make in SCRIPTS:
         cases[f"script {make.__name__}"] = lambda folder, make=make: {
             "code": 0,
@@ -286,17 +303,19 @@ def all_cases() -> dict[str, Callable[[Path], Record]]:
     meshes = [*Path(DATA).glob("*.obj"), *(Path(DATA) / "garments").iterdir()] if DATA else []
     for mesh in sorted(path for path in meshes if path.stem not in SLOW):
         if mesh.stem.startswith("body_"):
-            cases[f"scan {mesh.stem}"] = partial(command, ["mannequin", "--scan", str(mesh)])
+            cases[f"scan {mesh.stem}"] = partial(command, ["mannequin", "--scan", str(mesh)], seed=seed)
         else:
             for fabric in ("isotropic", "woven"):
-                cases[f"mesh {mesh.stem} {fabric}"] = partial(flatten_mesh, mesh, fabric)
+                cases[f"mesh {mesh.stem} {fabric}"] = partial(flatten_mesh, mesh, fabric, seed=seed)
     return cases
 
 
-def run_case(name: str) -> Record:
-    """Run a case in a process of its own."""
+def run_case(name: str, seed: int | None) -> Record:
+    """Run a case in a process of its own, under the noise of a seed if one is given."""
     setting = {**os.environ, "WARPFLAT_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    run = subprocess.run([sys.executable, __file__, "--one", name], capture_output=True, text=True, env=setting)
+    noise = [] if seed is None else ["--rounding", str(seed)]
+    asked = [sys.executable, __file__, "--one", name, *noise]
+    run = subprocess.run(asked, capture_output=True, text=True, env=setting)
     last = (run.stderr if run.returncode else run.stdout).strip().rpartition("\n")[2]
     failed = {"code": run.returncode, "runs": {}, "files": [], "seconds": 0.0, "message": last}
     return failed if run.returncode else json.loads(last)
@@ -373,10 +392,15 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--list", action="store_true", help="name the cases")
     parser.add_argument("--record", type=Path, metavar="FILE.json.gz", help="write a record instead")
+    parser.add_argument(
+        "--rounding", nargs="+", type=int, default=[None], metavar="SEED", help="seeds of rounding noise"
+    )
     parser.add_argument("--one", metavar="CASE", help=argparse.SUPPRESS)
     chosen = parser.parse_args()
-    cases = all_cases()
+    cases = all_cases(chosen.rounding[0])
     if chosen.one:
+        if chosen.rounding[0] is not None:
+            disturb(chosen.rounding[0])
         with tempfile.TemporaryDirectory() as folder:
             record = cases[chosen.one](Path(folder))
         print(json.dumps({**record, "seconds": round(sum(os.times()[:4]), 1)}))
@@ -396,9 +420,10 @@ def main() -> None:
         print(f"{'case':36} {columns} {'s':>11}", flush=True)
     faults = 0
     with ThreadPoolExecutor(chosen.jobs) as pool:
-        running = {pool.submit(run_case, name): name for name in names}
+        running = {pool.submit(run_case, name, seed): (name, seed) for name in names for seed in chosen.rounding}
         for ended in as_completed(running):
-            name, record = running[ended], ended.result()
+            (name, seed), record = running[ended], ended.result()
+            title = name if seed is None else f"{name}, {seed}"
             told = record.get("message", "")
             if chosen.record:
                 golden[name] = record
@@ -413,7 +438,7 @@ def main() -> None:
             faults += any(word.isupper() for word in row["words"])
             told += "".join(f"; {word}: {', '.join(row[word][:5])}" for word in ("lost", "new") if row[word])
             print(
-                f"{name:36} {row['energies'][0]:10.4g} {row['energies'][1]:10.4g} {row['ratio']:8.5f} {row['strain']:8.5f} "
+                f"{title:36} {row['energies'][0]:10.4g} {row['energies'][1]:10.4g} {row['ratio']:8.5f} {row['strain']:8.5f} "
                 f"{row['outline']:10.3f} {row['length']:9.3f} -{len(row['lost'])} +{len(row['new'])} "
                 f"{golden[name]['seconds']:5.1f} {record['seconds']:5.1f}  {' '.join(row['words']) or 'equal'}  {told}",
                 flush=True,
@@ -421,7 +446,7 @@ def main() -> None:
     if not chosen.record:
         absent = [name for name in golden if name not in cases]
         print(
-            f"{len(names)} cases, {faults} with faults"
+            f"{len(running)} cases, {faults} with faults"
             + (f"; cannot be run here: {', '.join(absent)}" if absent else "")
         )
         sys.exit(faults > 0)

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from command import Command, command_in
+from rounding import disturb
 
 from warpflat.core.errors import InputError
 from warpflat.core.usd_process import UNREADABLE
@@ -28,6 +29,17 @@ sys.dont_write_bytecode = False
 # A shell lets what it starts in the background ignore Ctrl-C, and the programs that tests start would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option of rounding noise."""
+    parser.addoption("--rounding", type=int, metavar="SEED", help="round as another processor might, see rounding.py")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Disturb what is computed, if asked for."""
+    if (seed := config.getoption("rounding")) is not None:
+        disturb(seed)
 
 
 @pytest.fixture(autouse=True, scope="module")

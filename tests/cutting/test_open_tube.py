@@ -84,4 +84,5 @@ def test_a_piece_with_three_borders_is_cut_twice():
     assert len(tube_borders(surface)) == 2
     opened = warpflat.open_tube(surface)
     assert len(border_loops(opened.faces)) == 1
-    assert {"opening.left", "opening 2.left"} <= set(opened.lines)
+    # Either side may be parted where the second opening begins.
+    assert {name.partition(".")[0] for name in opened.lines} == {"opening", "opening 2"}

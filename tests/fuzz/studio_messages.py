@@ -188,13 +188,13 @@ class Studio:
         self.names = {"localhost", "127.0.0.1", "::1"}
         self.host, self.port = host, self.page.server.get_port()
         self.token = self.page.url.rstrip("/").rpartition("/")[2]
-        self._wait(lambda: self.page.is_idle and self.page.session.solution is not None)
+        self.wait(lambda: self.page.is_idle and self.page.session.solution is not None)
 
     def state(self) -> tuple[object, ...]:
         """What no refused act may change."""
         session = self.page.session
         files = {path: path.read_bytes() for path in self.folder.rglob("*") if path.is_file()}
-        parts = {uuid: part.value for uuid, part in self._parts().items()}
+        parts = {uuid: part.value for uuid, part in self.parts().items()}
         return session.scene.settings, session.can_undo, session.can_redo, session.preview, session.saved, parts, files
 
     def ask(self, request: str) -> bool:
@@ -248,7 +248,7 @@ class Studio:
                 went_on = self._mark(page)
             except ConnectionClosed:
                 went_on = False
-            self._wait(lambda: went_on or any("cut off" in line for line in self.told[first:]))
+            self.wait(lambda: went_on or any("cut off" in line for line in self.told[first:]))
             self._come_to_rest()
         told = [line for line in self.told[first:] if "'mark " not in line]
         assert not any("fault of the program" in line for line in told), f"{told} after {messages!r:.500}"
@@ -284,7 +284,7 @@ class Studio:
         """Wait until all that was said before in a connection has been heard; return whether it is open still."""
         self._marks += 1
         page.send(self._encoded({"type": f"mark {self._marks}"}))
-        self._wait(lambda: page.close_code is not None or f"'mark {self._marks}'" in "".join(self.told[-20:]))
+        self.wait(lambda: page.close_code is not None or f"'mark {self._marks}'" in "".join(self.told[-20:]))
         return page.close_code is None
 
     def _come_to_rest(self) -> None:
@@ -292,17 +292,19 @@ class Studio:
         loop = self.page.server._event_loop
         for _ in range(3):  # a message is handled by a task, which may begin another
             asyncio.run_coroutine_threadsafe(asyncio.sleep(0.0), loop).result(10.0)
-        self._wait(lambda: all(act.done() for act in self._acts))
+        self.wait(lambda: all(act.done() for act in self._acts))
         self._acts.clear()
-        self._wait(lambda: self.page.is_idle)
+        self.wait(lambda: self.page.is_idle)
 
-    def _wait(self, what: Any) -> None:
+    def wait(self, what: Any) -> None:
+        """Wait until something is so, for half a minute."""
         end = time.monotonic() + 30.0
         while not what():
             assert time.monotonic() < end, "the studio does not go on"
             time.sleep(0.002)
 
-    def _parts(self) -> dict[str, Any]:
+    def parts(self) -> dict[str, Any]:
+        """Return the parts of the panel."""
         return dict(self.page.server.gui._gui_input_handle_from_uuid)
 
     def _filled(self, text: str) -> str:
@@ -315,7 +317,7 @@ class Studio:
             ("protocol", f"viser-v{viser.__version__}"),
         ):
             text = text.replace(f"@{word}@", value)
-        uuids = {part.label: uuid for uuid, part in self._parts().items()}
+        uuids = {part.label: uuid for uuid, part in self.parts().items()}
         return re.sub(r"@part:([^@]*)@", lambda found: uuids.get(found[1], found[1]), text)
 
     def _encoded(self, message: Any) -> bytes:

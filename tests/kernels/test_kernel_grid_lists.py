@@ -20,5 +20,5 @@ def test_rows_are_laid_out_at_their_arc_lengths_from_a_column(column: int, side:
     launch_each(lay_profiles, rows, [vertices, grid, column, side, station], [position], least=1)
     steps = np.linalg.norm(np.diff(vertices[grid], axis=1), axis=2)
     arc = np.concatenate([np.zeros((rows, 1)), np.cumsum(steps, axis=1)], axis=1)
-    np.testing.assert_allclose(position[grid, 0], side * (arc - arc[:, [column]]), atol=1e-14)
+    np.testing.assert_allclose(position[grid, 0], side * (arc - arc[:, [column]]), atol=1e-12)
     np.testing.assert_array_equal(position[grid, 1], np.broadcast_to(station[:, None], (rows, columns)))

@@ -140,7 +140,7 @@ def test_stopping_gives_what_forces_at_rest_are():
     moving.stop()
     still = Launched(network, shaken(network, scale=0.8)).evaluate_guard().gather_forces()
     for name in ("velocity", "force", "driving_force", "first_guess", "stiffness"):
-        np.testing.assert_allclose(moving[name], still[name], rtol=1e-12, atol=1e-15, err_msg=name)
+        np.testing.assert_allclose(moving[name], still[name], rtol=1e-12, atol=1e-12, err_msg=name)
 
 
 def test_a_vertex_of_a_mirrored_cell_stays():

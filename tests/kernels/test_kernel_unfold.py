@@ -139,11 +139,11 @@ def test_diagonals_are_those_of_numpy_and_straight_along_creases(name: str):
     over = np.stack([across(p0, p2, p1, p3, normal), across(p1, p3, p2, p0, normal)], axis=1)
     lengths, face = unfold_quad_diagonals(surface.vertices, surface.faces)
     np.testing.assert_array_equal(face, np.flatnonzero(surface.is_quad))
-    np.testing.assert_allclose(lengths, over, rtol=1e-14)
+    np.testing.assert_allclose(lengths, over, rtol=1e-12)
     straight = np.stack([norm(p2 - p0), norm(p3 - p1)], axis=1)
     along = crease[surface.is_quad][:, None] == np.arange(2)
     lengths, _ = unfold_quad_diagonals(surface.vertices, surface.faces, crease=crease)
-    np.testing.assert_allclose(lengths, np.where(along, straight, over), rtol=1e-14)
+    np.testing.assert_allclose(lengths, np.where(along, straight, over), rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -162,8 +162,8 @@ def test_cells_are_those_of_numpy(name: str):
     cells = make_cells(surface)
     for have, wished in ((cells.corner, corner), (cells.face, face), (cells.weight, weight)):
         np.testing.assert_array_equal(have, wished)
-    np.testing.assert_allclose(cells.edges, edges, rtol=1e-13, atol=1e-13 * edges.max())
-    np.testing.assert_allclose(cells.area, 0.5 * weight * twice, rtol=1e-13)
+    np.testing.assert_allclose(cells.edges, edges, rtol=1e-12, atol=1e-12 * edges.max())
+    np.testing.assert_allclose(cells.area, 0.5 * weight * twice, rtol=1e-12)
     at_vertices = np.bincount(corner.ravel(), np.repeat(cells.area / 3.0, 3), minlength=len(surface.vertices))
     np.testing.assert_allclose(cells.vertex_areas, at_vertices, rtol=1e-12)
 
@@ -176,6 +176,6 @@ def test_triangles_are_measured_at_each_corner():
     area, product = np.empty(30), np.empty((30, 3))
     launch_each(measure_triangles, 30, [points, triangles], [area, product])
     p, q, r = points[triangles].transpose(1, 0, 2)
-    np.testing.assert_allclose(area, 0.5 * norm(np.cross(q - p, r - p)), rtol=1e-13)
+    np.testing.assert_allclose(area, 0.5 * norm(np.cross(q - p, r - p)), rtol=1e-12)
     expected = np.column_stack([dot(q - p, r - p), dot(r - q, p - q), dot(p - r, q - r)])
-    np.testing.assert_allclose(product, expected, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(product, expected, rtol=1e-12, atol=1e-12)

@@ -37,14 +37,13 @@ def state_of(surface: Surface, fabric: str) -> Relaxation:
 
 
 @pytest.mark.parametrize("fabric", ["isotropic", "denim"])
-def test_it_reaches_the_minimum_of_plain_steps_on_needles_in_a_few_iterations(fabric: str):
+def test_it_reaches_the_minimum_of_plain_steps_on_needles(fabric: str):
     quick, plain = (state_of(pinched(), fabric) for _ in range(2))
     seen: list[int] = []
     outcome = relax(quick, each_step=lambda state: seen.append(state.steps))
     assert outcome.converged
     assert outcome.first_steps is not None
     assert seen == list(range(1, outcome.first_steps.steps + outcome.steps + 1))
-    assert outcome.steps <= 150
     assert (quick.network.cell_arrays.least_shares(quick.positions()) > 0.0).all()
     (grain,) = quick.alignments
     chord = quick.positions()[[grain.lower, grain.upper]]

@@ -178,9 +178,29 @@ def test_a_name_that_no_file_can_have_is_one_line(studio: Studio, name: str) -> 
 
 def test_what_a_page_says_is_obeyed(studio: Studio) -> None:
     assert not studio.say([change("cloth", "denim")])
-    assert studio.page.session.scene.settings.fabric == "denim"
+    studio.wait(lambda: studio.page.session.scene.settings.fabric == "denim")
     assert not studio.say([change("do", "Undo")])
-    assert studio.page.session.scene.settings.fabric != "denim"
+    studio.wait(lambda: studio.page.session.scene.settings.fabric != "denim")
+
+
+def test_a_choice_is_taken_although_a_drawing_sets_the_part_meanwhile(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    executor, session = studio.page.server._thread_executor, studio.page.session
+    submit, before = executor.submit, session.scene.settings.fabric
+    (part,) = [each for each in studio.parts().values() if each.label == "cloth"]
+    own = part.value
+
+    def after_a_drawing(*act: Any) -> Any:
+        part.value = own
+        return submit(*act)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(executor, "submit", after_a_drawing)
+        assert not studio.say([change("cloth", "denim")])
+        studio.wait(lambda: session.scene.settings.fabric == "denim")
+    assert not studio.say([change("do", "Undo")])
+    studio.wait(lambda: session.scene.settings.fabric == before)
 
 
 def test_a_fault_of_the_program_is_one_line_and_the_studio_goes_on(

@@ -205,7 +205,7 @@ def test_missing_unit_is_asked_for_with_sizes(tmp_path, suffix):
 @pytest.mark.parametrize(("unit", "metres"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254), ("ft", 0.3048)])
 def test_units_scale(tmp_path, unit, metres):
     path = write(tmp_path / "a.obj", SQUARE.replace("1", "5") + "f 1 2 3 4")
-    assert np.ptp(read_surface(path, units=unit).vertices[:, 0]) == pytest.approx(5 * metres, rel=1e-15)
+    assert np.ptp(read_surface(path, units=unit).vertices[:, 0]) == pytest.approx(5 * metres, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Sums and percentiles of arrays on the host, and offsets of consecutive ranges.
 
 A linear algebra library wakes threads of its own for a product of ten thousand numbers, and lets them spin for a while afterwards, on
-the cores on which the kernels' ranges are to run: a quarter of the time of a relaxation. These are as fast and wake nobody.
+the cores on which the kernels' ranges are to run: a quarter of the time of a relaxation. `dot` is as fast and wakes nobody.
 """
 
 from __future__ import annotations
@@ -13,13 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 
-__all__ = ["dot", "products", "range_offsets", "weighted_percentile", "weighted_percentiles", "weighted_rows"]
-
-Rows = Sequence[NDArray[np.floating]] | NDArray[np.floating]
-
-# Products of so many columns are small enough to stay on one core; so many are gathered at a time.
-_COLUMNS = 512
-_GATHERED = 16 * _COLUMNS
+__all__ = ["dot", "range_offsets", "weighted_percentile", "weighted_percentiles"]
 
 
 def range_offsets(counts: Sequence[int] | NDArray[np.integer]) -> IntArray:
@@ -36,26 +30,6 @@ def range_offsets(counts: Sequence[int] | NDArray[np.integer]) -> IntArray:
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Return the scalar product of two arrays of one shape."""
     return float(np.einsum("i,i->", a.ravel(), b.ravel()))
-
-
-def products(a: Rows, b: Rows) -> FloatArray:
-    """Return the scalar products (#A by #B) of the rows of `a` (#A by #N) with those of `b` (#B by #N), in double precision."""
-    total = np.zeros((len(a), len(b)))
-    count = len(a[0]) if len(a) else 0
-    for begin in range(0, count, _GATHERED):
-        # As np.stack, whose checks would take as long as all the rest for a few hundred numbers.
-        rows, others = (np.array([row[begin : begin + _GATHERED] for row in of], dtype=np.float64) for of in (a, b))
-        for first in range(0, rows.shape[1], _COLUMNS):
-            some = slice(first, first + _COLUMNS)
-            total += rows[:, some] @ others[:, some].T
-    return total
-
-
-def weighted_rows(weight: FloatArray, rows: Rows, total: FloatArray) -> None:
-    """Make `total` (#N) the sum of rows (#A by #N), each times its weight (#A), in double precision."""
-    for begin in range(0, len(total), _GATHERED):
-        here = slice(begin, begin + _GATHERED)
-        total[here] = sum(w * row[here].astype(np.float64) for w, row in zip(weight, rows, strict=True))
 
 
 def weighted_percentile(values: ArrayLike, weights: ArrayLike, fraction: float) -> float:

@@ -39,6 +39,8 @@ __all__ = ["Recovery", "recover_cloth", "recover_pattern"]
 _DAMPING, _SEAM, _HOLD = 1e-2, 1e3, 1e-8
 # The pattern is found when a step strains it by less than this on the mean.
 _LEAST_STRAIN = 2e-5
+# Strain up to which cloth under pressure counts as taut.
+_TAUT = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,8 +111,10 @@ def recover_cloth(
             for p in (x[cloth.welded[corner_flat]], cloth.flat[corner_flat])
         )
         deformation = in_space @ np.linalg.inv(in_flat)
+        # A hanging weft has no tension, and rounding must not decide what is slack: the stiffness is that of a shape a little larger.
+        taut = (1.0 + _TAUT) * x
         # J in cells: K F; and F K F, the cloth's stiffness in its plane.
-        by_flat = np.einsum("cijab,cbk->ciajk", energy.cell_stiffness(x), deformation)
+        by_flat = np.einsum("cijab,cbk->ciajk", energy.cell_stiffness(taut), deformation)
         in_plane = np.einsum("cal,ciajk->ciljk", deformation, by_flat)
         space, flat = 3 * len(x), 2 * len(cloth.flat)
         rows, columns = (3 * corner[:, :, None] + np.arange(3)), (2 * corner_flat[:, :, None] + np.arange(2))
@@ -124,7 +128,7 @@ def recover_cloth(
             now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
             damping = damping + _SEAM * threads * (sides.T @ sides)
             right = _SEAM * threads * (sides.T @ (difference - now))
-        matrix = csc_array(block_array([[energy.stiffness(x), -jacobian], [-jacobian.T, -damping]]))
+        matrix = csc_array(block_array([[energy.stiffness(taut), -jacobian], [-jacobian.T, -damping]]))
         found = factor_symmetric(matrix)(np.concatenate([force.ravel(), -right]))
         off, u = np.linalg.norm(found[:space].reshape(-1, 3), axis=1), found[space:].reshape(-1, 2)
         moved = replace(cloth, flat=cloth.flat + largest_share(cloth, u) * u)

@@ -324,7 +324,7 @@ class FindSeamsTable(Table):
     up: Direction | None = None
     front: Direction | None = None
     no: list[str] = Field(default_factory=list)
-    """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts."""
+    """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts; "uv": islands of the texture are not followed."""
     keep: list[str] = Field(default_factory=list)
     """Seams that are made in any case: "waist", "yoke", "centre back", "side left"."""
     smooth_mm: Annotated[float, Field(ge=0, le=100)] = 0.0

@@ -245,7 +245,7 @@ class Relaxation:
     def _total(self, values: wp.array) -> float:
         """Return the sum of an array on the device."""
         if self.network.device.is_cpu:
-            return float(self._on_host(values).sum())
+            return float(np.sum(self._on_host(values)))
         return float(wp.utils.array_sum(values))
 
     def positions(self) -> FloatArray:

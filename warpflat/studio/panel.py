@@ -210,9 +210,11 @@ def _chosen(handle: Any, act: Callable[[Any], None]) -> None:
     """Call `act` with the value when somebody has chosen it on a page; a value that the program sets calls nothing."""
 
     @handle.on_update
-    def _(event: Any) -> None:
-        if event.client_id is not None and event.target.value not in (_OWN,):
-            act(event.target.value)
+    async def _(event: Any) -> None:
+        # Taken at once: a drawing that is under way sets all parts to what the scene still has.
+        value = event.target.value
+        if event.client_id is not None and value not in (_OWN,):
+            handle._impl.gui_api._thread_executor.submit(act, value)
 
 
 def _one_of(value: Any, options: Sequence[str]) -> str:
