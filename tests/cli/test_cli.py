@@ -271,7 +271,7 @@ def test_a_pattern_is_exported_from_its_folder_or_its_file(command: Command):
     assert command("export", "out/pattern.json", "--format", "svg")[:2] == (0, "out: cap.svg\n")
     assert Path("out/cap.svg").exists()
     told = command("export", "out/cap.obj", "--format", "svg").refusal
-    assert told == "out/cap.obj: is a file; give the folder of a run, where its pattern.json lies"
+    assert told == "out/cap.obj: is a mesh, not a pattern: warpflat flatten reads it"
 
 
 def test_a_tube_is_cut_open_with_a_note_and_a_line_of_ones_own_is_checked(command: Command):
@@ -293,10 +293,10 @@ def test_noise_in_any_format_is_refused(command: Command, suffix: str, content: 
 def test_paths_that_are_no_mesh(command: Command):
     Path("folder.obj").mkdir()
     Path("cloth.obj").write_text(SQUARE)
-    Path("cloth.xyz").write_text(SQUARE)
+    Path("cloth.shape").write_text(SQUARE)
     assert "folder" in command("flatten", "folder.obj", "--units", "m").refusal
     assert "absent.obj" in command("flatten", "absent.obj", "--units", "m").refusal
-    assert ".obj" in command("flatten", "cloth.xyz", "--units", "m").refusal
+    assert ".obj" in command("flatten", "cloth.shape", "--units", "m").refusal
     assert "is a directory" in command("run", "folder.obj").refusal
     assert "no such file" in command("run", "absent.toml").refusal
     assert "did you mean" in command("run", "cloth.obj".replace("o.", "ob.").replace("cloth", "clotj")).refusal

@@ -347,10 +347,10 @@ def foreign_cases_of_file(kind: str, content: bytes, *, name: str = "odd", refus
         drape = ("drape", file, "--body", "EU 38", "--out", "worn", "--quiet")
         return [case(drape, {file: content}, file)]
     listed = case(("drape", file, "--edges"), {file: content}, file)
-    if kind == "garmentcode":
-        formats = ("--format", "svg", "--format", "dxf", "--format", "json")
-        return [listed, case(("export", file, *formats, "--quiet"), {file: content}, file)]
-    return [listed]
+    formats = ("--format", "svg", "--format", "dxf", "--format", "json")
+    exported = case(("export", file, *formats, "--quiet"), {file: content}, file)
+    laid = case(("marker", file, "--seconds", "1", "--quiet"), {file: content}, file)
+    return [listed, listed, exported, laid]
 
 
 def foreign_bounds() -> Iterator[Case]:

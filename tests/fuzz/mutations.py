@@ -17,6 +17,7 @@ from typing import Any
 import click
 
 from . import seeds, studio_messages
+from .composed_files import COMPOSED_SHARES, composed_case
 from .foreign_files import FOREIGN_SHARES, foreign_case
 from .geometry import GEOMETRY_SHARES, geometry_case
 from .promise import Case
@@ -297,6 +298,8 @@ def random_case(kind: str, random: Random) -> Case:
         from .folders import random_folder
 
         return random_folder(kind, random)
+    if kind in COMPOSED_SHARES:
+        return composed_case(kind, random)
     if kind in FOREIGN_SHARES:
         return foreign_case(kind, random)
     if kind == "arguments":
@@ -325,7 +328,7 @@ def random_case(kind: str, random: Random) -> Case:
 SHARES = {
     "obj": 9, "ply": 10, "stl": 6, "off": 7, "glb": 6, "gltf": 6, "usda": 6, "usdc": 7, "usdz": 3, "scene": 12, "fabric": 9, "pattern": 11,
     "metrics": 4, "scan": 1, "fit": 4, "sewn": 4, "arguments": 12, "batch": 6, "result": 4, "folder": 6,
-    **GEOMETRY_SHARES, **FOREIGN_SHARES,
+    **GEOMETRY_SHARES, **FOREIGN_SHARES, **COMPOSED_SHARES,
 }  # fmt: skip
 """How many of a hundred cases, or so, are of which kind: few where one takes seconds."""
 if find_spec("viser") is not None:  # the extra `studio`

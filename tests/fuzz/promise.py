@@ -66,6 +66,8 @@ class Case:
     """Symbolic links beside the files, each with its target."""
     says: str = ""
     """What must be printed."""
+    names: tuple[str, ...] = ()
+    """What must be printed, too: the pieces that were drawn."""
     refused: bool | None = None
     """Whether it must be refused, or must not; None where either is right."""
     seconds: float = 20.0
@@ -190,8 +192,9 @@ def _broken(
         return "done, but a line on standard error is not ours"
     elif files := _broken_files(case, here, before, after):
         return files
-    if case.says not in ended.stdout + ended.stderr:
-        return f"does not say {case.says}"
+    for words in (case.says, *case.names):
+        if words not in ended.stdout + ended.stderr:
+            return f"does not say {words}"
     if case.refused is not None and case.refused != (ended.code == 2) and not stopped:
         return "accepted" if case.refused else "refused"
     return ""

@@ -522,7 +522,7 @@ def test_another_size_that_went_wrong_is_a_warning(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "cannot be read as JSON"),
+        ("{", "is no JSON"),
         ("[]", "no pattern of warpflat"),
         ('{"sizes": {}, "schema": 99}', "has schema 99"),
         ('{"sizes": {}, "schema": 1}', "name: is missing"),

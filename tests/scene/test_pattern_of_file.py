@@ -211,7 +211,6 @@ def test_curves_keep_their_lengths_through_a_coarse_mesh(tmp_path: Path):
 REFUSED = {
     "no texture": r"no texture coordinates",
     "normalised": r"no pattern of true size: in \w+, the nearest unit, it has \d\.\d\d times the area",
-    "over each other": r"over each other with 50 % of their area, most of all 'front' and 'back'",
     "over itself": r"island 'back' of its texture lies over itself",
 }
 
@@ -221,8 +220,6 @@ def test_a_texture_that_is_no_sewn_pattern_is_refused_in_one_line(command: Comma
     def laid(places: np.ndarray) -> np.ndarray:
         if kind == "normalised":
             return places * 0.0037
-        if kind == "over each other":
-            return np.where(np.arange(len(places))[:, None] < ROWS * COLUMNS, places, places - [80.0, 0.0])
         if kind == "over itself":
             folded = places.copy()
             folded[ROWS * COLUMNS + 4 * COLUMNS + 6] += [7.0, 0.0]
@@ -236,6 +233,21 @@ def test_a_texture_that_is_no_sewn_pattern_is_refused_in_one_line(command: Comma
     assert told.startswith("skirt.obj: ")
     assert re.search(message, told)
     assert not Path("out").exists()
+
+
+def test_islands_may_be_stacked(tmp_path: Path):
+    """Layers of CLO lie on each other in its plane."""
+
+    def stacked(places: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(len(places))[:, None] < ROWS * COLUMNS, places, places - [80.0, 0.0])
+
+    apart, together = (
+        read_cut_pattern(write_obj(tmp_path / name, change=change), units="m", name="skirt").pattern
+        for name, change in (("apart.obj", None), ("stacked.obj", stacked))
+    )
+    for name, lengths in edge_lengths(apart).items():
+        assert edge_lengths(together)[name] == pytest.approx(lengths, abs=1e-3)
+    assert [seam.sides for seam in together.seams] == [seam.sides for seam in apart.seams]
 
 
 @pytest.mark.parametrize(

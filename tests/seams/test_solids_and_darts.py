@@ -341,6 +341,22 @@ def test_two_layers_are_worn_the_same_way_up(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_the_body_that_wears_a_shirt_is_no_layer_of_it(tmp_path: Path) -> None:
+    shirt = solids.shirt(step=0.045)
+    trunk = solids.rod([0, -0.3, 0], [0, 0.6, 0], 0.15, 0.6)
+    arms = [solids.rod([0, 0.5, 0], [0.6 * side, 0.5, 0], 0.045) for side in (1.0, -1.0)]
+    body = solids.skin(solids.joined([trunk, *arms], 0.02), [-0.8, -0.5, -0.3], [0.8, 0.9, 0.3], 0.045)
+    lines, count = list[str](), 0
+    for surface in (body, shirt):
+        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
+        lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in surface.faces.tolist()]
+        count += len(surface.vertices)
+    (tmp_path / "worn.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    layers = warpflat.read_layers(tmp_path / "worn.obj", units="m")
+    assert [len(layer.vertices) for layer in layers] == [len(shirt.vertices)]
+    assert any(note.startswith("a body, ") for note in layers[0].notes)
+
+
 def test_wrinkles_are_smoothed_on_request_and_tubes_keep_their_girth() -> None:
     plain = solids.skirt(40, 80)
     turn = np.arctan2(plain.vertices[:, 0], plain.vertices[:, 2])

@@ -124,6 +124,23 @@ def test_every_seam_has_a_price_or_a_reason() -> None:
     assert price["armhole left"].released == price["armhole right"].released
 
 
+def test_front_and_back_have_a_waist_together_where_the_trunk_is_narrowest_and_no_dart_begins_at_the_hem() -> None:
+    plain = solids.skirt(rows=24, around=32)
+    x, y, z = plain.vertices.T
+    turn, height = np.arctan2(x / (0.28 - 0.2 * y), z / (0.2 - 0.13 * y)), 0.85 / 0.6 * y
+    wide = np.interp(height, [0.0, 0.3, 0.55, 0.85], [0.19, 0.2, 0.1, 0.17])
+    dress = np.column_stack([wide * np.sin(turn), height, 0.7 * wide * np.cos(turn)])
+    options = warpflat.SeamOptions(no=("centre front", "centre back", "princess", "panel"), limit=0.002)
+    found = warpflat.find_seams(warpflat.make_surface(dress, plain.faces, name="dress"), options, fabric="woven")
+    lines = [(name, piece.vertices[line]) for piece in found.pieces for name, line in piece.lines.items()]
+    waist = np.concatenate([line for name, line in lines if name.startswith("waist")])
+    assert waist[:, 1] == pytest.approx(0.55, abs=0.03)
+    assert waist[:, 2].min() < -0.06
+    assert waist[:, 2].max() > 0.06
+    darts = [line for name, line in lines if name.startswith("dart")]
+    assert all(line[:, 1].min() > 0.01 for line in darts)
+
+
 def test_a_seam_that_costs_nothing_is_closed_again() -> None:
     # Straight legs lie flat without the seams at their sides.
     surface = solids.trousers()

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 import warpflat
 from warpflat.cli.main import main
@@ -172,6 +174,12 @@ def test_islands_that_are_not_as_large_as_the_cloth_are_taken_only_when_asked(tm
     check_gores(found(path, find="uv"))
 
 
+def test_the_texture_can_be_left_alone(tmp_path: Path) -> None:
+    result = found(write_obj(tmp_path / "skirt.obj"), find="auto", no=["uv"])
+    assert result.along == ""
+    assert {seam.name for seam in result.seams} >= {"side left", "side right"}
+
+
 def test_islands_that_are_no_pattern_are_taken_only_when_asked(tmp_path: Path) -> None:
     # A ball in two halves, in a texture that keeps their area: as large as cut pieces, and far from flat.
     ball = trimesh.creation.icosphere(4, radius=0.15)
@@ -231,6 +239,31 @@ def test_a_half_that_lies_mirrored_on_the_other_is_an_island_of_its_own(tmp_path
     assert len(seams.names) == 2
     assert np.allclose(raw.vertices[seams.edges][..., 0], 0.0)
     assert like_cut_pieces(raw, seams) == ""
+
+
+@pytest.mark.parametrize(("gap", "seams"), [(2, 1), (6, 2)])
+def test_slits_in_line_are_one_seam(tmp_path: Path, gap: int, seams: int) -> None:
+    """A texture that is slit along the middle but for a short stretch is parted there, too; a long one keeps it together."""
+    x, y = np.meshgrid(np.linspace(-0.2, 0.2, 9), np.linspace(0.0, 0.6, 21))
+    grid = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1)
+    # On the right of the middle the texture lies apart, but for the rows of the bridge.
+    texture = np.stack([x.ravel(), y.ravel()], axis=1)
+    slit = [row for row in range(21) if not 9 <= row <= 9 + gap]
+    other = {int(grid[row, 4]): x.size + number for number, row in enumerate(slit)}
+    places = np.concatenate([texture, texture[list(other)] + [0.01, 0.0]])
+    rows = [f"v {a:g} {b:g} {0.1 * a * a:g}" for a, b in texture] + [f"vt {a:g} {b:g}" for a, b in places]
+    for row in range(20):
+        for column in range(8):
+            corners = [int(corner) for corner in quads[row, column]]
+            at = [other.get(corner, corner) if column == 4 else corner for corner in corners]
+            rows.append("f " + " ".join(f"{a + 1}/{b + 1}" for a, b in zip(corners, at, strict=True)))
+    (tmp_path / "back.obj").write_text("\n".join(rows))
+    _, raw, _, _ = read_mesh_file(tmp_path / "back.obj", units="m", prim=None, name=None)
+    edges = file_seams(raw)["uv"].edges
+    joined = connected_components(coo_array((np.ones(len(edges)), tuple(edges.T)), shape=(x.size, x.size)))[1]
+    assert len(set(joined[edges].ravel().tolist())) == seams
+    assert len(edges) == (20 if seams == 1 else 20 - gap)
 
 
 def test_crumbs_of_a_texture_are_joined_to_their_neighbour(tmp_path: Path) -> None:

@@ -76,7 +76,10 @@ def drape(
 
     if is_pattern_file(scene):
         if edges:
-            click.echo(edge_table(scene, sewing=seams, units=units))
+            lines, notes = edge_table(scene, sewing=seams, units=units)
+            for note in notes:
+                click.echo(f"warpflat: {note}", err=True)
+            click.echo("\n".join(lines))
             return DONE
         start_warp_silently()
         job = OutsideJob.read(scene, sewing=seams, body=body, units=units)
@@ -84,14 +87,14 @@ def drape(
         result = drape_outside(job, folder, fabric=fabric, size=size, device=device, usd=usd, correct=correct)
         warnings = warnings_of(result.metrics)
         # What was left out has a line of its own at the end.
-        notes = [note for note in result.notes if note not in result.metrics.get("notes", ())]
-        for line in (*([] if quiet or as_json else notes), *warnings):
+        left = [note for note in result.notes if note not in result.metrics.get("notes", ())]
+        for line in (*([] if quiet or as_json else left), *warnings):
             click.echo(f"warpflat: {line}", err=True)
         if as_json:
             click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
         elif not quiet:
-            lines = drape_lines(result.metrics)
-            for line in lines if verbose else lines[:6]:
+            told = drape_lines(result.metrics)
+            for line in told if verbose else told[:6]:
                 click.echo(line)
             click.echo(f"files: {folder}: {', '.join(result.files)}")
         return NOT_CONVERGED if warnings else DONE

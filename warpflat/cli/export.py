@@ -1,4 +1,4 @@
-"""`warpflat export`: pattern files are written from a run's pattern.json, or from the JSON of GarmentCode."""
+"""`warpflat export`: pattern files are written from a run's pattern.json, or from the pattern of another program."""
 
 from __future__ import annotations
 
@@ -34,14 +34,20 @@ __all__ = ["export"]
     "--allowance",
     type=click.FloatRange(0, 100),
     metavar="MM",
-    help="Around the panels of GarmentCode, which has none.  [default: 10]",
+    help="Around the panels of GarmentCode, which has none.  [default: 10]  Of a DXF or an SVG without a sewing line: from its cutting "
+    "line to the sewing line.  [default: 0]",
+)
+@click.option(
+    "--units",
+    type=click.Choice(["mm", "cm", "in"]),
+    help="Of lengths that are printed; in: of the DXF, too.  [default: cm]",
 )
 @click.option(
     "--out",
     "-o",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Folder for the files.  [default: the run's, or out/NAME of a file of GarmentCode]",
+    help="Folder for the files.  [default: the run's, or out/NAME of another program's file]",
 )
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 def export(
@@ -51,12 +57,14 @@ def export(
     paper: str,
     sizes: tuple[str, ...],
     allowance: float | None,
+    units: str | None,
     out: Path | None,
     quiet: bool,
 ) -> int:
-    """Write a run's pattern files again, from its pattern.json: another dialect, another paper, one size.
+    """Write a run's pattern files again, from its pattern.json: another dialect, another paper, other units, one size.
 
-    A file of GarmentCode is drafted: its panels get an allowance, notches and labels.
+    The pattern of another program, a DXF, an SVG or the JSON of GarmentCode, is drafted: its lines stay, and it gets labels, and
+    notches where it names its seams. What of it is not read is said.
 
     \b
     Examples:
@@ -64,6 +72,8 @@ def export(
       warpflat export out/dress --format pdf --paper Letter --size "EU 38"
       warpflat export out/dress --format garmentcode
       warpflat export shirt_specification.json --format dxf --format pdf
+      warpflat export bought.dxf --format pdf --units in
+      warpflat export drawing.svg --format dxf --allowance 10
     """
     from warpflat.garment.pattern_files import export_patterns
 
@@ -75,6 +85,7 @@ def export(
         dialect=dialect,
         paper=paper,
         sizes=sizes or None,
+        units=units,
     )
     if not quiet:
         for note in notes:

@@ -38,7 +38,12 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     "--front", metavar="AXIS", help="Where the front of a whole garment faces: +z, -z, +x ...  [default: found]"
 )
 @click.option("--up", metavar="AXIS", help="Where up is: +y, +z ...  [default: found]")
-@click.option("--no", multiple=True, metavar="SEAM", help='A seam that is left closed: "shoulder", "side left".')
+@click.option(
+    "--no",
+    multiple=True,
+    metavar="SEAM",
+    help='A seam that is left closed: "shoulder", "side left"; "uv": not the texture\'s.',
+)
 @click.option(
     "--keep", multiple=True, metavar="SEAM", help='A seam that is made in any case: "waist", "yoke", "centre back".'
 )

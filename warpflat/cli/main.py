@@ -24,6 +24,7 @@ from warpflat.cli.fit import fit
 from warpflat.cli.flatten import flatten
 from warpflat.cli.internal_error import report_internal_error
 from warpflat.cli.mannequin import mannequin
+from warpflat.cli.marker import marker
 from warpflat.cli.new import new
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.review import review
@@ -85,6 +86,8 @@ def cli(context: click.Context) -> None:
       warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
       warpflat cuts scenes/bodice.toml                    which cut would release how much energy
       warpflat batch scenes/batch_sizes.toml              many bodies and fabrics
+      warpflat export bought.dxf --format pdf             the pattern of another program on paper
+      warpflat marker bought.dxf --width 140              its pieces on cloth
       warpflat review out/dome                            one page to review a run
       warpflat studio scenes/bodice.toml                  a page in the browser to edit a scene
       warpflat fabrics                                    what cloths there are
@@ -107,6 +110,7 @@ for _command in (
     fabrics,
     cuts,
     export,
+    marker,
     review,
     studio,
 ):

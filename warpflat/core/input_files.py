@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from warpflat.core.errors import InputError, system_reason
+from warpflat.core.file_kinds import foreign_words
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
 from warpflat.core.text import control_in, one_line, quote_value
 
@@ -126,6 +127,8 @@ def reading(
         note_read(file)
     with guarded(file, kind, missing=missing) as place:
         check_regular(file, FORMATS[kind].most, links=FORMATS[kind].links)
+        if foreign := foreign_words(file):
+            raise InputError(foreign)
         yield place
 
 
@@ -260,7 +263,15 @@ def read_result(path: Path) -> Any:
 
 def _parse_json(path: Path, kind: str, missing: str) -> Any:
     with open_file(path, kind, missing=missing) as stream, guarded(path, kind):
-        data = json.loads(stream.read().decode("utf-8-sig"))
+        try:
+            data = json.loads(stream.read().decode("utf-8-sig"))
+        except json.JSONDecodeError as error:
+            right = (
+                FORMATS[kind].right
+                if kind == "report"
+                else "comments and commas before a bracket are none; write it again"
+            )
+            raise InputError(f"line {error.lineno}, column {error.colno}: is no JSON ({error.msg}); {right}") from None
         check_values(data, depth_only=True)
     return data
 

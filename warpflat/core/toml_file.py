@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.file_kinds import other_kind_words
 from warpflat.core.input_files import RIGHT_NUMBER, check_values, reading
 from warpflat.core.text import quote_value
 
@@ -43,9 +44,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         try:
             tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors save it with a byte order mark
         except UnicodeDecodeError as error:
-            raise InputError(f"is not a text file (byte {error.start}); give a .toml file in UTF-8") from None
+            other = other_kind_words(path, "a text in TOML")
+            raise InputError(other or f"is not a text file (byte {error.start}); give a .toml file in UTF-8") from None
         except tomllib.TOMLDecodeError as error:
-            raise InputError(f"is not valid TOML: {error}") from None
+            raise InputError(other_kind_words(path, "a text in TOML") or f"is not valid TOML: {error}") from None
         except ValueError:  # Python turns no more than 4300 digits into a number
             raise InputError(f"has a number of thousands of digits; {RIGHT_NUMBER}") from None
         check_values(tables)

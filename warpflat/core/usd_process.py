@@ -16,7 +16,7 @@ from typing import Any
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_usd
 
-__all__ = ["UNREADABLE", "answer", "read_apart"]
+__all__ = ["UNREADABLE", "allow_size", "answer", "read_apart"]
 
 UNREADABLE = (
     "not a readable USD file: damaged, cut short, or with values of another type than its schema's; write it again"
@@ -26,6 +26,10 @@ UNREADABLE = (
 _MEMORY, _MEMORY_PER_BYTE = 2**30, 200
 # Of the processor; the clock may show more, where others compute, but a pipe that the file names must not be waited for.
 _SECONDS, _BYTES_PER_SECOND, _WAITING = 20, 10**6, 20
+# Memory that the process of a file had before it read anything [bytes]; None in any other process.
+_taken: int | None = None
+# Its limits before that, by their kind.
+_before: dict[int, int] = {}
 _PROGRAM = "from warpflat.core.usd_process import answer; answer()"
 
 
@@ -71,6 +75,21 @@ def read_apart(function: str, path: Path, **arguments: Any) -> Any:
     return result
 
 
+def allow_size(size: int) -> None:
+    """Limit the memory and the time of a process that reads a file by what it reads [bytes]; of any other process nothing."""
+    if _taken is None:
+        return
+    import resource
+
+    for kind, most in (
+        (resource.RLIMIT_AS, _taken + _MEMORY + _MEMORY_PER_BYTE * size),
+        (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_PER_SECOND),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        least = min(limit for limit in (most, _before[kind], hard) if limit != resource.RLIM_INFINITY)
+        resource.setrlimit(kind, (least, hard))
+
+
 def answer() -> None:
     """Call the function named on standard input, and write what it returns, or the words of an error, to standard output."""
     # Other output of the library must not mix with the result.
@@ -84,18 +103,13 @@ def answer() -> None:
 
         call, size = getattr(import_module(module), name), path.stat().st_size
         if sys.platform == "linux":
-            # Limit this process's memory and time by the size of the file.
             import resource
 
-            taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-            for kind, most in (
-                (resource.RLIMIT_AS, taken + _MEMORY + _MEMORY_PER_BYTE * size),
-                (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_PER_SECOND),
-                (resource.RLIMIT_CORE, 0),
-            ):
-                soft, hard = resource.getrlimit(kind)
-                least = min(limit for limit in (most, soft, hard) if limit != resource.RLIM_INFINITY)
-                resource.setrlimit(kind, (least, hard))
+            global _taken
+            _taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            _before.update({kind: resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_CPU)})
+            allow_size(size)
         result = True, call(path, **arguments)
     except InputError as error:
         result = False, str(error)

@@ -70,14 +70,14 @@ def write_dxf(
         raise InputError(f"unknown DXF units {units!r}; {nearest(units, UNITS)}")
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
     for size in chosen:
-        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+        garment.garment.check_size(size)
     scale, created = UNITS[units], source_date()
     rules = grade_rules(garment, chosen) if rul is not None and len(chosen) > 1 else None
     blocks, space = list[str](), list[str]()
-    groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
+    groups = list(filter(None, (tuple(p for p in nest if p.size in chosen) for nest in nests(garment))))
     taken: set[str] = set()
     seams = seam_words(garment.garment.seams)
-    names = {piece.name: piece.piece.title or piece.name for piece in next(iter(garment.pieces.values()))}
+    names = {piece.name: piece.piece.title or piece.name for row in garment.pieces.values() for piece in row}
     written = titles(list(dict.fromkeys(names.values())), lambda name: any(map(str.isalnum, _ascii(name))))
     for placed in lay_out(groups, width=1.5).placed:
         for piece in placed.pieces:
@@ -306,13 +306,15 @@ def grade_rules(garment: DraftedGarment, sizes: Sequence[str]) -> GradeRules:
     """Return the grade rules of a nest: rule 1 moves nothing.
 
     Graded are the corners of the cutting line, places between them on curved edges, notches and drill holes; each is the same
-    place in every size. A place that some size does not have is not graded.
+    place in every size. A place, or a piece, that some size does not have is not graded.
     """
     sample = garment.garment.sample if garment.garment.sample in sizes else sizes[0]
     rules = GradeRules(sizes=tuple(sizes), sample=sample)
     rules.rule(np.zeros((len(sizes), 2)))
     for piece in garment.pieces[sample]:
         all_sizes = {each.size: each for each in garment.all_sizes(piece.name)}
+        if not all(size in all_sizes for size in sizes):
+            continue
         rows = [_places(all_sizes[size]) for size in sizes]
         graded = rows[list(sizes).index(sample)]
         for key, at in graded.items():

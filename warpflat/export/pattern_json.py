@@ -188,7 +188,19 @@ class PieceEntry(Entry):
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
     role: Literal[
-        "shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket"
+        "shell",
+        "facing",
+        "strip",
+        "waistband",
+        "cuff",
+        "collar",
+        "hood",
+        "lining",
+        "interfacing",
+        "pocket",
+        "placket",
+        "tie",
+        "fly",
     ] = "shell"
     also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
     enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
@@ -302,6 +314,7 @@ class WornEntry(Entry):
     measures: dict[Text, list[MeasureEntry]] = Field(default_factory=dict)
     needed: list[NeededEntry] = Field(default_factory=list)
     knits: list[Text] = Field(default_factory=list)
+    buttonholes: Literal["left", "right"] = "right"
 
 
 class FoundSeamEntry(Entry):
@@ -585,6 +598,7 @@ def _worn(worn: Worn) -> dict[str, Any]:
         "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},
         "needed": [asdict(each) for each in worn.needed],
         "knits": list(worn.knits),
+        "buttonholes": worn.buttonholes,
     }
 
 
@@ -603,6 +617,7 @@ def _read_worn(data: WornEntry) -> Worn:
         measures={size: tuple(Measure(**each.model_dump()) for each in row) for size, row in data.measures.items()},
         needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
         knits=tuple(data.knits),
+        buttonholes=data.buttonholes,
     )
 
 

@@ -91,7 +91,7 @@ def write_pdf(
             raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
         chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
         for size in chosen:
-            garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+            garment.garment.check_size(size)
         whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
         printed = halved(whole)
         if fault := too_many_sheets(printed, paper):

@@ -14,7 +14,7 @@ from warpflat.export.pattern_json import pattern_from_json, read_pattern_data
 from warpflat.export.read_dxf import read_dxf
 from warpflat.export.read_garmentcode import garmentcode_pattern
 from warpflat.export.read_svg import read_svg
-from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.draft import draft_garment, relabelled
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.pieces import Pattern
 
@@ -41,21 +41,38 @@ def read_pattern(path: str | os.PathLike[str], *, allowance: float | None = None
     return found.garment if isinstance(found, DraftedGarment) else found
 
 
-def read_drafted(path: str | os.PathLike[str], *, allowance: float | None = None) -> DraftedGarment:
-    """Read a pattern that is ready to be written: a pattern.json, or the JSON of GarmentCode, whose lines stay as they are.
+def read_drafted(
+    path: str | os.PathLike[str], *, allowance: float | None = None, units: str | None = None
+) -> DraftedGarment:
+    """Read a pattern that is ready to be written: a pattern.json, or one of another program, whose lines stay as they are.
 
     Args:
         path: of the file.
-        allowance: [m] around the panels of GarmentCode, which has none; that of seams if not given.
+        allowance: [m] around the panels of GarmentCode, which has none, that of seams if not given; of a DXF or an SVG without a sewing
+            line as :func:`read_pattern` has it.
+        units: of lengths in printed words, "mm", "cm" or "in"; those of the pattern, or centimetres, if not given.
 
     Raises:
         InputError: the file cannot be read, is no such pattern, or has allowances of its own.
     """
+    if Path(path).suffix.lower() in (".dxf", ".svg"):
+        pattern = read_pattern(path, allowance=allowance)
+        with guarded(Path(path), "pattern"):
+            return draft_garment(_printed_in(pattern, units), true=False)
     found = _read_json(Path(path))
     if isinstance(found, DraftedGarment):
         if allowance is not None:
             raise InputError(f"{path}: has allowances of its own; --allowance is for a pattern without")
-        return found
+        if units is None:
+            return found
+        garment = _printed_in(found.garment, units)
+        rows = {
+            size: tuple(
+                relabelled(replace(piece, piece=garment.piece(piece.name, size)), garment.name, ()) for piece in row
+            )
+            for size, row in found.pieces.items()
+        }
+        return replace(found, garment=garment, pieces=rows)
     with guarded(Path(path), "pattern"):
         wide = {
             size: [
@@ -67,7 +84,15 @@ def read_drafted(path: str | os.PathLike[str], *, allowance: float | None = None
             ]
             for size, row in found.pieces.items()
         }
-        return draft_garment(replace(found, pieces=wide), true=False)
+        return draft_garment(_printed_in(replace(found, pieces=wide), units), true=False)
+
+
+def _printed_in(pattern: Pattern, units: str | None) -> Pattern:
+    """Return a pattern whose printed lengths are in these units; None leaves them."""
+    if units is None:
+        return pattern
+    rows = {size: [replace(piece, units=units) for piece in row] for size, row in pattern.pieces.items()}
+    return replace(pattern, pieces=rows)
 
 
 def _read_json(path: Path) -> Pattern | DraftedGarment:

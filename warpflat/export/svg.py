@@ -67,9 +67,9 @@ def write_svg(
         width: of the sheet [m].
     """
     for size in sizes or ():
-        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+        garment.garment.check_size(size)
     chosen = tuple(size for size in garment.pieces if sizes is None or size in sizes)
-    groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
+    groups = list(filter(None, (tuple(p for p in nest if p.size in chosen) for nest in nests(garment))))
     if not nested:
         groups = [(piece,) for size in chosen for nest in groups for piece in nest if piece.size == size]
     sheet = lay_out(groups, width=width)

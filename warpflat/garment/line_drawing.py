@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import groupby
@@ -89,7 +90,10 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
     knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
-    return Worn(views=views, measures=measures, needed=needed, knits=tuple(knits))
+    mens = garment.mannequin is not None and re.search(r"\bmen\b", garment.mannequin.source) is not None
+    return Worn(
+        views=views, measures=measures, needed=needed, knits=tuple(knits), buttonholes="left" if mens else "right"
+    )
 
 
 def _with_slanted_hems(garment: Garment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 from warpflat._version import __version__
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.file_kinds import foreign_words, other_kind_words
+from warpflat.core.file_names import make_file_name
 from warpflat.core.text import format_count, plain_letters
 from warpflat.garment.edge_rules import EdgeRules
-from warpflat.garment.linings import add_interfacing, add_lining
+from warpflat.garment.linings import add_interfacing, add_lining, add_pocketing
 from warpflat.garment.strips import CLOTH_WIDTH
 from warpflat.pattern.shrinkage import Shrinkage, enlarged
 
@@ -32,6 +35,7 @@ __all__ = [
     "check_names",
     "export_patterns",
     "garment_files",
+    "lay_markers",
     "outline_files",
     "pattern_names",
     "surface_files",
@@ -67,7 +71,7 @@ class PatternOptions:
         names: by piece what is printed instead of its name.
         shrinkage: of the shell's cloth; its pieces are drawn larger.
         words: what is printed instead of English words and names.
-        lining, interfacing: what these cloths are called; none without a name.
+        lining, interfacing, pocketing: what these cloths are called; none without a name.
         true: whether edges are made to run on smoothly across seams; not of a pattern that is taken as it is.
     """
 
@@ -84,6 +88,7 @@ class PatternOptions:
     words: Mapping[str, str] = field(default_factory=dict)
     lining: str = ""
     interfacing: str = ""
+    pocketing: str = ""
     true: bool = True
 
     @property
@@ -200,27 +205,28 @@ def export_patterns(
     dialect: str = "aama",
     paper: str = "A4",
     sizes: Sequence[str] | None = None,
+    units: str | None = None,
 ) -> tuple[list[Path], list[str]]:
-    """Write files of a pattern, all or none, from its `pattern.json` or the JSON of GarmentCode.
+    """Write files of a pattern, all or none, from its `pattern.json` or the file of another program.
 
     Args:
-        source: the folder of a run, its `pattern.json`, or a file of GarmentCode.
+        source: the folder of a run, its `pattern.json`, or a file of GarmentCode, a DXF or an SVG.
         formats: some of "dxf", "svg", "pdf", "json", "garmentcode" and "plt".
         out: the folder for the files; that of the run, or out/NAME for a file of another program, if not given.
-        allowance: [m] around pieces of a file that knows of none; that of seams if not given.
+        allowance: [m] of a file that knows of none (see :func:`warpflat.export.read_pattern.read_drafted`).
         dialect: of a DXF.
         paper: of a PDF.
         sizes: only these; None takes all. Not for "json", from which the others are made.
+        units: of lengths in printed words, "mm", "cm" or "in", and in inches of a DXF; None leaves them.
 
     Returns:
-        The files, and what their formats leave out, one sentence each.
+        The files, and what the file has beside the pattern and their formats leave out, one sentence each.
 
     Raises:
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
             has its own, or the folder cannot be written.
     """
-    from warpflat.core.output import file_in, output_folder, record_file, write_report
-    from warpflat.export.read_pattern import read_drafted
+    from warpflat.core.output import file_in
 
     for format in formats:
         if format not in FORMATS:
@@ -229,29 +235,88 @@ def export_patterns(
         raise InputError(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
         )
-    file = source if source.suffix.lower() == ".json" and not source.is_dir() else source / "pattern.json"
-    drafted = read_drafted(file, allowance=allowance)
-    folder = out or (file.parent if file.name == "pattern.json" else Path("out") / drafted.name)
-    # pattern.json may be written over itself: that is what was asked for.
-    over_itself = "json" in formats and file.name == "pattern.json" and out is None
-    notes = list[str]()
-    with output_folder(folder, sources=[] if over_itself else [file], guard=True):
-        files = list[str]()
+    with _rewritten(source, out, allowance, units, over_itself="json" in formats) as (drafted, folder, name, files):
+        notes = list(drafted.garment.notes)
         for format in formats:
-            name, lost = _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
-            files.append(name)
+            written, lost = _write(
+                drafted, folder, format, name=name, dialect=dialect, paper=paper, sizes=sizes, english=units == "in"
+            )
+            files.append(written)
             notes += lost
         if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
-            files.append(file_in(folder, drafted.name, ".rul").name)
+            files.append(file_in(folder, name, ".rul").name)
+    return [folder / file for file in files], notes
+
+
+def lay_markers(
+    source: Path,
+    cloth: Cloth,
+    *,
+    out: Path | None = None,
+    allowance: float | None = None,
+    sizes: Mapping[str, int] | None = None,
+    seconds: int = 5,
+) -> tuple[list[Path], list[str], list[dict[str, Any]]]:
+    """Write a marker for each cloth of a pattern, all or none.
+
+    Args:
+        source, out, allowance: as those of :func:`export_patterns`.
+        cloth: what the pieces are laid on; its stripes are those of the first cloth.
+        sizes: how many garments of each size; None lays one of each.
+        seconds: time for each marker.
+
+    Returns:
+        The files, what the maker should know, one sentence each, and for each cloth its name, and its width and length [m] and the share
+        that is used, or why there is no marker, as "not_made".
+
+    Raises:
+        InputError: there is no pattern, an unknown size or seam, no piece can be laid, or the folder cannot be written.
+    """
+    with _rewritten(source, out, allowance, None, over_itself=False) as (drafted, folder, name, files):
+        marked, remarks, plans = _marker(drafted, folder, name, cloth, seconds, sizes)
+        files += marked
+        if all("not_made" in plan for plan in plans):
+            raise InputError(f"{source}: {plans[0]['not_made']}")
+    return [folder / file for file in files], [*drafted.garment.notes, *remarks], plans
+
+
+@contextmanager
+def _rewritten(
+    source: Path, out: Path | None, allowance: float | None, units: str | None, *, over_itself: bool
+) -> Iterator[tuple[DraftedGarment, Path, str, list[str]]]:
+    """Read a pattern, and yield it with the folder, the name of its files and a list, to which their names are added.
+
+    `over_itself` is whether pattern.json may be written over itself, as it may be where that is asked for.
+    """
+    from warpflat.core.output import output_folder, record_file, write_report
+    from warpflat.export.read_pattern import PATTERN_ENDINGS, read_drafted
+
+    is_file = source.suffix.lower() in PATTERN_ENDINGS and not source.is_dir()
+    if not is_file and source.is_file():
+        raise InputError(
+            f"{source}: "
+            + (
+                foreign_words(source)
+                or other_kind_words(source, "a pattern")
+                or f"is no pattern; give the folder of a run, or a file that ends in {', '.join(PATTERN_ENDINGS)}"
+            )
+        )
+    file = source if is_file else source / "pattern.json"
+    drafted = read_drafted(file, allowance=allowance, units=units)
+    own = file.name == "pattern.json"
+    name = drafted.name if own else make_file_name(file.stem.removesuffix("_specification"))
+    folder = out or (file.parent if own else Path("out") / name)
+    files = list[str]()
+    with output_folder(folder, sources=[] if over_itself and own and out is None else [file], guard=True):
+        yield drafted, folder, name, files
         # A folder that is new knows its files from here on, so that the next export may replace them.
         if folder != file.parent and not (folder / "metrics.json").exists():
             head = {"schema": 1, "warpflat": __version__, "pieces": {}}
-            write_report(folder / "metrics.json", head, name=drafted.name, files=files)
+            write_report(folder / "metrics.json", head, name=name, files=files)
             files.append("metrics.json")
         else:
-            for name in files:
-                record_file(folder, drafted.name, name)
-    return [folder / name for name in files], notes
+            for written in files:
+                record_file(folder, name, written)
 
 
 def _write_pattern(
@@ -275,6 +340,7 @@ def _write_pattern(
         pattern, notes = make()
         pattern = add_lining(pattern, options.lining) if options.lining else pattern
         pattern = add_interfacing(pattern, options.interfacing) if options.interfacing else pattern
+        pattern = add_pocketing(pattern, options.pocketing) if options.pocketing else pattern
         # In the printed names and units that were asked for.
         titled = {
             size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row)
@@ -333,10 +399,10 @@ def _write_pattern(
         if "dxf" in options.formats and len(drafted.pieces) > 1:
             files.append(file_in(folder, name, ".rul").name)
         if options.cloth is not None:
-            marked, remarks, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+            marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
             files += marked
             notes = (*notes, *remarks)
-            metrics["marker"] = plan
+            metrics["marker"] = plans[0]
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics, walked=walked)
 
 
@@ -367,6 +433,7 @@ def _write(
     dialect: str,
     paper: str,
     sizes: Sequence[str] | None = None,
+    english: bool = False,
 ) -> tuple[str, tuple[str, ...]]:
     """Write one file and return its name, and what the format leaves out."""
     from warpflat.core.output import file_in
@@ -382,7 +449,8 @@ def _write(
     lost: tuple[str, ...] = ()
     report_activity(f"writing {file.name}")
     if kind == "dxf":
-        write_dxf(drafted, file, dialect=dialect, sizes=sizes, rul=file_in(folder, name, ".rul"))
+        lengths = "english" if english else "metric"
+        write_dxf(drafted, file, dialect=dialect, units=lengths, sizes=sizes, rul=file_in(folder, name, ".rul"))
     elif kind == "svg":
         write_svg(drafted, file, sizes=sizes, nested=True)
     elif kind == "pdf":
@@ -399,9 +467,17 @@ def _write(
 
 
 def _marker(
-    drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
-) -> tuple[list[str], tuple[str, ...], dict[str, Any]]:
-    """Write `NAME.marker.svg` and `NAME.marker.json`, one garment of each size; return names, notes and metrics."""
+    drafted: DraftedGarment,
+    folder: Path,
+    name: str,
+    cloth: Cloth,
+    seconds: int,
+    sizes: Mapping[str, int] | None = None,
+) -> tuple[list[str], tuple[str, ...], list[dict[str, Any]]]:
+    """Write `NAME.marker.svg` and `NAME.marker.json` for each cloth, one garment of each size if `sizes` does not say how many.
+
+    Returns names, notes and the measures of each marker, or why there is none.
+    """
     from warpflat.core.output import file_in, write_json
     from warpflat.export.svg import write_marker_svg
     from warpflat.pattern.cut_list import cloths_of
@@ -414,7 +490,7 @@ def _marker(
     for number, fabric in enumerate(cloths):
         own = cloth if number == 0 else replace(cloth, stripes=Stripes())
         try:
-            marker = make_marker(drafted, own, fabric=fabric if len(cloths) > 1 else "", seconds=seconds)
+            marker = make_marker(drafted, own, fabric=fabric if len(cloths) > 1 else "", sizes=sizes, seconds=seconds)
         except InputError as error:
             remarks.append(f"no marker was made: {error}")
             plans.append({"not_made": str(error)})
@@ -438,7 +514,7 @@ def _marker(
             "length_m": marker.length,
             "utilisation": marker.utilisation,
             "pieces": len(placements),
-            "garments": len(drafted.pieces),
+            "garments": len(drafted.pieces) if sizes is None else sum(sizes.values()),
             "folded": marker.folded,
         }
         write_json(files[1], {"schema": 1, **measures, "placements": placements})
@@ -449,4 +525,4 @@ def _marker(
             f"marker{'' if number == 0 else f' of {fabric}'}: {marker.length:.2f} m of cloth {wide}, {marker.utilisation:.1%} of it "
             f"used by {format_count(len(placements), 'piece')}"
         )
-    return names, tuple(remarks), plans[0]
+    return names, tuple(remarks), plans

@@ -27,6 +27,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges, hem_rises
+from warpflat.garment.fly import with_flies
 from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.line_drawing import describe_worn
 from warpflat.garment.mark_openings import mark_openings
@@ -241,7 +242,7 @@ def pattern_of_garment(
             girths[size] |= {} if head is None else {"head": head}
     rises = hem_rises(pattern, sample.finishing)
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width)
-    pattern = add_pockets(pattern, sample.pockets)
+    pattern = with_flies(add_pockets(pattern, sample.pockets))
     if not rises:
         # Godets of one size are equal, unless a slanted hem cuts them.
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")

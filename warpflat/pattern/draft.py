@@ -75,7 +75,7 @@ def draft_garment(
     with printed_in(garment.words):
         chosen = garment.sizes if sizes is None else tuple(sizes)
         for size in chosen:
-            garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
+            garment.check_size(size)
         drafted: dict[str, tuple[DraftedPiece, ...]] = {}
         reports: list[SeamReport] = []
         corners: list[CornerReport] = []

@@ -201,8 +201,13 @@ class DraftedGarment:
     def name(self) -> str:
         return self.garment.name
 
+    @property
+    def piece_names(self) -> tuple[str, ...]:
+        """Names of the pieces of all sizes, those of the first size first."""
+        return tuple(dict.fromkeys(piece.name for row in self.pieces.values() for piece in row))
+
     def all_sizes(self, name: str) -> tuple[DraftedPiece, ...]:
-        """Return one piece in every size, in the order of the sizes."""
+        """Return one piece in the sizes that have it, in the order of the sizes."""
         return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
 
 

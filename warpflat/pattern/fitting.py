@@ -71,7 +71,8 @@ def fit_edges(
         for edge in piece.edges:
             line = lines[piece.name, edge.name]
             line = line[[0, -1]] if edge.kind == "fold" else line
-            fitted[piece.name, edge.name] = _clean_curve(line, tolerance)
+            as_it_is = chords(line), TOLERANCE if tolerance is None else tolerance
+            fitted[piece.name, edge.name] = as_it_is if edge.as_drawn else _clean_curve(line, tolerance)
     if tolerance is None:
         # Edges that are sewn to one other edge, whether they run against each other, and the second's ease.
         pairs = list[tuple[EdgeKey, EdgeKey, bool, float]]()

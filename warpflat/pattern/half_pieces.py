@@ -29,10 +29,9 @@ ON_AXIS = 1e-6
 
 def halved(garment: DraftedGarment) -> DraftedGarment:
     """Return the garment with every wide piece that is its own mirror image, in all sizes, as a half on the fold."""
-    names = [piece.name for piece in next(iter(garment.pieces.values()))]
     on_fold = {
         name
-        for name in names
+        for name in garment.piece_names
         if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in garment.all_sizes(name))
     }
     sides = {name: _kept_side(garment.all_sizes(name)[0], garment.garment.seams) for name in on_fold}

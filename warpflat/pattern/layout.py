@@ -59,8 +59,7 @@ class Sheet:
 
 def nests(garment: DraftedGarment) -> list[tuple[DraftedPiece, ...]]:
     """Return each piece in all its drafted sizes."""
-    first = next(iter(garment.pieces.values()))
-    return [garment.all_sizes(piece.name) for piece in first]
+    return [garment.all_sizes(name) for name in garment.piece_names]
 
 
 def occupied_points(group: Sequence[DraftedPiece]) -> FloatArray:

@@ -17,6 +17,7 @@ __all__ = [
     "EDGE_KINDS",
     "FOLD_STRAIGHT",
     "HEMMED_LEVELS",
+    "MOST_ALLOWANCE",
     "SAME_POINT",
     "Dart",
     "Edge",
@@ -26,6 +27,8 @@ __all__ = [
 
 #: Allowance [m] of an edge that names none, by its kind.
 DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
+#: The widest allowance [m].
+MOST_ALLOWANCE = 0.5
 EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
 #: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
 #: skirt, a band or a facing.
@@ -47,6 +50,7 @@ class Edge:
         kind: "seam", "hem", "fold" (lies on the fold of the cloth), "cut" (raw, no allowance) or "dart" (a dart's leg).
         allowance: [m]; None for the default of the kind.
         vertices: #P, the mesh vertex of each point, where the edge comes from a mesh.
+        as_drawn: whether the points are the line as a file has it, straight between them, not samples of a curve.
     """
 
     name: str
@@ -54,6 +58,7 @@ class Edge:
     kind: str = "seam"
     allowance: float | None = None
     vertices: IntArray | None = None
+    as_drawn: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in EDGE_KINDS:
@@ -61,8 +66,10 @@ class Edge:
         points = check_points(self.points, f"edge {self.name!r}", at_least=2)
         if polyline_length(points) < SAME_POINT:
             raise InputError(f"edge {self.name!r} has no length; an edge runs between two different corners")
-        if self.allowance is not None and not 0 <= self.allowance <= 0.5:
-            raise InputError(f"edge {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and 0.5 m")
+        if self.allowance is not None and not 0 <= self.allowance <= MOST_ALLOWANCE:
+            raise InputError(
+                f"edge {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and {MOST_ALLOWANCE:g} m"
+            )
         if self.kind == "fold" and self.allowance:
             raise InputError(f"edge {self.name!r} lies on the fold: its allowance must be 0, not {self.allowance!r} m")
         object.__setattr__(self, "points", points)

@@ -29,7 +29,10 @@ __all__ = ["Elastic", "FoundSeam", "Pattern", "Piece", "Seam", "SeamSide", "unkn
 
 #: Kinds of :class:`SeamOpening`.
 OPENINGS = ("zip", "buttons", "slit", "vent")
-ROLES = ("shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket")
+ROLES = (
+    *("shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket"),
+    *("placket", "tie", "fly"),
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -273,13 +276,14 @@ class Pattern:
 
     Attributes:
         name: for labels and files.
-        pieces: by size, in the order in which sizes are listed; each size has pieces of the same names.
+        pieces: by size, in the order in which sizes are listed; what a seam joins is in every size.
         seams: by name of piece and edge.
-        sample_size: the size that files of one size show; None takes the middle one.
+        sample_size: the size that files of one size show; None takes the middle one of those with the most pieces.
         words: what is printed instead of English words and names (see `warpflat.pattern.words`).
         elastics: that are threaded through its casings.
         worn: how it looks and what it measures on its body; None where that is not known.
         found_seams: with their prices, of a garment whose seams were found.
+        notes: what the file from which it was read has beside it, one sentence each.
     """
 
     __repr__ = short_repr
@@ -292,23 +296,18 @@ class Pattern:
     elastics: Sequence[Elastic] = ()
     worn: Worn | None = None
     found_seams: Sequence[FoundSeam] = ()
+    notes: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):
             raise InputError(f"garment {self.name!r} has no pieces; every size needs at least one")
         for size, pieces in self.pieces.items():
-            # Every size has the same pieces, each once.
+            # Every size has each of its pieces once.
             names = [piece.name for piece in pieces]
             doubled = sorted({n for n in names if names.count(n) > 1})
             if doubled:
                 raise InputError(
                     f"garment {self.name!r}{f', size {size}' if size else ''}: piece {doubled[0]!r} occurs twice; names are unique"
-                )
-            expected = {piece.name for piece in next(iter(self.pieces.values()))}
-            if set(names) != expected:
-                odd = sorted(set(names) ^ expected)[0]
-                raise InputError(
-                    f"garment {self.name!r}: piece {odd!r} is not in every size; all sizes have the same pieces"
                 )
             for piece in pieces:
                 if piece.size != size:
@@ -338,6 +337,21 @@ class Pattern:
         """Sizes in their order."""
         return tuple(self.pieces)
 
+    def check_size(self, size: str) -> None:
+        """Check that there is such a size.
+
+        Raises:
+            InputError: there is none; gives the nearest.
+        """
+        if size not in self.pieces:
+            raise unknown_size(self.name, size, self.pieces)
+
+    @property
+    def piece_names(self) -> tuple[str, ...]:
+        """Names of the pieces of all sizes, those of the sample size first."""
+        rows = (self.pieces[self.sample], *self.pieces.values())
+        return tuple(dict.fromkeys(piece.name for row in rows for piece in row))
+
     @property
     def units(self) -> str:
         """Units of lengths in printed words: those of its pieces."""
@@ -346,7 +360,12 @@ class Pattern:
     @property
     def sample(self) -> str:
         """Size that is shown where only one is."""
-        return self.sample_size if self.sample_size is not None else self.sizes[len(self.sizes) // 2]
+        if self.sample_size is not None:
+            return self.sample_size
+        # Of those with the most pieces the middle one.
+        most = max(map(len, self.pieces.values()))
+        full = [size for size, row in self.pieces.items() if len(row) == most]
+        return full[len(full) // 2]
 
     def piece(self, name: str, size: str) -> Piece:
         """Return the piece of that name and size.
@@ -354,8 +373,7 @@ class Pattern:
         Raises:
             InputError: there is none; gives the nearest name.
         """
-        if size not in self.pieces:
-            raise unknown_size(self.name, size, self.pieces)
+        self.check_size(size)
         for piece in self.pieces[size]:
             if piece.name == name:
                 return piece

@@ -65,9 +65,11 @@ class Worn:
         measures: by size.
         needed: openings that are missing, of the sample size.
         knits: names of its cloths that are knits.
+        buttonholes: the half that has them and lies above, "right" for women, "left" for men.
     """
 
     views: Mapping[str, tuple[ViewedPiece, ...]] = field(default_factory=dict)
     measures: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
     needed: tuple[NeededOpening, ...] = ()
     knits: tuple[str, ...] = ()
+    buttonholes: str = "right"

@@ -21,6 +21,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST, reading
 from warpflat.core.sums import weighted_percentile
+from warpflat.core.usd_layers import check_layers
 from warpflat.core.usd_process import UNREADABLE, read_apart
 from warpflat.export.colours import VertexColours, energy_colours
 from warpflat.export.geometry import face_areas, outline_edges
@@ -166,6 +167,7 @@ def read_whole_film(path: Path) -> dict[str, Any] | None:
         InputError: without the file's name: it is no film. Any error of USD is the file's fault, of whatever type it is.
     """
     try:
+        check_layers(path)
         pieces = open_film(path)
         for piece in pieces:
             for time in piece.times:

@@ -40,6 +40,8 @@ __all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entr
 
 #: More than this share of the cloth beyond its limit is no pattern yet.
 NO_PATTERN = 0.1
+# What of a garment's file is not followed where `no` names it.
+_TEXTURE = "uv"
 # A pattern is nowhere narrower than this share of its seams' allowance.
 _WIDTH = 0.5
 # A ring that lacks more than this share of a full turn does not lie flat: its cloth would be stretched by as much.
@@ -106,7 +108,14 @@ def found_seams(scene: Scene) -> FoundSeams | None:
                 'find = "auto" (--seams auto) looks for seams'
             )
     by_itself = asked is None and not all_parts and _is_whole_garment(layers[0])
-    if not of_file and (asked is None or asked.find == "auto") and "uv" in seams and len(seams["uv"].edges):
+    ignored = asked is not None and _TEXTURE in asked.no
+    if (
+        not of_file
+        and (asked is None or asked.find == "auto")
+        and not ignored
+        and "uv" in seams
+        and len(seams["uv"].edges)
+    ):
         why = like_cut_pieces(read.raw, seams["uv"])
         parts = int(object_parts(read.raw.vertices, read.raw.polygons)[0].max()) + 1 if all_parts else 1
         more = len(seams["uv"].names) > parts
@@ -134,7 +143,13 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             notes.append(
                 f"{format_count(taken.joined, 'island')} of less than a thousandth of the cloth joined to a neighbour"
             )
-        cuts = [*by_hand, *_cuts_of_file(taken, read, layers, f"{path}")]
+        of_islands = _cuts_of_file(taken, read, layers, f"{path}")
+        cuts = [*by_hand, *of_islands]
+        if not of_islands and not of_file:
+            # They parted the inner shell from the outer one.
+            taken, given["find"] = None, "auto" if looked_for else "none"
+            if asked is None and not drawn and not by_itself:
+                return None
     waist = None
     if asked is not None and asked.body is not None:
         with errors_named(f"{scene.where}: find_seams.body"):
@@ -142,7 +157,11 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         notes.append(f"a waist is looked for where the body of {Path(asked.body).name} has its own")
     with errors_named(scene.where):
         options = SeamOptions(
-            **{**given, "no": tuple(given.get("no", ())), "keep": tuple(given.get("keep", ()))},
+            **{
+                **given,
+                "no": tuple(name for name in given.get("no", ()) if name != _TEXTURE),
+                "keep": tuple(given.get("keep", ())),
+            },
             smooth=smooth,
             cuts=tuple(cuts),
             waist=waist,
@@ -150,15 +169,18 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         fabric = scene_fabric(scene)
         found = find_seams(layers, options, fabric=fabric)
         if taken is not None and looked_for and (beyond := _beyond_limit(found.pieces, fabric)) > NO_PATTERN:
+            knit = _knit_for(found.pieces, fabric)
+            would = f"; --fabric {knit} would do, and --seams uv takes them" if knit else "; --seams uv takes them"
             notes.append(
-                f"{taken.describe()} were not taken, as {100 * beyond:.0f} % of the cloth would be beyond its limit; --seams uv takes them"
+                f"{taken.describe()} were not taken, as {100 * beyond:.0f} % of the cloth would be beyond its limit{would}"
             )
             taken, options = None, replace(options, find="auto", cuts=tuple(by_hand))
             found = find_seams(layers, options, fabric=fabric)
     if taken is not None:
         if not of_file:
             notes.insert(
-                0, "islands of the texture were taken, as they look like cut pieces; --seams none keeps it whole"
+                0,
+                "islands of the texture were taken, as they look like cut pieces; --no uv leaves them, --seams none keeps it whole",
             )
         found = _named_by_file(found, taken, read)
     elif by_itself:
@@ -180,8 +202,22 @@ def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
     return float(np.average([laid_flat(piece, fabric, 0.0).outside for piece in pieces], weights=area))
 
 
+def _knit_for(pieces: Sequence[Surface], fabric: Fabric) -> str:
+    """Return the name of the knit that gives the least of those in which pieces are a pattern; "" if there is none."""
+    from warpflat.fabric.library import load_library
+
+    knits = [knit for knit in load_library().values() if knit.is_knit and knit.strain_limit > fabric.strain_limit]
+    for knit in sorted(knits, key=lambda one: one.strain_limit):
+        if _beyond_limit(pieces, knit) <= NO_PATTERN:
+            return knit.name
+    return ""
+
+
 def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface], file: str) -> list[SeamCut]:
-    """Return a cut for each two islands that meet, along the edges that the layers still have after their repair."""
+    """Return a cut for each two islands that meet, along the edges that the layers still have within them after their repair.
+
+    What ran along an inner shell, or to it across a thickness, is gone with that, or lies on the border.
+    """
     from warpflat.seams.options import SeamCut
 
     place = weld_map(read.raw.vertices).astype(np.int64)
@@ -190,7 +226,11 @@ def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface]
         ends = np.sort(place[edges], axis=1)
         return ends[:, 0] * len(place) + ends[:, 1]
 
-    there = [layer.input_index[half_edges(layer.faces).edges].astype(np.int64) for layer in layers]
+    sides = [half_edges(layer.faces) for layer in layers]
+    there = [
+        layer.input_index[each.edges[each.count > 1]].astype(np.int64)
+        for layer, each in zip(layers, sides, strict=True)
+    ]
     edges = seams.edges[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))]
     beside = np.sort(seams.beside[np.isin(keys(seams.edges), np.concatenate([keys(ends) for ends in there]))], axis=1)
     return [

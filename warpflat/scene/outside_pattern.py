@@ -155,8 +155,10 @@ def is_pattern_file(path: Path) -> bool:
     return path.is_dir() or path.suffix.lower() in (*PATTERN_ENDINGS, *SUFFIXES)
 
 
-def edge_table(path: Path, *, sewing: Path | None = None, units: str | None = None) -> str:
-    """Return every edge of a pattern's pieces with its length and ends, a line each.
+def edge_table(
+    path: Path, *, sewing: Path | None = None, units: str | None = None
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return every edge of a pattern's pieces with its length and ends, a line each, and what was left out of the file.
 
     Raises:
         InputError: a file cannot be read.
@@ -170,7 +172,7 @@ def edge_table(path: Path, *, sewing: Path | None = None, units: str | None = No
             lines.append(
                 f"{piece.name}.{edge.name}: {1e3 * edge.length:.1f} mm, {edge.kind}, from ({x:.0f}, {y:.0f}) to ({u:.0f}, {v:.0f}) mm"
             )
-    return "\n".join(lines)
+    return lines, tuple(pattern.notes)
 
 
 def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, dict[str, Lift], dict[str, Any] | None]:
@@ -391,7 +393,7 @@ def drape_outside(
         body = {} if job.body is None else {"mannequin": job.body.metrics()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": entry})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)
-    return SceneResult(metrics=metrics, files=tuple(files), notes=(*notes, *more, *stale))
+    return SceneResult(metrics=metrics, files=tuple(files), notes=(*pattern.notes, *notes, *more, *stale))
 
 
 def _correction_words(found: Correction) -> str:

@@ -324,7 +324,7 @@ class FindSeamsTable(Table):
     up: Direction | None = None
     front: Direction | None = None
     no: list[str] = Field(default_factory=list)
-    """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts."""
+    """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts; "uv": islands of the texture are not followed."""
     keep: list[str] = Field(default_factory=list)
     """Seams that are made in any case: "waist", "yoke", "centre back", "side left"."""
     smooth_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
@@ -699,6 +699,8 @@ class ClothTable(Table):
     """Seams at whose first notch both sides lie on the same stripe in the marker."""
     interfacing: Annotated[str, Field(max_length=40)] = ""
     """What the interfacing is called; with a name facings and waistbands are cut from it too."""
+    pocketing: Annotated[str, Field(max_length=40)] = ""
+    """What the cloth of pocket bags is called; with a name these are cut from it, not from the shell's cloth."""
 
 
 class MarkerTable(Table):

@@ -26,7 +26,7 @@ from warpflat.surface.paths.edge_paths import are_joined
 from warpflat.surface.paths.section import plane_sections
 from warpflat.surface.paths.trace import SurfacePath, geodesic_path, locate, polyline_path
 
-__all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand"]
+__all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand", "level_of"]
 
 Ids = NDArray[np.int64]
 
@@ -366,7 +366,7 @@ def _kept(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> Cl
         ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
         edges = edges[ahead if name == "centre front" else ~ahead]
     elif name in ("waist", "yoke"):
-        level = _level(cloth, anatomy, name, options)
+        level = level_of(cloth, anatomy, name, options)
         if level is None:
             return None
         height = cloth.vertices @ anatomy.up - level
@@ -380,7 +380,7 @@ def _kept(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> Cl
     return cloth.with_seam(name, edges) if len(edges) else None
 
 
-def _level(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> float | None:
+def level_of(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> float | None:
     """Return the height of a waist or a yoke [m]; None where the garment has none."""
     trunk = cloth.labels["sleeve"] < 0
     heights = cloth.vertices @ anatomy.up

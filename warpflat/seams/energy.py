@@ -25,6 +25,7 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.sew_pieces import sew_pieces
 from warpflat.seams.anatomy import ROLES, Anatomy
+from warpflat.seams.by_hand import level_of
 from warpflat.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.seams.options import SeamOptions
 from warpflat.seams.solid import NARROW, SEWABLE, SOLID, LaidFlat, parts_within
@@ -85,6 +86,8 @@ _STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm", "side")
 _FACE, _OWNER = "face before", "piece before"
 # The hem of what opens in front is the lowest share of its height.
 _HEM = 0.15
+# The seam around the narrowest of the trunk; pieces that reach no farther above or below it, as a share of the size, are not cut.
+_WAIST, _BESIDE_WAIST = "waist", 0.04
 # Names of a seam on trial, and of its mirror image.
 _TRIAL, _MATE = "on trial", "on trial, mirrored"
 # Prices are known to this share, what is made to the second.
@@ -230,6 +233,8 @@ def cut_by_energy(
                 made = both or made
             # Where a twin is cut alike, it adds as many.
             more = (int(made.parts.max()) + 1 - len(pieces)) * (1 if twin is None else 2)
+            if candidate.name == _WAIST:
+                more = len(_across(cloth, candidate, anatomy))
             if more and len(pieces) + more > most:
                 return None
             try:
@@ -279,6 +284,14 @@ def cut_by_energy(
                 other = None if target is None else _cut(cloth, target, _mirrored(candidate, anatomy), names[1])
                 names = names if other is not None else names[:1]
                 cloth = other or cloth
+        if candidate.name == _WAIST:
+            # Front and back have it together.
+            title = _free_name(cloth, candidate, 0) if both else names[0]
+            tried_on = set[int]()
+            while left := [one for one in _across(cloth, candidate, anatomy) if _key(one) not in tried_on]:
+                tried_on.add(_key(left[0]))
+                cloth = _cut(cloth, left[0], candidate, title) or cloth
+            names = [*names, *([title] if title not in names and title in cloth.seams else [])]
         before, pieces = pieces, _measured(cloth, anatomy, fabric, prepare, [*pieces, *new])
         gain = (sum(one.outside for one in before) - sum(one.outside for one in pieces)) / total
         released = sum(one.energy for one in before) - sum(one.energy for one in pieces)
@@ -716,10 +729,12 @@ def _candidates(
             yield _Candidate(name=name, normal=anatomy.normal, point=anatomy.offset * anatomy.normal, parts=True)
         tall = float(np.ptp(heights))
         level = float(np.average(heights[[m.vertex for m in misfits]], weights=[m.area for m in misfits]))
-        name, waist = "waist" if tall > 0.8 * size else "yoke", options.waist_along(anatomy.up)
+        name, waist = "yoke", None
+        if anatomy.kind in ("top", "dress", "jumpsuit") and (tall > 0.8 * size or options.waist is not None):
+            # Where the body has it, or the trunk is narrowest.
+            waist = level_of(cloth, anatomy, _WAIST, options)
         if waist is not None and 0.2 * tall < waist - heights.min() < 0.8 * tall:
-            # Where the body has it.
-            name, level = "waist", waist
+            name, level = _WAIST, waist
         known = [edges for other, edges in cloth.seams.items() if other.startswith(name)]
         if known:
             # Front and back meet at the sides.
@@ -813,6 +828,18 @@ def _candidates(
                     end=rim[k] + reach * size * way,
                     parts=False,
                 )
+
+
+def _across(cloth: Cloth, candidate: _Candidate, anatomy: Anatomy) -> list[PieceMesh]:
+    """Return the pieces of the trunk that a plane parts well inside."""
+    sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1))
+    beside = _BESIDE_WAIST * anatomy.size
+    found = []
+    for mesh in cloth.pieces():
+        height = (mesh.vertices - candidate.point) @ candidate.normal
+        if np.median(sleeve[mesh.face_of]) < 0 and height.min() < -beside and height.max() > beside:
+            found.append(mesh)
+    return found
 
 
 def _at_hem(cloth: Cloth, vertices: Ids, anatomy: Anatomy) -> BoolArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, plain_label
 from warpflat.core.text import area_words, format_count, quote_value
 from warpflat.seams.options import SeamCut
+from warpflat.surface.connectivity import euler_characteristic
 from warpflat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
 from warpflat.surface.io.usd_stage import ALL_PRIMS
 from warpflat.surface.mesh import Surface
@@ -22,6 +24,8 @@ __all__ = ["GarmentFile", "read_garment", "read_layers"]
 
 # A part is a trifle, such as a button, below this share of the area of all; a closed one below this.
 _TRIFLE, _CLOSED_TRIFLE = 0.004, 0.05
+# A body is no shorter than a newborn, and half of what it wears is as near as this [m].
+_SHORTEST_BODY, _WORN = 0.45, 0.1
 # So many parts at most are cut, each on its own.
 _MOST_LAYERS = 40
 
@@ -41,7 +45,7 @@ def read_layers(
     """Read a garment whose seams are to be found: each connected part is a layer, largest first; closed ones are kept.
 
     Vertices at one place are joined, so that seams of a texture do not part the cloth. Buttons, crumbs and second layers are left out
-    with a note, as is a part that is no surface where another one is.
+    with a note, as are a body that wears the rest, and a part that is no surface where another one is.
 
     Args:
         path, units: as :func:`warpflat.read_surface`.
@@ -97,6 +101,11 @@ def read_garment(
             found.append(surface)
     if not found:
         raise faults[0] if faults else wrong_size(largest, file, scale)
+    bodies = [surface for surface in found if _is_body(surface, [other for other in found if other is not surface])]
+    for body in bodies:
+        tall = float(np.ptp(body.vertices, axis=0).max())
+        notes.append(f"a body, {tall:.2f} m tall, left out: closed, and the rest lies around it")
+    found = [surface for surface in found if all(surface is not body for body in bodies)]
     layers = [Layer(surface.vertices, surface.faces) for surface in found]
     total = sum(layer.area for layer in layers)
     surplus = surplus_layers(layers)
@@ -130,6 +139,19 @@ def read_garment(
         )
     kept[0] = replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes])))
     return GarmentFile(layers=tuple(kept), marks=tuple(marks), raw=raw, scale=scale)
+
+
+def _is_body(surface: Surface, others: Sequence[Surface]) -> bool:
+    """Return whether a layer is the body that wears the others: closed, without handles, as tall as one, and most of them lie on it."""
+    from scipy.spatial import cKDTree
+
+    if np.ptp(surface.vertices, axis=0).max() < _SHORTEST_BODY or not _is_closed(surface):
+        return False
+    worn = [other.vertices for other in others if not _is_closed(other)]
+    if not worn or euler_characteristic(surface.faces) != 2:
+        return False
+    away = cKDTree(surface.vertices).query(np.concatenate(worn))[0]
+    return float(np.median(away)) < _WORN
 
 
 def _is_closed(surface: Surface) -> bool:

@@ -8,7 +8,7 @@ are one, so that formats that split them (GLB) and those that do not (OBJ, USD) 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ _CRUMB = 1e-3
 # Cut pieces: at most so many; areas that agree with the cloth's within this share, of islands above the second share of their part;
 # and no more of an island than this lies face down.
 _MOST_PIECES, _SAME_AREA, _COUNTED, _FACE_DOWN = 24, 0.15, 0.01, 0.01
+# Slits are one seam across a gap of this share of both, from which they turn by no more than this (its cosine).
+_GAP, _IN_LINE = 0.25, float(np.cos(np.radians(30.0)))
 # A part that is mirrored in the texture is an island of its own from this share on.
 _MIRRORED = 0.05
 
@@ -100,6 +102,7 @@ def file_seams(raw: RawMesh) -> dict[str, FileSeams]:
         island = sides.islands(number)
         island, joined = sides.without_crumbs(island) if int(island.max()) < MOST_ISLANDS else (island, 0)
         differ = sides.pairs[(sides.ends(number)[0] != sides.ends(number)[1]).any(axis=1)]
+        differ = np.concatenate([differ, sides.bridges(differ)])
         # Within an island that a crumb was joined to, only its own slits are left.
         of = island[sides.face[differ]]
         kept = (of[:, 0] != of[:, 1]) | ~sides.was_crumb[sides.face[differ]].any(axis=1)
@@ -159,7 +162,8 @@ class _Sides:
         column = np.arange(polygons.shape[1])
         self._follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
         self._real = real
-        place = weld_map(raw.vertices).astype(np.int64)
+        self._place = place = weld_map(raw.vertices).astype(np.int64)
+        self._points = raw.vertices
         heads = np.take_along_axis(polygons, self._follow, axis=1)
         self.face = np.repeat(np.arange(len(polygons)), size)
         self.tail, self.head = polygons[real], heads[real]
@@ -179,6 +183,58 @@ class _Sides:
         #: #F [the file's unit, squared].
         self.area = 0.5 * np.linalg.norm(normal, axis=1)
         self.was_crumb: BoolArray = np.zeros(len(polygons), dtype=bool)
+
+    def bridges(self, seams: Ids) -> Ids:
+        """Return pairs of sides (#B by 2) along which slits (#P by 2 pairs of sides) go on to others in line with them.
+
+        Two slits are one seam where the gap between their ends is short against both, and both run straight on across it.
+        """
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components, dijkstra
+
+        if not len(seams):
+            return seams
+        count = len(self._place)
+        tail, head = self._place[self.tail], self._place[self.head]
+        a, b = tail[seams[:, 0]], head[seams[:, 0]]
+        part = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
+        long = np.bincount(part[a], self.length[seams[:, 0]], minlength=int(part.max()) + 1)
+        # Slits end where one of their edges does, and no border is.
+        alone = np.ones(len(tail), dtype=bool)
+        alone[self.pairs.ravel()] = False
+        degree = np.bincount(np.concatenate([a, b]), minlength=count)
+        degree[np.concatenate([tail[alone], head[alone]])] = 0
+        ends = np.flatnonzero(degree == 1)
+        if len(ends) > MOST_ISLANDS:
+            return seams[:0]  # as many are no pattern
+        at_one, at_two = degree[a] == 1, degree[b] == 1
+        before = dict(
+            zip([*a[at_one].tolist(), *b[at_two].tolist()], [*b[at_one].tolist(), *a[at_two].tolist()], strict=True)
+        )
+        found = list[tuple[float, int, int]]()
+        for one, other in combinations(ends.tolist(), 2):
+            across = self._points[other] - self._points[one]
+            gap = float(np.linalg.norm(across))
+            if part[one] == part[other] or not 0.0 < gap <= _GAP * float(long[part[one]] + long[part[other]]):
+                continue
+            runs = self._points[one] - self._points[before[one]], self._points[before[other]] - self._points[other]
+            if all(float(run @ across) >= _IN_LINE * float(np.linalg.norm(run)) * gap for run in runs):
+                found.append((gap, one, other))
+        if not found:
+            return seams[:0]
+        graph = coo_array((self.length, (tail, head)), shape=(count, count)).tocsr()
+        sides = np.stack([tail, head], axis=1)[self.pairs[:, 0]].tolist()
+        at = {frozenset(pair): row for row, pair in enumerate(sides)}
+        rows, taken = list[int](), set[int]()
+        for gap, one, other in sorted(found):
+            if {one, other} & taken:
+                continue
+            taken |= {one, other}
+            reached, came = dijkstra(graph, directed=False, indices=one, return_predecessors=True, limit=gap / _IN_LINE)
+            while np.isfinite(reached[other]) and other != one:
+                rows += [at[key]] if (key := frozenset((other, int(came[other])))) in at else []
+                other = int(came[other])
+        return self.pairs[rows]
 
     def ends(self, number: Ids) -> tuple[Ids, Ids]:
         """Return #P by 2 twice: the numbers (#F by k, of corners) at both ends of the sides of each pair, in one direction."""

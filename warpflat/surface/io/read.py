@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, expect, nearest
+from warpflat.core.file_kinds import other_kind_words
 from warpflat.core.file_names import check_file_name, make_file_name, plain_label
 from warpflat.core.input_files import listening_to_reads, note_read, reading
 from warpflat.core.text import quote_value
@@ -221,7 +222,8 @@ def _reading_mesh(file: Path) -> Iterator[None]:
     """
     with reading(file, "mesh", missing="does not exist"):
         if file.suffix.lower() not in SUFFIXES:
-            raise InputError(f"unknown kind of file {file.suffix!r}; {nearest(file.suffix.lower(), SUFFIXES)}")
+            known = f"unknown kind of file {file.suffix!r}; {nearest(file.suffix.lower(), SUFFIXES)}"
+            raise InputError(other_kind_words(file, "a mesh") or known)
         if file.stat().st_size == 0:
             raise InputError("is empty")
         yield
@@ -302,6 +304,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
         scale=scale,
         split_corners=mesh.split_corners,
         objects=_in_turn(mesh.groups, mesh.faces) if mesh.groups else None,
+        notes=mesh.notes,
         marked=list(mesh.edges),
         texture=mesh.corner_texture,
         face_material=mesh.face_material,

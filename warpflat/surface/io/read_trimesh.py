@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.input_files import noting_resolver
+from warpflat.surface.io.gltf import gltf_notes, gltf_table, plain_gltf
 from warpflat.surface.io.usd_stage import numbered
 
 __all__ = ["GLTF", "read_with_trimesh"]
 
 
-GLTF = (".glb", ".gltf")
+#: Kinds of glTF; an avatar in VRM is one with more in it.
+GLTF = (".glb", ".gltf", ".vrm")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +39,7 @@ class TrimeshMesh:
         edges: #E by 2, elements of a PLY file.
         corner_texture: #F by 3 by 2, texture coordinates of GLB and glTF, nan where there are none; None if no corner has any.
         face_material, face_group: #F, a number for the material and the node of each face, and their names.
+        notes: what a glTF has beside its scene, one sentence each.
     """
 
     vertices: FloatArray
@@ -47,6 +50,7 @@ class TrimeshMesh:
     corner_texture: FloatArray | None
     face_material: tuple[NDArray[np.int64], tuple[str, ...]]
     face_group: tuple[NDArray[np.int64], tuple[str, ...]]
+    notes: list[str]
 
 
 def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
@@ -60,7 +64,7 @@ def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
         InputError: without the file's name: it cannot be read, has no such node, or no faces.
     """
     suffix = file.suffix.lower()
-    scene, materials = _load_scene(file)
+    scene, materials, notes = _load_scene(file)
     meshes = list(_instances(scene))
     if node is not None:
         names = [one.node for one in meshes]
@@ -92,11 +96,15 @@ def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
         corner_texture=texture if np.isfinite(texture).any() else None,
         face_material=(np.repeat(number, size), material),
         face_group=(np.repeat(np.arange(len(meshes)), size), tuple(one.node for one in meshes)),
+        notes=notes,
     )
 
 
-def _load_scene(file: Path) -> tuple[Any, dict[str, str]]:
-    """Load a file with trimesh, whose log and warnings are silenced meanwhile; return the scene, and the materials of its geometry."""
+def _load_scene(file: Path) -> tuple[Any, dict[str, str], list[str]]:
+    """Load a file with trimesh, whose log and warnings are silenced meanwhile.
+
+    Returns the scene, the materials of its geometry, and what the file has beside it.
+    """
     import trimesh
 
     suffix = file.suffix.lower()
@@ -113,19 +121,20 @@ def _load_scene(file: Path) -> tuple[Any, dict[str, str]]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if suffix not in GLTF:
-                return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options), {}
-            data = file.read_bytes()
-            first, last = (20, 20 + int.from_bytes(data[12:16], "little")) if suffix == ".glb" else (0, len(data))
+                return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options), {}, []
+            data = plain_gltf(file.read_bytes(), noting_resolver(file))
+            binary = data[:4] == b"glTF"
+            first, last = (20, 20 + int.from_bytes(data[12:16], "little")) if binary else (0, len(data))
             # Trimesh reads texture coordinates together with the pictures only; under this name they are an attribute like any other.
             head = data[first:last].replace(b'"TEXCOORD_0"', b'"_EXCOORD_0"')
             scene = trimesh.load_scene(
                 io.BytesIO(data[:first] + head + data[last:]),
-                file_type=suffix[1:],
+                file_type="glb" if binary else "gltf",
                 process=False,
                 resolver=noting_resolver(file),
                 **options,
             )
-            return scene, _materials(head, list(scene.geometry))
+            return scene, _materials(head, list(scene.geometry)), gltf_notes(gltf_table(data))
     except InputError:
         raise
     # Any error of a parser is the file's fault, of whatever type it is.

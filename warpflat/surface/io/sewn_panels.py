@@ -11,7 +11,6 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import format_count
-from warpflat.surface.connectivity import border_loops
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.io.file_seams import MOST_ISLANDS, file_seams
 from warpflat.surface.io.read import METRES_PER_UNIT, POSSIBLE, RawMesh, check_size, read_mesh_file
@@ -102,7 +101,7 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
         name: of panels without one of their own.
 
     Raises:
-        InputError: there is no texture, or it is no pattern: not of true size in any unit, or of panels that lie over each other.
+        InputError: there is no texture, or it is no pattern: not of true size in any unit, or of a panel that lies over itself.
     """
     parts_of_faces(raw.vertices * scale, raw.polygons, weld=True)
     seams = file_seams(raw).get("uv")
@@ -162,44 +161,15 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
         a, b, c = np.moveaxis(cut[triangulate(surface.faces)[0]], 1, 0)
         turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
         panels.append(SewnPanel(surface=surface, cut=cut * [-1.0, 1.0] if turned.sum() < 0.0 else cut, unit=unit))
-    _refuse_overlap(panels, [metres * places for _, _, places in found])
-    return panels
-
-
-def _refuse_overlap(panels: list[SewnPanel], laid: list[FloatArray]) -> None:
-    """Check that no panel lies over itself or, where the texture has them (`laid`, #V by 2 [m] each), over another one.
-
-    Raises:
-        InputError: one does.
-    """
-    import shapely
-
     for panel in panels:
+        # Islands may lie over each other, as layers that are stacked in the plane do.
         own = overlap_area(panel.surface, panel.cut, np.empty(0, dtype=np.int32)) / panel.area
         if own > _OVERLAP:
             raise InputError(
                 f"island {panel.surface.name!r} of its texture lies over itself with {100 * own:.1f} % of its area, or partly face down: "
                 f"that is no pattern; {_RIGHT}"
             )
-    outlines = list[shapely.Polygon]()
-    for panel, places in zip(panels, laid, strict=True):
-        rings = sorted(
-            (shapely.Polygon(places[loop]) for loop in border_loops(panel.surface.faces)), key=lambda ring: -ring.area
-        )
-        outlines.append(
-            shapely.difference(rings[0].buffer(0), shapely.union_all([ring.buffer(0) for ring in rings[1:]]))
-        )
-    area = sum(outline.area for outline in outlines)
-    covered = float(shapely.union_all(outlines).area)
-    if area - covered > _OVERLAP * area:
-        tree = shapely.STRtree(outlines)
-        pairs = [(a, b) for a, b in tree.query(outlines).T.tolist() if a < b]
-        worst = max(pairs, key=lambda pair: outlines[pair[0]].intersection(outlines[pair[1]]).area)
-        names = " and ".join(repr(panels[k].surface.name) for k in worst)
-        raise InputError(
-            f"islands of its texture lie over each other with {100 * (1.0 - covered / area):.0f} % of their area, most of all {names}: "
-            f"they are no sewn pattern; {_RIGHT}"
-        )
+    return panels
 
 
 def _titles(raw: RawMesh, island: np.ndarray, name: str) -> list[str]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import quote_value
+from warpflat.core.usd_layers import check_layers
 from warpflat.core.usd_process import UNREADABLE
 
 __all__ = ["ALL_PRIMS", "UsdMesh", "numbered", "read_usd_stage"]
@@ -95,11 +96,16 @@ def _warned(warnings: Any) -> str:
 
 
 def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
-    from pxr import Usd, UsdGeom, UsdShade
+    from pxr import Pcp, Usd, UsdGeom, UsdShade
 
+    check_layers(path)
     stage = Usd.Stage.Open(str(path))
     if not stage:
         raise InputError(UNREADABLE)
+    # What a prim refers to in a layer may be missing there.
+    for each in stage.TraverseAll():
+        if any(isinstance(error, Pcp.ErrorUnresolvedPrimPath) for error in each.GetPrimIndex().localErrors):
+            raise InputError(f"{each.GetPath()} is not whole: a layer does not have what it refers to there")
     meshes = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
     paths = [str(p.GetPath()) for p in meshes]
     if not meshes:
@@ -113,7 +119,11 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
         if len(chosen) != 1:
             what = "names several mesh prims" if chosen else "is not a mesh prim"
             raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
-    notes: list[str] = []
+    notes = [
+        f"{each.GetPath()} repeats meshes, of which each was read once; make its instances real, or save each as a mesh"
+        for each in stage.Traverse()
+        if each.IsA(UsdGeom.PointInstancer)
+    ]
     if metres_per_unit is None:
         metres_per_unit = float(UsdGeom.GetStageMetersPerUnit(stage))
         if not 0.0 < metres_per_unit < np.inf:
