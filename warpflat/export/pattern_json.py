@@ -188,7 +188,19 @@ class PieceEntry(Entry):
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
     role: Literal[
-        "shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket"
+        "shell",
+        "facing",
+        "strip",
+        "waistband",
+        "cuff",
+        "collar",
+        "hood",
+        "lining",
+        "interfacing",
+        "pocket",
+        "placket",
+        "tie",
+        "fly",
     ] = "shell"
     also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
     enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
@@ -304,6 +316,7 @@ class WornEntry(Entry):
     needed: list[NeededEntry] = Field(default_factory=list)
     knits: list[Text] = Field(default_factory=list)
     failing: list[Literal["held", "pressing", "too large"]] = Field(default_factory=list)
+    buttonholes: Literal["left", "right"] = "right"
 
 
 class FoundSeamEntry(Entry):
@@ -588,6 +601,7 @@ def _worn(worn: Worn) -> dict[str, Any]:
         "needed": [asdict(each) for each in worn.needed],
         "knits": list(worn.knits),
         "failing": list(worn.failing),
+        "buttonholes": worn.buttonholes,
     }
 
 
@@ -607,6 +621,7 @@ def _read_worn(data: WornEntry) -> Worn:
         needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
         knits=tuple(data.knits),
         failing=tuple(data.failing),
+        buttonholes=data.buttonholes,
     )
 
 

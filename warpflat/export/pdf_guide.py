@@ -16,7 +16,8 @@ from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_
 from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
 from warpflat.pattern.pieces import FoundSeam
-from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams, tools
+from warpflat.pattern.sewing_order import SewingStep, notions, sewing_steps, sewn_seams, tools
+from warpflat.pattern.sewing_tasks import piece_titles, techniques
 from warpflat.pattern.words import listed, translate, translate_name
 from warpflat.pattern.worn import Worn
 
@@ -38,6 +39,14 @@ FAILING = {
     "held": "This garment does not fit: its cloth is stretched or sheared beyond what it bears.",
     "pressing": "This garment does not fit: it presses on the body.",
     "too large": "This garment does not fit: it is larger than it was drafted.",
+}
+#: Size of the drawing of a technique [m], and of the box in which its strokes are given; by style their colour, width [pt] and dashes.
+TECHNIQUE, BOX = np.array([0.0176, 0.011]), np.array([48.0, 30.0])
+STROKES = {
+    "cloth": ("#000000", 0.9, ()),
+    "other": ("#1f5fa8", 0.9, ()),
+    "fold": ("#000000", 0.5, (2, 1.2)),
+    "stitch": ("#b8460b", 1.0, (1.5, 1)),
 }
 #: Sizes of type [pt] and distance of lines [m].
 HEADING, TEXT, LINE = 11.0, 8.0, 0.0046
@@ -188,9 +197,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
     )
     for number, sewing in enumerate(sewing_steps(whole, size), 1):
-        _step(
-            page, number, sewing.words, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn]
-        )
+        _step(page, number, sewing, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn])
     seams = sewn_seams(whole, size)
     if seams:
         page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
@@ -335,11 +342,12 @@ def _prices(page: _Page, found: Sequence[FoundSeam], units: str) -> None:
     page.table(["", *map(translate, ("length", "releases", "per length"))], rows, (0.34, 0.16, 0.34, 0.16))
 
 
-def _step(page: _Page, number: int, words: str, pieces: Sequence[tuple[DraftedPiece, frozenset[str]]]) -> None:
-    """Write a step with a small picture of its pieces, what is sewn in colour."""
+def _step(page: _Page, number: int, sewing: SewingStep, pieces: Sequence[tuple[DraftedPiece, frozenset[str]]]) -> None:
+    """Write a step with small pictures: how it is sewn, and of its pieces, what is sewn in colour."""
     shown = pieces[:STEP_PIECES]
-    rows = wrap_text(words, TEXT * CAPITALS / POINT, page.width - 0.006 - STEP_WIDTH).split("\n")
-    height = max(LINE * len(rows), STEP_HEIGHT if shown else 0.0) + 0.0012
+    width = page.width - 0.010 - STEP_WIDTH - TECHNIQUE[0]
+    rows = wrap_text(sewing.words, TEXT * CAPITALS / POINT, width).split("\n")
+    height = max(LINE * len(rows), STEP_HEIGHT) + 0.0012
     page.need(height)
     top = page.y
     for row_number, row in enumerate(rows):
@@ -347,6 +355,20 @@ def _step(page: _Page, number: int, words: str, pieces: Sequence[tuple[DraftedPi
         if row_number == 0:
             page.text(page.left, str(number), bold=True)
         page.text(page.left + 0.006, row)
+    corner = np.array([page.left + page.width - STEP_WIDTH - TECHNIQUE[0] - 0.002, top - 0.5 * (height + TECHNIQUE[1])])
+    for stroke in techniques()[sewing.technique]["drawing"]:
+        style, *numbers = stroke.split(" ")
+        colour, line_width, dashes = STROKES[style]
+        page.canvas.setStrokeColor(colour)
+        page.canvas.setLineWidth(line_width)
+        page.canvas.setDash(list(dashes))
+        points = (corner + np.array(numbers, dtype=float).reshape(-1, 2) * TECHNIQUE / BOX) * POINT
+        path = page.canvas.beginPath()
+        path.moveTo(*points[0])
+        for point in points[1:]:
+            path.lineTo(*point)
+        page.canvas.drawPath(path)
+    page.canvas.setDash([])
     if shown:
         room = STEP_WIDTH / STEP_PIECES
         largest = np.max([np.ptp(piece.cut_line, axis=0) for piece, _ in shown], axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import groupby
@@ -92,7 +93,11 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
     knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
     verdict = judge(garment.metrics()) if garment.form is not None else None
     failing = dict.fromkeys(finding.kind for finding in verdict.findings if finding.fails) if verdict else {}
-    return Worn(views=views, measures=measures, needed=needed, knits=tuple(knits), failing=tuple(failing))
+    mens = garment.mannequin is not None and re.search(r"\bmen\b", garment.mannequin.source) is not None
+    return Worn(
+        views=views, measures=measures, needed=needed, knits=tuple(knits), failing=tuple(failing),
+        buttonholes="left" if mens else "right",
+    )  # fmt: skip
 
 
 def _with_slanted_hems(garment: Garment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:

@@ -72,6 +72,7 @@ class Worn:
         needed: openings that are missing, of the sample size.
         knits: names of its cloths that are knits.
         failing: why it does not fit, by the verdict of its run: "held", "pressing" or "too large"; nothing where it fits.
+        buttonholes: the half that has them and lies above, "right" for women, "left" for men.
     """
 
     views: Mapping[str, tuple[ViewedPiece, ...]] = field(default_factory=dict)
@@ -79,3 +80,4 @@ class Worn:
     needed: tuple[NeededOpening, ...] = ()
     knits: tuple[str, ...] = ()
     failing: tuple[str, ...] = ()
+    buttonholes: str = "right"
