@@ -23,6 +23,8 @@ Ids = NDArray[np.int64]
 _MEAN, _FARTHEST = 0.01, 0.035
 # The move of the cloth fades over this where a border moves by more.
 _FADE = 0.05
+# Cloth crosses the plane where the way over it leads across by this (cosine).
+_STEEP = 0.5
 # A seam that keeps so near to the plane of symmetry is in it.
 _IN_PLANE = 0.008
 # Cloth that is so far from the plane, as a share of what is the farthest at its height, one of so many levels, is of its side.
@@ -155,7 +157,10 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
 
 
 def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
-    """Return a harmonic field, #V: the distance from the plane of symmetry [m] far from it, and 0 along seams in the plane."""
+    """Return a field, #V: the distance from the plane of symmetry [m] far from it and where cloth plainly crosses it; else harmonic.
+
+    It is 0 along seams in the plane.
+    """
     operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
     lateral = cloth.vertices @ anatomy.normal - anatomy.offset
     heights = cloth.vertices @ anatomy.up
@@ -174,11 +179,31 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
         inner = np.setdiff1d(np.concatenate([np.empty(0, dtype=np.int64), *(part.ravel() for part in parts)]), far)
         fixed = np.concatenate([far, inner])
         field = operators.solve(fixed, np.concatenate([lateral[far], np.zeros(len(inner))]))
-        # One that has the same side of the garment on both of its sides, is not in it.
+        # One that has the same side of the garment on both of its sides is not in it.
         between = [part for part in parts if _changes_sign(cloth, field, part)]
         if len(between) == len(parts):
-            return field
+            break
         parts = between
+    plain = np.setdiff1d(_plainly_across(cloth, field, lateral, anatomy), fixed)
+    given = np.concatenate([lateral[far], np.zeros(len(inner)), lateral[plain]])
+    return operators.solve(np.concatenate([fixed, plain]), given)
+
+
+def _plainly_across(cloth: Cloth, field: FloatArray, lateral: FloatArray, anatomy: Anatomy) -> Ids:
+    """Return the vertices near the plane of symmetry in whose surroundings the cloth is steep to it, and goes as a field (#V) rises."""
+    from scipy.spatial import cKDTree
+
+    near = _FADE * anatomy.size
+    corners, normals = cloth.vertices[cloth.faces], cloth.face_normals
+    # Of a linear function, by the edges opposite to the corners, each turned by a right angle.
+    turned = np.cross(normals[:, None], np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1))
+    rise = np.einsum("fk,fka->fa", field[cloth.faces], turned)
+    across = rise @ anatomy.normal > _STEEP * np.linalg.norm(rise, axis=1)
+    other = (np.abs(lateral[cloth.faces]).min(axis=1) < 2.0 * near) & ~across
+    away = np.full(len(lateral), np.inf)
+    if other.any():
+        away = cKDTree(corners[other].mean(axis=1)).query(cloth.vertices)[0]
+    return np.flatnonzero((np.abs(lateral) < near) & (away > near))
 
 
 def _changes_sign(cloth: Cloth, field: FloatArray, line: Ids) -> bool:
