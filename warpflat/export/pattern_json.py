@@ -39,7 +39,7 @@ from warpflat.pattern.drafted import (
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Elastic, FoundSeam, Pattern, Piece, Seam, SeamOpening, SeamSide
-from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
+from warpflat.pattern.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
 
 __all__ = [
     "SCHEMA",
@@ -308,6 +308,15 @@ class NeededEntry(Entry):
     depth: Length
 
 
+class ClothEntry(Entry):
+    """What a shop knows a cloth by (see `warpflat.pattern.worn.ClothKind`)."""
+
+    kind: Literal["woven", "knit"]
+    weight: Length
+    stretch: Annotated[list[Length], Field(min_length=2, max_length=2)]
+    examples: list[Text] = Field(default_factory=list)
+
+
 class WornEntry(Entry):
     """The garment on its body."""
 
@@ -316,6 +325,7 @@ class WornEntry(Entry):
     needed: list[NeededEntry] = Field(default_factory=list)
     knits: list[Text] = Field(default_factory=list)
     failing: list[Literal["held", "pressing", "too large"]] = Field(default_factory=list)
+    cloths: dict[Text, ClothEntry] = Field(default_factory=dict)
     buttonholes: Literal["left", "right"] = "right"
 
 
@@ -601,6 +611,7 @@ def _worn(worn: Worn) -> dict[str, Any]:
         "needed": [asdict(each) for each in worn.needed],
         "knits": list(worn.knits),
         "failing": list(worn.failing),
+        "cloths": {name: asdict(each) for name, each in worn.cloths.items()},
         "buttonholes": worn.buttonholes,
     }
 
@@ -621,6 +632,15 @@ def _read_worn(data: WornEntry) -> Worn:
         needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
         knits=tuple(data.knits),
         failing=tuple(data.failing),
+        cloths={
+            name: ClothKind(
+                kind=each.kind,
+                weight=each.weight,
+                stretch=(each.stretch[0], each.stretch[1]),
+                examples=tuple(each.examples),
+            )
+            for name, each in data.cloths.items()
+        },
         buttonholes=data.buttonholes,
     )
 

@@ -19,7 +19,7 @@ from warpflat.garment.button_stand import button_depths
 from warpflat.garment.drawn_finishing import finishing_views
 from warpflat.garment.girths import pattern_girths
 from warpflat.garment.openings import Buttons, place_opening
-from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
+from warpflat.pattern.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
@@ -94,8 +94,16 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
     verdict = judge(garment.metrics()) if garment.form is not None else None
     failing = dict.fromkeys(finding.kind for finding in verdict.findings if finding.fails) if verdict else {}
     mens = garment.mannequin is not None and re.search(r"\bmen\b", garment.mannequin.source) is not None
+    fabrics = {flat.fabric.name: flat.fabric for flat in pieces}
+    cloths = {
+        name: ClothKind(
+            kind="knit" if fabric.is_knit else "woven", weight=fabric.areal_density,
+            stretch=(fabric.stretch("warp"), fabric.stretch("weft")), examples=fabric.examples,
+        )
+        for name, fabric in fabrics.items()
+    }  # fmt: skip
     return Worn(
-        views=views, measures=measures, needed=needed, knits=tuple(knits), failing=tuple(failing),
+        views=views, measures=measures, needed=needed, knits=tuple(knits), failing=tuple(failing), cloths=cloths,
         buttonholes="left" if mens else "right",
     )  # fmt: skip
 
