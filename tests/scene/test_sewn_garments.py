@@ -16,6 +16,7 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.drawing import draw_piece
+from warpflat.pattern.finished import finished_lengths
 from warpflat.pattern.label import cutting_words
 from warpflat.pattern.pieces import SeamSide
 from warpflat.pattern.sewing_order import notions, sewing_steps, sewn_seams, tools
@@ -119,6 +120,18 @@ def test_a_seam_comes_after_those_that_end_on_its_line(drafted: DraftedGarment):
                 assert crossing is None or number[crossing] <= number[seam.name], (crossing, seam.name)
 
 
+def test_a_shirt_and_trousers_are_as_long_as_their_pieces_say():
+    shirt = finished_lengths(drafted_garment("shirt", {}), "")
+    assert {"length at the centre back", "sleeve", "hem at the hip"} == set(shirt)
+    assert 0.5 < shirt["length at the centre back"] < 0.75
+    assert 0.5 < shirt["sleeve"] < 0.7
+    assert 1.0 < shirt["hem at the hip"] < 1.15
+    trousers = finished_lengths(drafted_garment("trousers", {}), "")
+    assert {"outer leg, below the waistband", "inner leg", "hem at the ankle"} == set(trousers)
+    assert 0.2 < trousers["outer leg, below the waistband"] - trousers["inner leg"] < 0.4
+    assert 0.3 < trousers["hem at the ankle"] < 0.45
+
+
 class Misses(dict[str, str]):
     """Words of a language, with those that were asked for in vain."""
 
@@ -145,6 +158,7 @@ def test_every_printed_word_is_german(drafted: DraftedGarment):
         sewing_steps(garment, "")
         notions(garment, "")
         tools(garment, "")
+        finished_lengths(garment, "")
         for piece in garment.pieces[""]:
             draw_piece(piece)
             cutting_words(piece.piece)

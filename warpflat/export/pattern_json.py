@@ -39,7 +39,7 @@ from warpflat.pattern.drafted import (
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Elastic, FoundSeam, Pattern, Piece, Seam, SeamOpening, SeamSide
-from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
+from warpflat.pattern.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
 
 __all__ = [
     "SCHEMA",
@@ -307,6 +307,15 @@ class NeededEntry(Entry):
     depth: Length
 
 
+class ClothEntry(Entry):
+    """What a shop knows a cloth by (see `warpflat.pattern.worn.ClothKind`)."""
+
+    kind: Literal["woven", "knit"]
+    weight: Length
+    stretch: Annotated[list[Length], Field(min_length=2, max_length=2)]
+    examples: list[Text] = Field(default_factory=list)
+
+
 class WornEntry(Entry):
     """The garment on its body."""
 
@@ -314,6 +323,7 @@ class WornEntry(Entry):
     measures: dict[Text, list[MeasureEntry]] = Field(default_factory=dict)
     needed: list[NeededEntry] = Field(default_factory=list)
     knits: list[Text] = Field(default_factory=list)
+    cloths: dict[Text, ClothEntry] = Field(default_factory=dict)
     buttonholes: Literal["left", "right"] = "right"
 
 
@@ -598,6 +608,7 @@ def _worn(worn: Worn) -> dict[str, Any]:
         "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},
         "needed": [asdict(each) for each in worn.needed],
         "knits": list(worn.knits),
+        "cloths": {name: asdict(each) for name, each in worn.cloths.items()},
         "buttonholes": worn.buttonholes,
     }
 
@@ -617,6 +628,15 @@ def _read_worn(data: WornEntry) -> Worn:
         measures={size: tuple(Measure(**each.model_dump()) for each in row) for size, row in data.measures.items()},
         needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
         knits=tuple(data.knits),
+        cloths={
+            name: ClothKind(
+                kind=each.kind,
+                weight=each.weight,
+                stretch=(each.stretch[0], each.stretch[1]),
+                examples=tuple(each.examples),
+            )
+            for name, each in data.cloths.items()
+        },
         buttonholes=data.buttonholes,
     )
 

@@ -12,6 +12,7 @@ from warpflat.core.text import energy_words, without_side
 from warpflat.export.pdf_legend import page_footer
 from warpflat.pattern.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.finished import finished_lengths
 from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
 from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
@@ -125,6 +126,10 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     if whole.garment.worn is not None:
         worn = whole.garment.worn
         _worn(page, worn, size, [each for each in printed.pieces if each in worn.measures], units)
+    lengths = finished_lengths(whole, size)
+    if lengths:
+        words = ", ".join(f"{what} {length_words(length, units)}" for what, length in lengths.items())
+        page.paragraph(words, indent=0.030, lead=translate("Finished"))
     page.heading(translate("You need"), 3 * LINE)
     page.paragraph(", ".join(notions(whole, size)), indent=0.030, lead=translate("Notions"))
     page.paragraph(tools(whole, size), indent=0.030, lead=translate("Tools"))
@@ -146,7 +151,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
             lines = [
                 f"{start + number + 1}  {titles[piece.name]}",
                 cutting_words(piece.piece),
-                " / ".join(cloths_of(piece)),
+                " / ".join(map(translate_name, cloths_of(piece))),
             ]
             y = page.y
             for k, line in enumerate(lines):
@@ -173,13 +178,11 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     if len(cloths) > 1:
         page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
         for cloth, entries in cloths.items():
-            cut = [
-                translate(
-                    f"{{title}} {{count}}{' on fold' if entry.on_fold else ''}", title=entry.title, count=entry.quantity
-                )
-                for entry in entries
-            ]
-            page.paragraph(", ".join(cut), indent=0.030, lead=cloth)
+            cut = []
+            for entry in entries:
+                how = " on fold" if entry.on_fold else ", one mirrored" if entry.mirrored == 1 else ""
+                cut.append(translate(f"{{title}} {{count}}{how}", title=entry.title, count=entry.quantity))
+            page.paragraph("; ".join(cut), indent=0.030, lead=translate_name(cloth))
     page.heading(translate("Sewing order"), 3 * LINE)
     page.paragraph(
         translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
@@ -407,8 +410,22 @@ def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     for fabric, size in ((fabric, size) for fabric in fabrics for size in needed if fabric in needed[size]):
         lengths = needed[size][fabric]
         words = [translate("too narrow") if length is None else cloth_words(length, units) for length in lengths]
-        rows.append([", ".join(part for part in (fabric, printed_size(size) if size else "") if part), *words])
+        rows.append(
+            [", ".join(part for part in (translate_name(fabric), printed_size(size) if size else "") if part), *words]
+        )
     page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
+    for name, cloth in ({} if whole.garment.worn is None else whole.garment.worn.cloths).items():
+        told = translate(
+            f"a {cloth.kind} of {{weight}} g/m2, which a hand's pull stretches by {{along}} % along and {{across}} % across",
+            weight=round(1000 * cloth.weight),
+            along=round(100 * cloth.stretch[0]),
+            across=round(100 * cloth.stretch[1]),
+        )
+        if cloth.examples:
+            told += translate(
+                ", such as {examples}", examples=listed([translate_name(each) for each in cloth.examples])
+            )
+        page.paragraph(told, indent=0.030, lead=translate_name(name))
     page.paragraph(
         translate("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")
     )
