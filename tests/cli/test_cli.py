@@ -296,7 +296,7 @@ def test_paths_that_are_no_mesh(command: Command):
     assert "is a directory" in command("run", "folder.obj").refusal
     assert "no such file" in command("run", "absent.toml").refusal
     assert "did you mean" in command("run", "cloth.obj".replace("o.", "ob.").replace("cloth", "clotj")).refusal
-    assert "is not valid TOML" in command("run", "cloth.obj").refusal
+    assert "is a mesh, not a text in TOML" in command("run", "cloth.obj").refusal
 
 
 def test_units_are_asked_for_and_checked(command: Command):

@@ -94,7 +94,7 @@ def test_05_quantised_meshes_are_read_and_compressed_ones_named(row: Path, comma
     for file in ("float.glb", "quantised.glb"):
         ended = flattened(command, file)
         assert ended.code == 0
-        assert "size: reads as 0.6 m tall" in ended.out
+        assert "reads as 0.6 m tall" in ended.out
     for file, name in (("draco.glb", "Draco"), ("meshopt.glb", "meshopt")):
         assert f"compressed with {name}; save it again" in flattened(command, file).refusal
 
@@ -144,7 +144,7 @@ def test_14_islands_may_be_stacked(row: Path, command: Command) -> None:
     for file in ("apart.obj", "stacked.obj"):
         ended = flattened(command, file, "--units", "mm", "--pattern", "uv")
         assert ended.code == 0
-        assert "pieces: 2" in ended.out
+        assert "2 pieces" in ended.out
 
 
 def test_15_what_the_seams_lose_with_the_inner_shell_is_dropped(row: Path, command: Command) -> None:

@@ -239,7 +239,7 @@ def test_wrong_units_are_named_whatever_is_read(tmp_path, capsys, drawn, read, r
     height = 0.6 / METRES_PER_UNIT[drawn] * METRES_PER_UNIT[read]
     if 3e-3 <= height <= 20.0:
         assert code in (0, 1)
-        assert f"size: reads as {height:.3g} m tall" in told.out
+        assert f"reads as {height:.3g} m tall" in told.out
         assert f"; in {right} it would be 0.6 m" in told.out
     else:
         assert code == 2

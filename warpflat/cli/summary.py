@@ -67,9 +67,9 @@ def summary_lines(
     area = sum(piece["area_m2"] for piece in pieces.values())
     energy = energy_words(sum(piece["strain_energy_j"] for piece in pieces.values()))
     # With what was drafted beside them, such as collars and bands.
-    titles = {each["title"] for part in metrics.get("cloths", ()) for each in part["pieces"]} or pieces
+    titles = {each["title"] for part in metrics.get("cloths", ()) for each in part["pieces"]}
     what = (
-        [f"{format_count(len(titles), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"]
+        [f"{format_count(max(len(titles), len(pieces)), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"]
         if pieces
         else []
     )

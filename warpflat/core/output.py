@@ -471,7 +471,7 @@ def optional_step(
         The note, once the block has ended with an error; before, and where it has not, nothing.
 
     Raises:
-        InputError: a place cannot be written, the disk is full, or the error is none of `of`.
+        InputError: a place cannot be written, the disk is full, or the error is none of `of`; any error where nobody hears of the note.
     """
     notes = list[str]()
     try:
@@ -485,8 +485,10 @@ def optional_step(
             or (foreseen and not isinstance(error, of))
         ):
             raise
-        notes.append(one_line(f"{words}: {error}" if foreseen else f"{words}: {type(error).__name__}: {error}"))
         run = next(reversed(_going_on()), None) if folder is None else _run_into(folder)
+        if folder is None and run is None and not _listeners.get():
+            raise  # nobody would hear of it
+        notes.append(one_line(f"{words}: {error}" if foreseen else f"{words}: {type(error).__name__}: {error}"))
         leave_out(LeftOut(note=notes[0], folder=folder if run is None else run.folder, is_needed=is_needed))
 
 

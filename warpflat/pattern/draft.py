@@ -280,12 +280,13 @@ def _fitted_edges(
         lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
     curves = equal_sides(pieces, seams, {key: curve for key, (curve, _) in fitted.items()})
-    curves, corners = as_in_layout(lines, seams, curves), list[CornerReport]()
+    corners = list[CornerReport]()
     trued: Mapping[tuple[str, str], Curve] = curves
     if true:
         # Turned ends change lengths a little, too.
         trued, corners = true_corners(pieces, seams, curves)
         trued = equal_sides(pieces, seams, trued)
+    trued = as_in_layout(lines, seams, trued)
     edges = {}
     for piece in pieces:
         keys = [(piece.name, edge.name) for edge in piece.edges]
