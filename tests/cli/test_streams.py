@@ -18,6 +18,10 @@ from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotatio
 QUICK = "[relax]\nmax_steps = 30\n[output]\nframes = 0\npicture = false\n[pattern]\nformats = ['json']\n"
 CAP = "datum = 'centre'\n[surface]\nshape = 'bodice'\nresolution = 5\n"
 #: A command line for every command that prints JSON.
+SQUARE = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="400mm" height="300mm" viewBox="0 0 400 300">'
+    '<path id="front" d="M10 10H310V210H10Z"/></svg>'
+)
 PRINTING = {
     "run": ["run", "cap.toml"],
     "flatten": ["flatten", "cap.obj", "--units", "m", "--frames", "0", "--no-picture"],
@@ -26,6 +30,7 @@ PRINTING = {
     "compare": ["compare", "cap.toml", "--fabric", "denim", "--fabric", "jersey"],
     "cuts": ["cuts", "cap.toml"],
     "drape": ["drape", "cap.toml"],
+    "marker": ["marker", "square.svg"],
     "fit": ["fit", "skirt.obj", "--units", "m", "--from", "EU 38", "--to", "EU 40", "--frames", "0", "--no-picture"],
 }
 
@@ -39,6 +44,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "cap.toml").write_text(CAP + QUICK)
     (folder / "cap.obj").write_bytes(CLOTH)
     (folder / "skirt.obj").write_bytes(SKIRT)
+    (folder / "square.svg").write_text(SQUARE)
     model, (finer, triangles) = BodyModel.load(), finer_body()
     upright = rotation(np.zeros((len(model.joints), 3)))
     person = Person(shape=np.zeros(len(model.shapes)), bend=upright, turn=np.eye(3), scale=1.7, place=np.zeros(3))

@@ -180,7 +180,10 @@ def read_row(task: Task, out: Path) -> Row | None:
     with suppress(Exception):  # others may have changed it in any way
         metrics, record = read_result(folder / "metrics.json"), read_result(folder / "task.json")
         pieces = list(metrics["pieces"].values())
-        fits = metrics.get("verdict", {}).get("fits")
+        verdict = metrics.get("verdict")
+        if not pieces or (verdict is None and any(piece.get("wear") for piece in pieces)):
+            raise ValueError("no pieces, or no verdict on them")
+        fits = None if verdict is None else verdict["fits"]
         if fits not in (None, True, False):
             raise ValueError(fits)
         return Row(

@@ -160,7 +160,7 @@ def flatten(
     grain_angles: tuple[str, ...],
     **options: Any,
 ) -> int:
-    """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF or USD.
+    """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, VRM, glTF or USD.
 
     \b
     Examples:

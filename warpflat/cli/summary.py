@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from warpflat.cli.tables import cut_words
 from warpflat.core.text import energy_words, format_count
 from warpflat.garment.to_pattern import LACKING
 from warpflat.scene.found_seams import NO_PATTERN
@@ -48,6 +49,8 @@ def summary_lines(
         lines.append(f"{verdict['words']}{reason}")
     # What would help where it does not fit, else what a maker should know.
     others = [each["words"] for each in told if each["kind"] != "opening"]
+    if taken := metrics.get("pattern_of_file"):
+        others.insert(0, cut_words(taken))
     if correction := metrics.get("drape", {}).get("correction"):
         first, *_, last = (1e3 * each["misfit_m"] for each in correction["rounds"])
         rounds = format_count(len(correction["rounds"]) - 1, "round")

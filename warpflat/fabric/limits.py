@@ -66,20 +66,21 @@ class Demand:
     @cached_property
     def held(self) -> BoolArray:
         """#C, true where the cloth is held beyond a limit: stretched or sheared. Slack cloth folds instead."""
-        return np.asarray((self._held_shares > _AT_LIMIT).any(axis=1))
+        return np.asarray((self.held_shares > _AT_LIMIT).any(axis=1))
 
     @property
     def slack(self) -> BoolArray:
         """#C, true where the cloth is longer than the surface by more than its limit, and not held beyond another one."""
         return np.asarray(self.beyond & ~self.held)
 
-    @property
+    @cached_property
     def most(self) -> FloatArray:
-        """#C, the largest share of a limit, unsigned; where the cloth is held beyond a limit, of those that hold it."""
-        return np.asarray(np.where(self.held, self._held_shares.max(axis=1), np.abs(self.shares).max(axis=1)))
+        """#C, the largest share of a limit, unsigned."""
+        return np.asarray(np.abs(self.shares).max(axis=1))
 
     @cached_property
-    def _held_shares(self) -> FloatArray:
+    def held_shares(self) -> FloatArray:
+        """#C by #ways, the shares of the limits that hold the cloth: those of stretched threads, and of shear, unsigned."""
         shear = np.array([way == "shear" for way in self.ways])
         return np.asarray(np.where(shear, np.abs(self.shares), self.shares))
 
@@ -88,9 +89,8 @@ class Demand:
         return float(area[self.beyond].sum() / max(float(area.sum()), 1e-300))
 
     def amount(self, place: int, way: int | None = None) -> Amount:
-        """Return what is asked at a place in one way, a column of `shares`, or in the one that `most` is of."""
-        asked = self._held_shares[place] if self.held[place] else np.abs(self.shares[place])
-        column = int(asked.argmax()) if way is None else way
+        """Return what is asked at a place in one way, a column of `shares`, or in the one that asks for most."""
+        column = int(np.abs(self.shares[place]).argmax()) if way is None else way
         limit = self.fabric.shear_limit if self.ways[column] == "shear" else self.fabric.strain_limit
         return Amount(way=self.ways[column], value=float(self.shares[place, column]) * limit, limit=limit)
 

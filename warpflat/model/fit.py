@@ -110,6 +110,7 @@ class WornFit:
         area: flat [m2].
         demand: what is asked of each face, as shares of the fabric's limits.
         misfits: regions beyond a limit, largest first.
+        held_misfits, slack_misfits: those that are held beyond it, and those that are only slack: a dart helps the one, folds are the other.
         hollow: share of the flat area where the tension would lift the cloth off.
         close: #F, true where the surface lies close to the wearer's body; None if it does everywhere. Elsewhere the cloth hangs, and is not
             held.
@@ -126,6 +127,8 @@ class WornFit:
     area: FloatArray
     demand: Demand
     misfits: tuple[Misfit, ...] = field(default=())
+    held_misfits: tuple[Misfit, ...] = field(default=())
+    slack_misfits: tuple[Misfit, ...] = field(default=())
     hollow: float = 0.0
     close: BoolArray | None = None
 
@@ -157,8 +160,7 @@ class WornFit:
     @cached_property
     def held_regions(self) -> tuple[Misfit, ...]:
         """The regions that are held beyond a limit where they lie close to the body, largest first."""
-        held = [misfit for misfit in self.misfits if misfit.worst.state != "slack"]
-        return tuple(misfit for misfit in held if self.close is None or self.close[misfit.faces].any())
+        return tuple(each for each in self.held_misfits if self.close is None or self.close[each.faces].any())
 
     def _share(self, chosen: BoolArray) -> float:
         return float(self.area[chosen].sum() / max(float(self.area.sum()), 1e-300))
@@ -186,7 +188,7 @@ class WornFit:
             "slack": self.slack,
             "hollow": self.hollow,
             "where_not": [misfit.words for misfit in self.held_regions[:3]],
-            "where_slack": [misfit.words for misfit in self.misfits if misfit.worst.state == "slack"][:3],
+            "where_slack": [misfit.words for misfit in self.slack_misfits[:3]],
             **distributions,
         }
 
@@ -246,28 +248,30 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     meant = np.where(asked > fabric.strain_limit, asked, 0.0)
     demand = Demand.of(fabric, strain_warp - meant[:, 0], strain_weft - meant[:, 1], shear)
     total_area = max(float(weight.sum()), 1e-300)
-    misfits = list[Misfit]()
-    # Held cloth and slack cloth are regions of their own: a dart helps the one, folds are the other.
-    for outside in map(np.flatnonzero, (demand.held, demand.slack)):
+
+    def regions(outside: IntArray, most: FloatArray, way: IntArray) -> tuple[Misfit, ...]:
+        """Return the connected regions of some faces, the largest first, by what is asked of each face (#F) and in which way."""
         if not len(outside):
-            continue
+            return ()
         part = components(surface.faces[outside])
         count = int(part.max()) + 1
         order, begin = counting_sort(part.astype(np.int32), count)
         members = outside[order].astype(np.int32)
-        regions = np.bincount(part, weight[outside], minlength=count)
+        area = np.bincount(part, weight[outside], minlength=count)
         # Of each region the face of which most is asked, and of several the first.
-        worst = outside[np.lexsort((-demand.most[outside], part))[begin[:-1]]]
-        misfits += [
+        worst = outside[np.lexsort((-most[outside], part))[begin[:-1]]]
+        return tuple(
             Misfit(
                 surface=surface,
                 faces=members[begin[k] : begin[k + 1]],
-                area=float(regions[k]),
-                worst=demand.amount(int(worst[k])),
+                area=float(area[k]),
+                worst=demand.amount(int(worst[k]), int(way[worst[k]])),
                 vertex=int(surface.faces[worst[k], 0]),
             )
-            for k in range(count)
-        ]
+            for k in np.argsort(-area, kind="stable").tolist()
+        )
+
+    any_way, held_way = np.abs(demand.shares).argmax(axis=1), demand.held_shares.argmax(axis=1)
     return WornFit(
         strain_warp=strain_warp,
         strain_weft=strain_weft,
@@ -277,6 +281,8 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         pressure=np.maximum(pressure, 0.0),
         area=weight,
         demand=demand,
-        misfits=tuple(sorted(misfits, key=lambda misfit: -misfit.area)),
+        misfits=regions(np.flatnonzero(demand.beyond), demand.most, any_way),
+        held_misfits=regions(np.flatnonzero(demand.held), demand.held_shares.max(axis=1), held_way),
+        slack_misfits=regions(np.flatnonzero(demand.slack), demand.most, any_way),
         hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
     )
