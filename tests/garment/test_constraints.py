@@ -135,6 +135,12 @@ def test_a_piece_becomes_its_own_mirror_image(front: Flattening, leaning: Flatte
     assert abs(held.cost) < 1e-3 * made.cost
 
 
+def test_a_piece_stays_in_its_place(front: Flattening):
+    """Nothing holds it there: rounding decided where it came to rest."""
+    made = sewn(front, FixedLength(piece="bodice", line="top", length=0.4))
+    np.testing.assert_allclose(made.pieces["bodice"].positions.mean(axis=0), front.positions.mean(axis=0), atol=1e-12)
+
+
 def test_constraints_that_contradict_each_other_are_not_called_kept(leaning: Flattening):
     """Edges of different lengths to either side of the axis cannot be mirror images."""
     asked = (FixedLength(piece="bodice", line="top"), Symmetric(piece="bodice", line="centre"))

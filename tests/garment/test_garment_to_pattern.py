@@ -89,7 +89,8 @@ def test_a_line_that_leaves_the_border_is_drawn_inside_and_carries_the_grain(man
     # From hip to chest, as the edge of its name begins there.
     edge = flat.positions[piece.edges["centre front"]]
     assert np.ptp(drawn[:, 1]) > 2 * np.ptp(edge[:, 1])
-    assert np.abs(edge - drawn[-1]).sum(axis=1).min() < 1e-12
+    # To a micrometre, as layouts are drafted.
+    assert np.abs(edge - drawn[-1]).sum(axis=1).min() < 2e-6
     # The whole line's chord is upright, not that of its short edge.
     whole = flat.positions[flat.datum]
     assert abs(whole[-1, 0] - whole[0, 0]) < 1e-6
@@ -145,7 +146,7 @@ def test_the_pattern_lies_on_the_flat_mesh(shirt: Garment):
         flat, form = shirt.pieces[piece.name], shirt.form.pieces[piece.name]
         assert [edge.name for edge in piece.edges] == list(form.edges)
         for edge in piece.edges:
-            np.testing.assert_array_equal(edge.points, flat.positions[form.edges[edge.name]])
+            np.testing.assert_array_equal(edge.points, np.round(flat.positions[form.edges[edge.name]], 6))
         assert piece.fabric == "interlock"
         assert not set(piece.internal_lines) & set(form.edges)
     front = pattern.piece("front", "EU 38")
@@ -153,7 +154,7 @@ def test_the_pattern_lies_on_the_flat_mesh(shirt: Garment):
     centre = shirt.pieces["front"].positions[shirt.pieces["front"].datum]
     assert front.grain is not None
     assert front.grain[0, 0] == pytest.approx(front.grain[1, 0], abs=1e-9)
-    assert front.grain[0, 0] == pytest.approx(centre[:, 0].mean(), abs=1e-9), "on the centre line"
+    assert front.grain[0, 0] == pytest.approx(centre[:, 0].mean(), abs=1e-6), "on the centre line"
 
 
 def test_of_a_pair_one_is_drawn_and_sewn_at_the_seams_of_both(shirt: Garment):
@@ -314,6 +315,17 @@ def test_a_parted_surface_is_sewn_together_again():
     drafted = draft_garment(pattern)
     assert abs(drafted.seams[0].difference_mm) < 0.5
     assert all(any(n.seam == seam.name for n in piece.notches) for piece in drafted.pieces[""])
+
+
+def test_of_layouts_that_differ_by_rounding_errors_one_pattern_is_drawn():
+    flat = flatten(make_shape("bodice", resolution=13), datum="centre", fabric="woven")
+    known = np.round(flat.positions, 6)
+    near = known + 1e-10 * np.random.default_rng(0).normal(size=known.shape)
+    assert (near != known).all()
+    first, second = (pattern_of_surface([replace(flat, positions=at)], name="p")[0] for at in (known, near))
+    lines, others = ([edge.points for edge in pattern.pieces[""][0].edges] for pattern in (first, second))
+    for line, other in zip(lines, others, strict=True):
+        np.testing.assert_array_equal(line, other)
 
 
 def test_an_edge_is_sewn_to_a_row_of_edges_that_corners_part():

@@ -21,7 +21,7 @@ def test_longest_run_of_a_name_is_replaced():
     with printed_in(language_words("de")):
         assert translate_name("front_armhole_facing") == "Vorderteil Armlochbeleg"
         assert translate_name("side left") == "Seite links"
-        assert translate_name("unheard of") == "unheard of"
+        assert translate_name("never heard") == "never heard"
     assert translate("Cut {count}", count=2) == "Cut 2"
 
 
@@ -58,7 +58,7 @@ def test_pages_and_labels_are_german_and_so_are_those_of_a_file_read_back(tmp_pa
             "Größe 38",
             "im Stoffbruch",
             "Nähreihenfolge",
-            "Schulternähte schließen",
+            "Zusammennähen, solange alles flach liegt",
             "IM STOFFBRUCH",
             "Blatt A1",
         ):

@@ -1,16 +1,27 @@
-"""Every garment of `warpflat new`, as it is sewn: notches meet."""
+"""Every garment of `warpflat new`, as it is sewn: notches meet, each edge is used up once, in an order that can be followed."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from warpflat.core.text import other_side
 from warpflat.garment.linings import add_interfacing, add_lining
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.drafted import DraftedGarment
+from warpflat.pattern.drawing import draw_piece
+from warpflat.pattern.finished import finished_lengths
+from warpflat.pattern.label import cutting_words
+from warpflat.pattern.pieces import SeamSide
+from warpflat.pattern.sewing_order import notions, sewing_steps, sewn_seams, tools
+from warpflat.pattern.sewing_tasks import techniques
+from warpflat.pattern.words import language_words, printed_in
 from warpflat.scene.load import make_scene
 from warpflat.scene.plan import plan_scene
 from warpflat.scene.wardrobe import garment_offer, offers, scene_text
@@ -56,3 +67,113 @@ def test_notches_meet(drafted: DraftedGarment):
     apart = {seam.name: seam.notches_mm for seam in drafted.seams if seam.notches_mm is not None}
     assert apart or not drafted.seams
     assert {name: gap for name, gap in apart.items() if gap > 0.2} == {}
+
+
+def test_every_edge_is_used_up_by_one_step(drafted: DraftedGarment):
+    steps = sewing_steps(drafted, "")
+    finished = [place for step in steps for place in step.finished]
+    assert len(finished) == len(set(finished))
+    joined = {(side.piece, side.edge) for seam in drafted.garment.seams for row in seam.sides for side in row}
+    assert not joined & set(finished)
+    every = {
+        (piece.name, edge.name)
+        for piece in drafted.pieces[""]
+        for edge in piece.edges
+        if edge.kind not in ("fold", "dart")
+    }
+    assert every <= {(piece, edge) for step in steps for piece, edges in step.sewn.items() for edge in edges}
+    assert every <= joined | {(piece, other_side(edge)) for piece, edge in joined} | set(finished)
+    # Each dart and each seam is sewn once, and what a step takes stands in the list.
+    letters = [seam.letter for seam in sewn_seams(drafted, "")]
+    words = " ".join(step.words for step in steps)
+    assert all(words.count(f" {letter} (") == 1 for letter in letters)
+    assert [each for step in steps for each in step.notions] == list(notions(drafted, "")[1:])
+    # Nothing is left to the maker, but the lower edge of a hat that is lined.
+    assert {step.technique for step in steps} & {"bind_raw", "raw"} <= (
+        {"bind_raw"} if drafted.name == "sun_hat" else set()
+    )
+
+
+def test_a_seam_comes_after_those_that_end_on_its_line(drafted: DraftedGarment):
+    """Along each side of a seam the ends of its edges that meet have been sewn together before."""
+    pieces = {piece.name: [edge.name for edge in piece.edges] for piece in drafted.pieces[""]}
+
+    def corner(side: SeamSide, *, end: bool) -> tuple[str, bool, int, int]:
+        at = pieces[side.piece].index(side.edge) + (end != side.reversed)
+        return side.piece, side.mirrored, side.copy, at % len(pieces[side.piece])
+
+    number = {}
+    for at, step in enumerate(sewing_steps(drafted, "")):
+        for seam in drafted.garment.seams:
+            places = [(side.piece, side.edge) for row in seam.sides for side in row]
+            if seam.name not in number and all(edge in step.sewn.get(piece, ()) for piece, edge in places):
+                number[seam.name] = at
+    ends = {
+        frozenset(corner(row[0 if not end else -1], end=end) for row in seam.sides): seam.name
+        for seam in drafted.garment.seams
+        for end in (False, True)
+    }
+    for seam in drafted.garment.seams:
+        for row in seam.sides:
+            for one, other in pairwise(row):
+                crossing = ends.get(frozenset((corner(one, end=True), corner(other, end=False))))
+                assert crossing is None or number[crossing] <= number[seam.name], (crossing, seam.name)
+
+
+def test_a_shirt_and_trousers_are_as_long_as_their_pieces_say():
+    shirt = finished_lengths(drafted_garment("shirt", {}), "")
+    assert {"length at the centre back", "sleeve", "hem at the hip"} == set(shirt)
+    assert 0.5 < shirt["length at the centre back"] < 0.75
+    assert 0.5 < shirt["sleeve"] < 0.7
+    assert 1.0 < shirt["hem at the hip"] < 1.15
+    trousers = finished_lengths(drafted_garment("trousers", {}), "")
+    assert {"outer leg, below the waistband", "inner leg", "hem at the ankle"} == set(trousers)
+    assert 0.2 < trousers["outer leg, below the waistband"] - trousers["inner leg"] < 0.4
+    assert 0.3 < trousers["hem at the ankle"] < 0.45
+
+
+class Misses(dict[str, str]):
+    """Words of a language, with those that were asked for in vain."""
+
+    def __init__(self, words: Mapping[str, str]) -> None:
+        super().__init__(words)
+        self.missed: set[str] = set()
+
+    def get(self, key: str, default: str = "") -> str:  # type: ignore[override]
+        self.missed |= set() if super().__contains__(key) else {key}
+        return super().get(key, default)
+
+    def __contains__(self, key: object) -> bool:
+        found = super().__contains__(key)
+        # A run of words that is not there is tried shorter; one word stays English, and so does a number.
+        word = str(key).strip("0123456789.,+()")
+        self.missed |= {str(key)} if not found and word and " " not in word else set()
+        return found
+
+
+def test_every_printed_word_is_german(drafted: DraftedGarment):
+    words = Misses(language_words("de"))
+    garment = replace(drafted, garment=replace(drafted.garment, words=words))
+    with printed_in(words):
+        sewing_steps(garment, "")
+        notions(garment, "")
+        tools(garment, "")
+        finished_lengths(garment, "")
+        for piece in garment.pieces[""]:
+            draw_piece(piece)
+            cutting_words(piece.piece)
+    assert words.missed - {""} == set()
+
+
+def test_every_technique_has_a_drawing_and_german_words():
+    german = language_words("de")
+    for name, technique in techniques().items():
+        assert technique["text"] in german, name
+        strokes = [stroke.split(" ") for stroke in technique["drawing"]]
+        assert strokes, name
+        for style, *numbers in strokes:
+            assert style in ("cloth", "other", "fold", "stitch"), name
+            assert len(numbers) >= 4, name
+            assert len(numbers) % 2 == 0, name
+            assert all(0 <= float(x) <= 48 for x in numbers[::2]), name
+            assert all(0 <= float(y) <= 30 for y in numbers[1::2]), name

@@ -279,7 +279,7 @@ def test_a_piece_within_the_limit_gets_its_darts_while_the_whole_is_beyond() -> 
     vertices = plain.vertices.copy()
     # Saddles in front, which no dart takes up.
     turn = np.arctan2(vertices[:, 0], vertices[:, 2])
-    ripple = 0.018 * np.sin(8 * turn) * np.sin(30 * vertices[:, 1]) * np.clip(20 * vertices[:, 2] - 0.4, 0, 1)
+    ripple = 0.02 * np.sin(8 * turn) * np.sin(30 * vertices[:, 1]) * np.clip(20 * vertices[:, 2] - 0.4, 0, 1)
     vertices += ripple[:, None] * np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
     surface = warpflat.make_surface(vertices, plain.faces, name="skirt")
     flat = [warpflat.flatten(piece, fabric="woven", datum="grain") for piece in warpflat.find_seams(surface).pieces]

@@ -39,7 +39,7 @@ from warpflat.pattern.drafted import (
 from warpflat.pattern.label import Label
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Elastic, FoundSeam, Pattern, Piece, Seam, SeamOpening, SeamSide
-from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
+from warpflat.pattern.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
 
 __all__ = [
     "SCHEMA",
@@ -188,7 +188,19 @@ class PieceEntry(Entry):
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
     role: Literal[
-        "shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket"
+        "shell",
+        "facing",
+        "strip",
+        "waistband",
+        "cuff",
+        "collar",
+        "hood",
+        "lining",
+        "interfacing",
+        "pocket",
+        "placket",
+        "tie",
+        "fly",
     ] = "shell"
     also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
     enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
@@ -295,6 +307,15 @@ class NeededEntry(Entry):
     depth: Length
 
 
+class ClothEntry(Entry):
+    """What a shop knows a cloth by (see `warpflat.pattern.worn.ClothKind`)."""
+
+    kind: Literal["woven", "knit"]
+    weight: Length
+    stretch: Annotated[list[Length], Field(min_length=2, max_length=2)]
+    examples: list[Text] = Field(default_factory=list)
+
+
 class WornEntry(Entry):
     """The garment on its body."""
 
@@ -302,6 +323,8 @@ class WornEntry(Entry):
     measures: dict[Text, list[MeasureEntry]] = Field(default_factory=dict)
     needed: list[NeededEntry] = Field(default_factory=list)
     knits: list[Text] = Field(default_factory=list)
+    cloths: dict[Text, ClothEntry] = Field(default_factory=dict)
+    buttonholes: Literal["left", "right"] = "right"
 
 
 class FoundSeamEntry(Entry):
@@ -585,6 +608,8 @@ def _worn(worn: Worn) -> dict[str, Any]:
         "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},
         "needed": [asdict(each) for each in worn.needed],
         "knits": list(worn.knits),
+        "cloths": {name: asdict(each) for name, each in worn.cloths.items()},
+        "buttonholes": worn.buttonholes,
     }
 
 
@@ -603,6 +628,16 @@ def _read_worn(data: WornEntry) -> Worn:
         measures={size: tuple(Measure(**each.model_dump()) for each in row) for size, row in data.measures.items()},
         needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
         knits=tuple(data.knits),
+        cloths={
+            name: ClothKind(
+                kind=each.kind,
+                weight=each.weight,
+                stretch=(each.stretch[0], each.stretch[1]),
+                examples=tuple(each.examples),
+            )
+            for name, each in data.cloths.items()
+        },
+        buttonholes=data.buttonholes,
     )
 
 

@@ -12,11 +12,13 @@ from warpflat.core.text import energy_words, without_side
 from warpflat.export.pdf_legend import page_footer
 from warpflat.pattern.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.finished import finished_lengths
 from warpflat.pattern.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
 from warpflat.pattern.marker import WIDTHS, cloth_needed
 from warpflat.pattern.measures import cloth_words, length_words
 from warpflat.pattern.pieces import FoundSeam
-from warpflat.pattern.sewing_order import notions, piece_titles, sewing_steps, sewn_seams, tools
+from warpflat.pattern.sewing_order import SewingStep, notions, sewing_steps, sewn_seams, tools
+from warpflat.pattern.sewing_tasks import piece_titles, techniques
 from warpflat.pattern.words import listed, translate, translate_name
 from warpflat.pattern.worn import Worn
 
@@ -33,6 +35,14 @@ THUMBNAIL, IN_ROW = (0.026, 0.034), 7
 SIZES_IN_ROW = 5
 #: The pictures of a step: their height and width in all [m], and how many there are at most.
 STEP_HEIGHT, STEP_WIDTH, STEP_PIECES = 0.013, 0.048, 4
+#: Size of the drawing of a technique [m], and of the box in which its strokes are given; by style their colour, width [pt] and dashes.
+TECHNIQUE, BOX = np.array([0.0176, 0.011]), np.array([48.0, 30.0])
+STROKES = {
+    "cloth": ("#000000", 0.9, ()),
+    "other": ("#1f5fa8", 0.9, ()),
+    "fold": ("#000000", 0.5, (2, 1.2)),
+    "stitch": ("#b8460b", 1.0, (1.5, 1)),
+}
 #: Sizes of type [pt] and distance of lines [m].
 HEADING, TEXT, LINE = 11.0, 8.0, 0.0046
 
@@ -116,6 +126,10 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     if whole.garment.worn is not None:
         worn = whole.garment.worn
         _worn(page, worn, size, [each for each in printed.pieces if each in worn.measures], units)
+    lengths = finished_lengths(whole, size)
+    if lengths:
+        words = ", ".join(f"{what} {length_words(length, units)}" for what, length in lengths.items())
+        page.paragraph(words, indent=0.030, lead=translate("Finished"))
     page.heading(translate("You need"), 3 * LINE)
     page.paragraph(", ".join(notions(whole, size)), indent=0.030, lead=translate("Notions"))
     page.paragraph(tools(whole, size), indent=0.030, lead=translate("Tools"))
@@ -137,7 +151,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
             lines = [
                 f"{start + number + 1}  {titles[piece.name]}",
                 cutting_words(piece.piece),
-                " / ".join(cloths_of(piece)),
+                " / ".join(map(translate_name, cloths_of(piece))),
             ]
             y = page.y
             for k, line in enumerate(lines):
@@ -164,13 +178,11 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     if len(cloths) > 1:
         page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
         for cloth, entries in cloths.items():
-            cut = [
-                translate(
-                    f"{{title}} {{count}}{' on fold' if entry.on_fold else ''}", title=entry.title, count=entry.quantity
-                )
-                for entry in entries
-            ]
-            page.paragraph(", ".join(cut), indent=0.030, lead=cloth)
+            cut = []
+            for entry in entries:
+                how = " on fold" if entry.on_fold else ", one mirrored" if entry.mirrored == 1 else ""
+                cut.append(translate(f"{{title}} {{count}}{how}", title=entry.title, count=entry.quantity))
+            page.paragraph("; ".join(cut), indent=0.030, lead=translate_name(cloth))
     page.heading(translate("Sewing order"), 3 * LINE)
     page.paragraph(
         translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
@@ -178,9 +190,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
     )
     for number, sewing in enumerate(sewing_steps(whole, size), 1):
-        _step(
-            page, number, sewing.words, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn]
-        )
+        _step(page, number, sewing, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn])
     seams = sewn_seams(whole, size)
     if seams:
         page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
@@ -316,11 +326,12 @@ def _prices(page: _Page, found: Sequence[FoundSeam], units: str) -> None:
     page.table(["", *map(translate, ("length", "releases", "per length"))], rows, (0.34, 0.16, 0.34, 0.16))
 
 
-def _step(page: _Page, number: int, words: str, pieces: Sequence[tuple[DraftedPiece, frozenset[str]]]) -> None:
-    """Write a step with a small picture of its pieces, what is sewn in colour."""
+def _step(page: _Page, number: int, sewing: SewingStep, pieces: Sequence[tuple[DraftedPiece, frozenset[str]]]) -> None:
+    """Write a step with small pictures: how it is sewn, and of its pieces, what is sewn in colour."""
     shown = pieces[:STEP_PIECES]
-    rows = wrap_text(words, TEXT * CAPITALS / POINT, page.width - 0.006 - STEP_WIDTH).split("\n")
-    height = max(LINE * len(rows), STEP_HEIGHT if shown else 0.0) + 0.0012
+    width = page.width - 0.010 - STEP_WIDTH - TECHNIQUE[0]
+    rows = wrap_text(sewing.words, TEXT * CAPITALS / POINT, width).split("\n")
+    height = max(LINE * len(rows), STEP_HEIGHT) + 0.0012
     page.need(height)
     top = page.y
     for row_number, row in enumerate(rows):
@@ -328,6 +339,20 @@ def _step(page: _Page, number: int, words: str, pieces: Sequence[tuple[DraftedPi
         if row_number == 0:
             page.text(page.left, str(number), bold=True)
         page.text(page.left + 0.006, row)
+    corner = np.array([page.left + page.width - STEP_WIDTH - TECHNIQUE[0] - 0.002, top - 0.5 * (height + TECHNIQUE[1])])
+    for stroke in techniques()[sewing.technique]["drawing"]:
+        style, *numbers = stroke.split(" ")
+        colour, line_width, dashes = STROKES[style]
+        page.canvas.setStrokeColor(colour)
+        page.canvas.setLineWidth(line_width)
+        page.canvas.setDash(list(dashes))
+        points = (corner + np.array(numbers, dtype=float).reshape(-1, 2) * TECHNIQUE / BOX) * POINT
+        path = page.canvas.beginPath()
+        path.moveTo(*points[0])
+        for point in points[1:]:
+            path.lineTo(*point)
+        page.canvas.drawPath(path)
+    page.canvas.setDash([])
     if shown:
         room = STEP_WIDTH / STEP_PIECES
         largest = np.max([np.ptp(piece.cut_line, axis=0) for piece, _ in shown], axis=0)
@@ -385,8 +410,22 @@ def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     for fabric, size in ((fabric, size) for fabric in fabrics for size in needed if fabric in needed[size]):
         lengths = needed[size][fabric]
         words = [translate("too narrow") if length is None else cloth_words(length, units) for length in lengths]
-        rows.append([", ".join(part for part in (fabric, printed_size(size) if size else "") if part), *words])
+        rows.append(
+            [", ".join(part for part in (translate_name(fabric), printed_size(size) if size else "") if part), *words]
+        )
     page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
+    for name, cloth in ({} if whole.garment.worn is None else whole.garment.worn.cloths).items():
+        told = translate(
+            f"a {cloth.kind} of {{weight}} g/m2, which a hand's pull stretches by {{along}} % along and {{across}} % across",
+            weight=round(1000 * cloth.weight),
+            along=round(100 * cloth.stretch[0]),
+            across=round(100 * cloth.stretch[1]),
+        )
+        if cloth.examples:
+            told += translate(
+                ", such as {examples}", examples=listed([translate_name(each) for each in cloth.examples])
+            )
+        page.paragraph(told, indent=0.030, lead=translate_name(name))
     page.paragraph(
         translate("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")
     )

@@ -14,7 +14,7 @@ from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.label import BOLD, CAPITALS, FONT, printed_size, text_width
 from warpflat.pattern.layout import Sheet
 from warpflat.pattern.placement import fit_label
-from warpflat.pattern.sewing_order import piece_titles
+from warpflat.pattern.sewing_tasks import piece_titles
 from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:

@@ -54,6 +54,8 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 
 # Cloth that may be strained by more than this is a knit.
 _WOVEN_STRAIN = 0.1
+# What cloth is stretched by to see how far it gives [N/m], 100 gf/cm as in FAST's tests.
+_HAND = 98.1
 
 # A medium woven creases from about this shear angle on [degrees].
 _WOVEN_SHEAR = 15.0
@@ -120,6 +122,7 @@ class Fabric:
         curve_weft: such points along the weft.
         description: one line for people.
         aliases: other names it is found by.
+        examples: cloths of the kind that shops sell.
         provenance: for each value (by attribute name) where it comes from.
     """
 
@@ -137,6 +140,7 @@ class Fabric:
     curve_weft: Curve = ()
     description: str = ""
     aliases: tuple[str, ...] = ()
+    examples: tuple[str, ...] = ()
     provenance: Mapping[str, Provenance] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -208,6 +212,11 @@ class Fabric:
     def softness(self) -> float:
         """K/G, the tensile stiffness along the stiffer threads over the shear stiffness."""
         return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
+
+    def stretch(self, direction: Literal["warp", "weft"] = "warp") -> float:
+        """Return the strain at which the cloth pulls with 98.1 N/m, a hand's pull, along one direction; a share."""
+        strains = np.linspace(0.0, 2.0, 4001)
+        return float(np.interp(_HAND, self.tension(strains, direction), strains))
 
     @property
     def is_knit(self) -> bool:

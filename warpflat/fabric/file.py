@@ -134,6 +134,7 @@ class FabricTable(Table):
     base: str | None = None
     description: str = ""
     aliases: list[str] = Field(default_factory=list)
+    examples: list[str] = Field(default_factory=list)
     stiffness_warp: Quantity | None = None
     stiffness_weft: Quantity | None = None
     shear_stiffness: Quantity | None = None
@@ -301,6 +302,7 @@ def fabric_from_table(
                     given_as = f"{key} = {example}, the reading {reading},"
                 raise InputError(f"fabric {name!r}: {key} is missing; write {given_as} or base = another fabric")
         values["description"] = table.description or values.get("description", "")
+        values["examples"] = tuple(table.examples) or values.get("examples", ())
         return Fabric(name=name, aliases=tuple(table.aliases), provenance=origins, **values)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None

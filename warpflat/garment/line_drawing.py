@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import groupby
@@ -17,7 +18,7 @@ from warpflat.garment.button_stand import button_depths
 from warpflat.garment.drawn_finishing import finishing_views
 from warpflat.garment.girths import pattern_girths
 from warpflat.garment.openings import Buttons, place_opening
-from warpflat.pattern.worn import Measure, NeededOpening, ViewedPiece, Worn
+from warpflat.pattern.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.normals import vertex_normals
 from warpflat.surface.triangles import triangulate
@@ -89,7 +90,19 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
     knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
-    return Worn(views=views, measures=measures, needed=needed, knits=tuple(knits))
+    mens = garment.mannequin is not None and re.search(r"\bmen\b", garment.mannequin.source) is not None
+    fabrics = {flat.fabric.name: flat.fabric for flat in pieces}
+    cloths = {
+        name: ClothKind(
+            kind="knit" if fabric.is_knit else "woven", weight=fabric.areal_density,
+            stretch=(fabric.stretch("warp"), fabric.stretch("weft")), examples=fabric.examples,
+        )
+        for name, fabric in fabrics.items()
+    }  # fmt: skip
+    return Worn(
+        views=views, measures=measures, needed=needed, knits=tuple(knits), cloths=cloths,
+        buttonholes="left" if mens else "right",
+    )  # fmt: skip
 
 
 def _with_slanted_hems(garment: Garment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:

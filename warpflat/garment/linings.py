@@ -14,14 +14,14 @@ from warpflat.garment.shaped_band import without_strip
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 
-__all__ = ["add_interfacing", "add_lining"]
+__all__ = ["add_interfacing", "add_lining", "add_pocketing"]
 
 # The hem of a lining is turned up this much less [m] than the shell's, and at least the second: it ends above it.
 _SHORTER, _LEAST_HEM = 0.020, 0.010
 
 
 def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
-    """Return a pattern whose facings, waistbands, cuffs and collars are cut from an interfacing too, by the same patterns.
+    """Return a pattern whose facings, waistbands, flies, cuffs and collars are cut from an interfacing too, by the same patterns.
 
     A facing that is grown on gets a piece of interfacing of its own, without allowances.
     """
@@ -29,7 +29,7 @@ def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
     for size, row in pattern.pieces.items():
         doubled = [
             replace(piece, also={**piece.also, cloth: piece.quantity})
-            if piece.role in ("facing", "waistband", "cuff", "collar")
+            if piece.role in ("facing", "waistband", "cuff", "collar", "fly")
             else piece
             for piece in row
         ]
@@ -46,6 +46,17 @@ def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
                 )  # fmt: skip
         pieces[size] = doubled
     return replace(pattern, pieces=pieces)
+
+
+def add_pocketing(pattern: Pattern, cloth: str) -> Pattern:
+    """Return a pattern whose pocket bags are cut from a cloth of their own: what of a pocket is seen neither outside nor at its opening."""
+    seen = {side.piece for seam in pattern.seams for row in seam.sides if len(row) > 1 for side in row}
+
+    def cut(piece: Piece) -> Piece:
+        plain = not any(edge.kind == "hem" for edge in piece.edges) and "fold line" not in piece.internal_lines
+        return replace(piece, fabric=cloth) if piece.role == "pocket" and plain and piece.name not in seen else piece
+
+    return replace(pattern, pieces={size: [cut(piece) for piece in row] for size, row in pattern.pieces.items()})
 
 
 def _has_grown_facing(piece: Piece) -> bool:

@@ -273,7 +273,7 @@ def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
             grain = np.array([[0.2, 0.5], [0.8, 0.5]]) * [opening.tie, _TIE]
             made.append(
                 Piece(
-                    name=tied, size=size, fabric=row[0].fabric, quantity=2, role="strip", paired=False, grain=grain,
+                    name=tied, size=size, fabric=row[0].fabric, quantity=2, role="tie", paired=False, grain=grain,
                     edges=[replace(edge, kind="cut", allowance=0.010) for edge in edges], internal_lines={"fold line": fold},
                 )
             )  # fmt: skip

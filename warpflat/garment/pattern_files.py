@@ -15,7 +15,7 @@ from warpflat.core.file_kinds import foreign_words, other_kind_words
 from warpflat.core.file_names import make_file_name
 from warpflat.core.text import format_count, plain_letters
 from warpflat.garment.edge_rules import EdgeRules
-from warpflat.garment.linings import add_interfacing, add_lining
+from warpflat.garment.linings import add_interfacing, add_lining, add_pocketing
 from warpflat.garment.strips import CLOTH_WIDTH
 from warpflat.pattern.shrinkage import Shrinkage, enlarged
 
@@ -71,7 +71,7 @@ class PatternOptions:
         names: by piece what is printed instead of its name.
         shrinkage: of the shell's cloth; its pieces are drawn larger.
         words: what is printed instead of English words and names.
-        lining, interfacing: what these cloths are called; none without a name.
+        lining, interfacing, pocketing: what these cloths are called; none without a name.
         true: whether edges are made to run on smoothly across seams; not of a pattern that is taken as it is.
     """
 
@@ -88,6 +88,7 @@ class PatternOptions:
     words: Mapping[str, str] = field(default_factory=dict)
     lining: str = ""
     interfacing: str = ""
+    pocketing: str = ""
     true: bool = True
 
     @property
@@ -339,6 +340,7 @@ def _write_pattern(
         pattern, notes = make()
         pattern = add_lining(pattern, options.lining) if options.lining else pattern
         pattern = add_interfacing(pattern, options.interfacing) if options.interfacing else pattern
+        pattern = add_pocketing(pattern, options.pocketing) if options.pocketing else pattern
         # In the printed names and units that were asked for.
         titled = {
             size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row)

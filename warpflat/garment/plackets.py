@@ -79,7 +79,7 @@ def with_slits(
         allowance={"lower": 0.006, "upper": 0.006},
     )  # fmt: skip
     binding = Piece(
-        name=title, fabric=pattern.pieces[pattern.sample][0].fabric, quantity=count, edges=edges, paired=False, role="strip",
+        name=title, fabric=pattern.pieces[pattern.sample][0].fabric, quantity=count, edges=edges, paired=False, role="placket",
         internal_lines={"fold line": np.array([[0.0, _BINDING], [whole, _BINDING]])},
         grain=np.array([[0.1 * whole, 0.5 * high], [0.9 * whole, 0.5 * high]]),
     )  # fmt: skip
@@ -156,7 +156,7 @@ def with_placket(
                 holes[f"{title} of {number + 1}"] = line
         strip = Piece(
             name=find_unused_name(f"{called}_placket", {each.name for each in row}), size=size, fabric=piece.fabric, quantity=2,
-            edges=edges, paired=False, role="strip", marks=marks,
+            edges=edges, paired=False, role="placket", marks=marks,
             internal_lines={"fold line": np.array([[0.0, _STRIP], [whole, _STRIP]]), **holes},
             grain=np.array([[0.1 * whole, 0.5 * high], [0.9 * whole, 0.5 * high]]),
         )  # fmt: skip

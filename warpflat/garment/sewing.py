@@ -104,8 +104,12 @@ class SewingNetwork:
         ends = [(stage_name, layout, outcome)]
         if first is not None and outcome.first_layout is not None:
             ends.insert(0, (STEPS, outcome.first_layout, first))
+        free = state.network.bonds.freedom.numpy()
         for name, piece in self.pieces.items():
             rows = slice(self.first[name], self.first[name] + len(piece.positions))
+            # Nothing but a fold holds a piece in its place: where it has drifted to would be a matter of rounding.
+            drift = layout[rows].mean(axis=0) - piece.positions.mean(axis=0)
+            layout[rows] -= free[rows].min(axis=0) * drift
             stages = list(piece.stages)
             for stage, place, end in ends:
                 energies = Relaxation(piece.network, state.options, start=place[rows]).energies()

@@ -27,6 +27,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges, hem_rises
+from warpflat.garment.fly import with_flies
 from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.line_drawing import describe_worn
 from warpflat.garment.mark_openings import mark_openings
@@ -62,6 +63,8 @@ __all__ = ["LACKING", "check_edge_names", "grain_of", "pattern_of_garment", "pat
 
 #: A datum that strays from the grain by no more than this [m] carries the grain line.
 ON_DATUM = 1e-3
+# Decimals [m] of the layouts to which curves are fitted: of two that differ by rounding errors the same pattern is drawn.
+_DECIMALS = 6
 #: Least distance [m] of the grain line from darts and holes, and the steps [m] in which it is moved aside.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 #: A side of a seam is a row of at most so many edges, parted by corners in the plane.
@@ -159,7 +162,7 @@ def pattern_of_garment(
         for piece, flat in garment.pieces.items():
             there = sample.pieces[piece]
             offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
-            moved[piece] = replace(flat, positions=flat.positions + offset) if offset.any() else flat
+            moved[piece] = replace(flat, positions=np.round(flat.positions + offset, _DECIMALS))
         laid[size] = replace(garment, pieces=moved)
     garments, sample = laid, next(iter(laid.values()))
     # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
@@ -239,7 +242,7 @@ def pattern_of_garment(
             girths[size] |= {} if head is None else {"head": head}
     rises = hem_rises(pattern, sample.finishing)
     pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width)
-    pattern = add_pockets(pattern, sample.pockets)
+    pattern = with_flies(add_pockets(pattern, sample.pockets))
     if not rises:
         # Godets of one size are equal, unless a slanted hem cuts them.
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
@@ -514,6 +517,7 @@ def pattern_of_surface(
     """
     rules = rules or EdgeRules()
     ends = ends or {}
+    results = [replace(result, positions=np.round(result.positions, _DECIMALS)) for result in results]
     pieces = [_mesh_piece(result, size, ends.get(result.surface.name, ())) for result in results]
     named = []
     for seam in seams:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from warpflat.pattern.drafted import DraftedPiece
-from warpflat.pattern.sewing_order import piece_titles
+from warpflat.pattern.sewing_tasks import piece_titles
 
 __all__ = ["CutEntry", "cloths_of", "cut_list"]
 

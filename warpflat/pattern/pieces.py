@@ -29,7 +29,10 @@ __all__ = ["Elastic", "FoundSeam", "Pattern", "Piece", "Seam", "SeamSide", "unkn
 
 #: Kinds of :class:`SeamOpening`.
 OPENINGS = ("zip", "buttons", "slit", "vent")
-ROLES = ("shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket")
+ROLES = (
+    *("shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket"),
+    *("placket", "tie", "fly"),
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

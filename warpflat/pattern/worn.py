@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from warpflat.core.arrays import FloatArray
 
-__all__ = ["Measure", "NeededOpening", "ViewedPiece", "Worn"]
+__all__ = ["ClothKind", "Measure", "NeededOpening", "ViewedPiece", "Worn"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,6 +38,23 @@ class Measure:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ClothKind:
+    """What a shop knows a cloth by.
+
+    Attributes:
+        kind: "woven" or "knit".
+        weight: [kg/m2].
+        stretch: how far a hand's pull of 98.1 N/m stretches it along and across, as shares.
+        examples: cloths of the kind.
+    """
+
+    kind: str
+    weight: float
+    stretch: tuple[float, float]
+    examples: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class NeededOpening:
     """A way around the garment [m] that is too small for what must pass it, and how deep it has to be opened.
 
@@ -65,9 +82,13 @@ class Worn:
         measures: by size.
         needed: openings that are missing, of the sample size.
         knits: names of its cloths that are knits.
+        cloths: by name what a shop knows them by.
+        buttonholes: the half that has them and lies above, "right" for women, "left" for men.
     """
 
     views: Mapping[str, tuple[ViewedPiece, ...]] = field(default_factory=dict)
     measures: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
     needed: tuple[NeededOpening, ...] = ()
     knits: tuple[str, ...] = ()
+    cloths: Mapping[str, ClothKind] = field(default_factory=dict)
+    buttonholes: str = "right"

@@ -58,4 +58,5 @@ def pattern_options(
         else Shrinkage(warp=cut_from.shrinkage_warp, weft=cut_from.shrinkage_weft),
         lining="" if cut_from is None else cut_from.lining,
         interfacing="" if cut_from is None else cut_from.interfacing,
+        pocketing="" if cut_from is None else cut_from.pocketing,
     )

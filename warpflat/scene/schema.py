@@ -699,6 +699,8 @@ class ClothTable(Table):
     """Seams at whose first notch both sides lie on the same stripe in the marker."""
     interfacing: Annotated[str, Field(max_length=40)] = ""
     """What the interfacing is called; with a name facings and waistbands are cut from it too."""
+    pocketing: Annotated[str, Field(max_length=40)] = ""
+    """What the cloth of pocket bags is called; with a name these are cut from it, not from the shell's cloth."""
 
 
 class MarkerTable(Table):
