@@ -416,7 +416,7 @@ def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
     for name, cloth in ({} if whole.garment.worn is None else whole.garment.worn.cloths).items():
         told = translate(
-            f"a {cloth.kind} of {{weight}} g/m2, which a hand's pull stretches by {{along}} % along and {{across}} % across",
+            f"a {cloth.kind} cloth of {{weight}} g/m2, which a hand's pull stretches by {{along}} % along and {{across}} % across",
             weight=round(1000 * cloth.weight),
             along=round(100 * cloth.stretch[0]),
             across=round(100 * cloth.stretch[1]),

@@ -97,7 +97,7 @@ class SewnSeam:
         if not self.by_pieces:
             if first != second:
                 words = translate("{seam}: {first} to {second}", seam=self.name, first=first, second=second)
-            elif first not in self.name:
+            elif first not in self.name and not self.lined:
                 words = translate("{seam} of the {first}", seam=self.name, first=first)
         if self.held:
             # The second side is the longer one where there is ease.
