@@ -245,9 +245,9 @@ class Metric:
 
 
 def stiffness_matrix(network: SpringNetwork, positions: FloatArray) -> csc_array:
-    """Return the Gauss-Newton stiffness J^T J of a network in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m].
+    """Return the stiffness of a network in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m]: J^T J of springs and guard, and that of cells.
 
-    It leaves out the negative stiffness across compressed springs and threads, so that each direction is one of descent.
+    It leaves out what is negative, as across compressed springs and threads, so that each direction is one of descent.
     """
     cells, size = network.cell_arrays, 2 * network.vertex_count
     free, matrix = diags_array(network.bonds.freedom.numpy().ravel()), csc_array((size, size))
