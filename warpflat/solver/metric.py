@@ -154,7 +154,9 @@ class StiffnessFactor:
             rows = equation_rows(network, positions) @ diags_array(free)
             matrix = csc_array(matrix + rows.T @ rows)
         diagonal = matrix.diagonal()
-        matrix.setdiag(diagonal + _REGULARISATION * diagonal.mean() + (free == 0.0) * diagonal.max())
+        # So much that a factor in this precision still sees it.
+        least = max(_REGULARISATION, 10.0 * float(np.finfo(dtype).eps))
+        matrix.setdiag(diagonal + least * diagonal.mean() + (free == 0.0) * diagonal.max())
         self._solve, self._count = factor_symmetric(matrix, dtype=dtype), len(free)
         self._column: dict[int, FloatArray] = {}
 
