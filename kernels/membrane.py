@@ -36,18 +36,11 @@ from .cells import (
     count_cells,
     flat_edges,
     longest_square,
-    turned_left,
 )
 from .indices import natural
 from .membrane_cell import TINY, Cloth, WornCell, membrane_forces, membrane_viscosity, pair_bound, worn_cell
 
 wp.set_module_options({"enable_backward": False})
-
-
-@wp.func
-def corner_weight(cell: WornCell, k: int):
-    """Return the gradient of the barycentric weight of a cell's corner k [1/m]."""
-    return wp.where(k == 0, cell.w0, wp.where(k == 1, cell.w1, cell.w2))
 
 
 @wp.func
@@ -198,61 +191,83 @@ def bound_membrane(
         k += 1
 
 
+@wp.func
+def second_derivative(cell: WornCell, cloth: Cloth):
+    """Return the second derivative of det(I + A) psi(F (I + A)^-1) by A = du/dx at A = 0, rows and columns A00, A01, A10, A11 [N/m].
+
+    With S = F^T P, P = d(psi)/dF, it is, for A along B, that of psi by the worn threads, - tr A (S : B) - tr B (S : A)
+    + tr(S^T (A B + B A)) + psi (tr A tr B - tr(A B)).
+    """
+    law = cell.law
+    back = wp.transpose(cell.F)
+    unit = wp.identity(n=2, dtype=wp.float64)
+    u = cell.worn_warp / cell.length_warp
+    v = cell.worn_weft / cell.length_weft
+    a = law.sigma[0] / cell.length_warp
+    b = law.sigma[1] / cell.length_weft
+    shear = cloth.shear + law.locked
+    ww = wp.outer(u, u) * (law.slope[0] - a) + unit * a + wp.outer(cell.worn_weft, cell.worn_weft) * shear
+    ff = wp.outer(v, v) * (law.slope[1] - b) + unit * b + wp.outer(cell.worn_warp, cell.worn_warp) * shear
+    wf = wp.outer(u, v) * law.slope[2] + unit * law.tau + wp.outer(cell.worn_weft, cell.worn_warp) * shear
+    ww = back * ww * cell.F
+    ff = back * ff * cell.F
+    wf = back * wf * cell.F
+    P = wp.outer(cell.worn_warp * a + cell.worn_weft * law.tau, cell.warp)
+    P += wp.outer(cell.worn_weft * b + cell.worn_warp * law.tau, cell.weft)
+    S = back * P
+    found = wp.mat44d()
+    for m in range(4):
+        i = m / 2
+        p = m % 2
+        for n in range(4):
+            j = n / 2
+            q = n % 2
+            value = ww[i, j] * cell.warp[p] * cell.warp[q] + ff[i, j] * cell.weft[p] * cell.weft[q]
+            value += wf[i, j] * cell.warp[p] * cell.weft[q] + wf[j, i] * cell.weft[p] * cell.warp[q]
+            if i == p:
+                value -= S[j, q]
+            if j == q:
+                value -= S[i, p]
+            if p == j:
+                value += S[i, q]
+            if q == i:
+                value += S[j, p]
+            if i == p and j == q:
+                value += law.energy
+            if i == q and j == p:
+                value -= law.energy
+            found[m, n] = value
+    return found
+
+
 @wp.kernel
-def stiffen_membrane(
+def differentiate_membrane(
     position: wp.array(dtype=wp.vec2d),
     cells: Cells,
     cloth: Cloth,
     first: int,
     # outputs
-    stiffness: wp.array(dtype=wp.mat22d),
+    second: wp.array(dtype=wp.mat44d),
+    gradient: wp.array(dtype=wp.mat22d),
 ):
-    """Compute the stiffness of each cell by the places of its corners: the part of the second derivatives that is never negative.
+    """Compute the second derivative of each cell's energy by the gradient of a displacement [J], and its corners' weight gradients.
 
-    That is J^T C J of the strains, C of the cloth in tension, and J^T sigma J of what moves a thread under tension sideways.
-
-    position: #V [m]. stiffness: 9 #C, of corners 00, 01, 02, 10, ... [N/m]; of a mirrored cell left as it was.
+    position: #V [m]. second: #C, as of `second_derivative`, times the cell's area. gradient: #C, of corners 1 and 2 as rows [1/m]. Of a
+    mirrored cell both are left as they were.
     """
     f = natural(wp.tid() + first)
     face = cells.face[f]
     begin = natural(cells.first[f])
-    none = wp.float64(0.0)
     k = int(0)
     count = count_cells(face)
     while k < count:
         c = natural(begin + k)
         D = flat_edges(position, cell_corner(face, k))
         det = wp.determinant(D)
-        if det > none:
+        if det > wp.float64(0.0):
             cell = worn_cell(D, cells.laid[c], cloth, cells.slack[f])
-            law = cell.law
-            area = wp.float64(0.5) * det * cell_weight(face)
-            # Derivatives of the strains by a corner's place are minus these times its weight's gradient along warp and weft.
-            back = wp.transpose(cell.F)
-            unit_warp = back * cell.worn_warp / cell.length_warp
-            unit_weft = back * cell.worn_weft / cell.length_weft
-            turned_warp = back * turned_left(cell.worn_warp) / cell.length_warp
-            turned_weft = back * turned_left(cell.worn_weft) / cell.length_weft
-            pull_warp = wp.max(law.sigma[0], none) / cell.length_warp
-            pull_weft = wp.max(law.sigma[1], none) / cell.length_weft
-            shear = cloth.shear + law.locked
-            of_warp = wp.outer(unit_warp, unit_warp) * law.bound[0] + wp.outer(turned_warp, turned_warp) * pull_warp
-            of_weft = wp.outer(unit_weft, unit_weft) * law.bound[1] + wp.outer(turned_weft, turned_weft) * pull_weft
-            back_warp = unit_warp * cell.length_warp
-            back_weft = unit_weft * cell.length_weft
-            of_warp += wp.outer(back_weft, back_weft) * shear
-            of_weft += wp.outer(back_warp, back_warp) * shear
-            of_both = wp.outer(unit_warp, unit_weft) * cloth.c_cross + wp.outer(back_weft, back_warp) * shear
-            for i in range(3):
-                w_i = corner_weight(cell, i)
-                for j in range(3):
-                    w_j = corner_weight(cell, j)
-                    stiffness[natural(9 * c + 3 * i + j)] = area * (
-                        of_warp * (wp.dot(w_i, cell.warp) * wp.dot(w_j, cell.warp))
-                        + of_weft * (wp.dot(w_i, cell.weft) * wp.dot(w_j, cell.weft))
-                        + of_both * (wp.dot(w_i, cell.warp) * wp.dot(w_j, cell.weft))
-                        + wp.transpose(of_both) * (wp.dot(w_i, cell.weft) * wp.dot(w_j, cell.warp))
-                    )
+            second[c] = second_derivative(cell, cloth) * (wp.float64(0.5) * det * cell_weight(face))
+            gradient[c] = cell.inv
         k += 1
 
 

@@ -160,16 +160,19 @@ def moved(coarse: FloatArray, fine: FloatArray) -> float:
         ("bodice", 200.0, False, (33, 65, 129)),
         ("bodice", 20.0, False, (65, 129)),
         ("bodice", 200.0, True, (33, 65)),
-        ("bodice", 20.0, True, (65, 129)),
+        # In cells it is thinner still: at 1/50 the outline moves by .59 mm from 65 to 129 and by .28 from 129 to 257.
+        ("bodice", 50.0, True, (65, 129)),
     ],
 )
 def test_a_finer_mesh_does_not_move_the_outline(shape, shear, triangles, resolutions):
-    outlines = []
+    """Each relaxed until its outline has hardly any way to go."""
+    outlines, relax = [], RelaxOptions(energy_left=1e-4, outline_left_mm=0.05)
     for resolution in resolutions:
         piece = flatten(
             make_shape(shape, resolution=resolution, triangles=triangles),
             fabric=cloth(shear),
             datum="centre",
+            relax=relax,
             device=DEVICE,
         )
         assert piece.converged

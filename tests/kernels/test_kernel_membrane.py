@@ -11,7 +11,12 @@ from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import corner_vertices, filled
 from warpflat.kernels.cells import CellForces
-from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane, evaluate_membrane_potential
+from warpflat.kernels.membrane import (
+    compute_membrane_energy,
+    differentiate_membrane,
+    evaluate_membrane,
+    evaluate_membrane_potential,
+)
 from warpflat.kernels.strain import compute_worn_strain
 
 from warpflat.fabric.fabric import Fabric, grain_axes
@@ -291,6 +296,32 @@ def test_a_strip_pulled_along_a_curve_contracts_by_poisson():
     _, stress = one_cell(np.diag([1.0 + contraction, 1.0 + e]), fabric)
     assert stress[1] == pytest.approx(0.0, abs=1e-9)
     assert stress[0] == pytest.approx(float(fabric.tension(e, "warp")), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "strain", [[[1.04, 0.1], [0.0, 0.97]], [[0.93, -0.3], [0.05, 1.02]], [[1.03, 0.45], [0.02, 1.05]]]
+)
+@pytest.mark.parametrize("name", CLOTHS)
+def test_second_derivatives_are_those_of_the_energy(name: str, strain: list[list[float]]):
+    """By the gradient of a displacement, and so by the corners' places: stretched, pressed and locked."""
+    shape = np.array([[0.0, 0.0], [0.05, 0.01], [0.02, 0.06]])
+    surface = make_surface(np.column_stack([shape, np.zeros(3)]), [[0, 1, 2]])
+    flat = shape @ np.array(strain)
+    network = network_of(surface, CLOTHS[name], flat, grain_angle=20.0)
+    second, gradient = wp.zeros(1, wp.mat44d, DEVICE), wp.zeros(1, wp.mat22d, DEVICE)
+    given = [wp.array(flat, dtype=wp.vec2d, device=DEVICE), network.cells, network.cloth, 0]
+    wp.launch(differentiate_membrane, dim=1, inputs=given, outputs=[second, gradient], device=DEVICE)
+    rows = np.vstack([-gradient.numpy()[0].sum(axis=0), gradient.numpy()[0]])
+    found = np.einsum("ipjq,kp,lq->kilj", second.numpy().reshape(2, 2, 2, 2), rows, rows).reshape(6, 6)
+    step, columns = 1e-7, []
+    for index in range(6):
+        sides = [flat.copy(), flat.copy()]
+        sides[0].flat[index] += step
+        sides[1].flat[index] -= step
+        columns.append(
+            np.subtract(*(evaluated(network, at)["vertex_force"] for at in sides[::-1])).ravel() / (2 * step)
+        )
+    np.testing.assert_allclose(found, np.array(columns).T, atol=1e-5 * np.abs(found).max())
 
 
 @pytest.mark.parametrize("limit", [8.0, 15.0, 40.0])

@@ -26,7 +26,7 @@ from warpflat.core.launch import record
 from warpflat.core.sparse import factor_symmetric
 from warpflat.fabric.fabric import grain_axes
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
-from warpflat.kernels.membrane import stiffen_membrane
+from warpflat.kernels.membrane import differentiate_membrane
 from warpflat.model.network import CellModel, SpringNetwork
 from warpflat.solver.collapse import iterate_coarsenings
 from warpflat.solver.grain import GrainAlignment
@@ -134,9 +134,14 @@ class StiffnessFactor:
     """The Gauss-Newton stiffness of a network and its equations in one layout."""
 
     def __init__(
-        self, network: SpringNetwork, positions: FloatArray, alignments: Sequence[GrainAlignment] = ()
+        self,
+        network: SpringNetwork,
+        positions: FloatArray,
+        alignments: Sequence[GrainAlignment] = (),
+        *,
+        dtype: type[np.floating] = np.float64,
     ) -> None:
-        """Factor the stiffness in a layout (#V by 2 [m]) without mirrored cells; chords of pieces resist being turned."""
+        """Factor the stiffness in a layout (#V by 2 [m]) without mirrored cells, in a precision; chords of pieces resist being turned."""
         matrix, free = stiffness_matrix(network, positions), network.bonds.freedom.numpy().ravel()
         if alignments:
             # Each end of a chord is held sideways. A piece that no force moves along has one place and direction then, and the chord
@@ -149,8 +154,10 @@ class StiffnessFactor:
             rows = equation_rows(network, positions) @ diags_array(free)
             matrix = csc_array(matrix + rows.T @ rows)
         diagonal = matrix.diagonal()
-        matrix.setdiag(diagonal + _REGULARISATION * diagonal.mean() + (free == 0.0) * diagonal.max())
-        self._solve, self._count = factor_symmetric(matrix), len(free)
+        # So much that a factor in this precision still sees it.
+        least = max(_REGULARISATION, 10.0 * float(np.finfo(dtype).eps))
+        matrix.setdiag(diagonal + least * diagonal.mean() + (free == 0.0) * diagonal.max())
+        self._solve, self._count = factor_symmetric(matrix, dtype=dtype), len(free)
         self._column: dict[int, FloatArray] = {}
 
     def solve(self, force: FloatArray) -> FloatArray:
@@ -240,9 +247,9 @@ class Metric:
 
 
 def stiffness_matrix(network: SpringNetwork, positions: FloatArray) -> csc_array:
-    """Return the Gauss-Newton stiffness J^T J of a network in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m].
+    """Return the stiffness of a network in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m]: J^T J of springs and guard, and that of cells.
 
-    It leaves out the negative stiffness across compressed springs and threads, so that each direction is one of descent.
+    It leaves out what is negative, as across compressed springs and threads, so that each direction is one of descent.
     """
     cells, size = network.cell_arrays, 2 * network.vertex_count
     free, matrix = diags_array(network.bonds.freedom.numpy().ravel()), csc_array((size, size))
@@ -260,19 +267,23 @@ def stiffness_matrix(network: SpringNetwork, positions: FloatArray) -> csc_array
 
 
 def _membrane_stiffness(network: SpringNetwork, positions: FloatArray, part: CellModel, cells: slice) -> csc_array:
-    """Return the stiffness of the cells of a part that is a membrane."""
-    device, size = network.device, 2 * network.vertex_count
-    blocks = wp.zeros(9 * network.cell_count, dtype=wp.mat22d, device=device)
+    """Return the stiffness of the cells of a part that is a membrane: of each the second derivative, without what is negative."""
+    device, size, count = network.device, 2 * network.vertex_count, network.cell_count
+    second, inverse = wp.zeros(count, wp.mat44d, device), wp.zeros(count, wp.mat22d, device)
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
-    given = [at, network.cells, part.parameters]
-    record(stiffen_membrane, dim=part.count, first=part.first, inputs=given, outputs=[blocks], device=device).launch()
-    corner, values = network.cell_arrays.corner[cells], blocks.numpy().reshape(-1, 3, 3, 2, 2)[cells]
-    place = 2 * corner[:, :, None] + np.arange(2, dtype=np.int32)
-    shape = values.transpose(0, 1, 3, 2, 4).shape
-    rows = np.broadcast_to(place[:, :, :, None, None], shape)
-    columns = np.broadcast_to(place[:, None, None], shape)
-    entries = values.transpose(0, 1, 3, 2, 4).ravel(), (rows.ravel(), columns.ravel())
-    return csc_array(coo_array(entries, shape=(size, size)))
+    given, made = [at, network.cells, part.parameters], [second, inverse]
+    record(differentiate_membrane, dim=part.count, first=part.first, inputs=given, outputs=made, device=device).launch()
+    values, vectors = np.linalg.eigh(second.numpy()[cells])
+    positive = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
+    # Rows: the gradients of the barycentric weights of a cell's corners.
+    gradient = inverse.numpy()[cells]
+    gradient = np.concatenate([-gradient.sum(axis=1, keepdims=True), gradient], axis=1)
+    entries = np.einsum("cipjq,ckp,clq->ckilj", positive.reshape(-1, 2, 2, 2, 2), gradient, gradient, optimize=True)
+    place = 2 * network.cell_arrays.corner[cells][:, :, None] + np.arange(2, dtype=np.int32)
+    rows, columns = (
+        np.broadcast_to(each, entries.shape) for each in (place[:, :, :, None, None], place[:, None, None])
+    )
+    return csc_array(coo_array((entries.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
 
 
 def _rows(count: int, vertices: IntArray, gradient: FloatArray) -> csr_array:

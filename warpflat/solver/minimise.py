@@ -23,7 +23,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.sums import dot
 from warpflat.solver.energy import Energy, Point
 from warpflat.solver.grain import align_grain
-from warpflat.solver.metric import LaplacianFactor, Metric, Solve
+from warpflat.solver.metric import CHEAP, LaplacianFactor, Metric, Solve, StiffnessFactor
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.steps import Relaxation, Watch, relax_by_steps, take_first_steps
 from warpflat.solver.stop import Outcome, Remainder, RemainderEstimate, Status, looked_back, relative_change
@@ -45,6 +45,9 @@ _LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
 # Work units of an iteration: two evaluations of the forces and the solution; and of each layout that is tried.
 _WORK, _TRIAL_WORK = 3.0, 0.5
 
+# After so many iterations over the Laplacian the cloth's own stiffness is factored, where cells are the cloth; and again after each so many
+# times as many.
+_FACTORED, _LATER = 15, 2
 # Directions are measured no more often than after so many iterations.
 _RENEWAL = 6
 # A rise of the energy from one measurement of directions to the next, as a share, that makes them follow the layout by less.
@@ -308,8 +311,13 @@ def relax(
     estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
     directions = None if measure is None else _Directions(measure, measured)
 
-    done = False
+    done, factored = False, _FACTORED if state.network.model == "membrane" and len(start) <= CHEAP else 0
     while not done:
+        if descent.iterations and descent.iterations == factored:
+            own = StiffnessFactor(state.network, descent.point.positions, state.alignments, dtype=np.float32)
+            problem.metric = Metric(own, state.alignments)
+            descent.renew(forget=True)
+            factored *= _LATER
         moved = descent.step()
         state.steps += moved
         state.work_units = work_before + descent.work_units
