@@ -280,7 +280,7 @@ def test_a_damaged_pattern_is_told_in_one_line_and_nothing_is_written(
         ('{"schema": ' + DIGITS[:4000] + ', "sizes": {}}', "has schema"),
         ('{"schema": 1, "sizes": 3}', "name: is missing"),
         ("null", "no pattern of warpflat"),
-        ("", "cannot be read as JSON"),
+        ("", "line 1, column 1: is no JSON"),
     ],
     ids=["open lists", "lists", "digits", "schema", "sizes", "null", "empty"],
 )
