@@ -220,7 +220,7 @@ def correct_pattern(
 
 
 def _round(drape: Drape, share: float, bridging: bool) -> Round:
-    strained = drape.demand.outside(drape.face_areas)
+    strained = float(drape.face_areas[drape.demand.held].sum() / drape.face_areas.sum())
     off = drape.misfit if bridging else drape.distance
     mean = float((off * drape.areas).sum() / drape.areas.sum())
     return Round(
