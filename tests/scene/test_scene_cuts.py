@@ -315,7 +315,7 @@ def test_the_command_compares_cuts_and_applies_one(
 def test_a_cut_across_the_mesh_has_smooth_legs_near_the_mesh(tmp_path: Path):
     """The shorter leg, which is to be longer, would else take up the length in teeth."""
     dart = {"name": "a", "from": [0.17, 0.20, 0.0], "to": [0.08, 0.26, 0.14]}
-    result = run_scene(scene(surface={"shape": "bodice", "resolution": 33}, cuts=[dart], **QUIET), tmp_path)
+    result = run_scene(scene(surface={"shape": "bodice", "resolution": 41}, cuts=[dart], **QUIET), tmp_path)
     assert [note for note in result.notes if "stays ragged" in note] == []
     (piece,) = read_pattern_json(tmp_path / "pattern.json").pieces[""]
     left, right = piece.edge("a.left"), piece.edge("a.right")

@@ -48,7 +48,8 @@ def worst_difference(
     if len(first) != len(second):
         return None
     if laid is not None:
-        second = second - (laid[1] - laid[0])
+        # What the layout eases in is no difference.
+        second, ease = second - (laid[1] - laid[0]), 0.0
     starts = np.unique(np.concatenate([first, first - STRETCH]))
     starts = starts[(starts >= 0) & (starts <= first[-1] - STRETCH)]
     starts = starts if len(starts) else first[:1]
