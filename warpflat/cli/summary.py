@@ -72,7 +72,9 @@ def summary_lines(
     # With what was drafted beside them, such as collars and bands.
     titles = {each["title"] for part in metrics.get("cloths", ()) for each in part["pieces"]}
     what = (
-        [f"{format_count(max(len(titles), len(pieces)), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"]
+        [
+            f"{format_count(max(len(titles), len(pieces)), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"
+        ]
         if pieces
         else []
     )

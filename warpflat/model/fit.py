@@ -110,7 +110,7 @@ class WornFit:
         area: flat [m2].
         demand: what is asked of each face, as shares of the fabric's limits.
         misfits: regions beyond a limit, largest first.
-        held_misfits, slack_misfits: those that are held beyond it, and those that are only slack: a dart helps the one, folds are the other.
+        held_misfits, slack_misfits: those that are held beyond it, and those that are only slack. A dart helps the ones, the others fold.
         hollow: share of the flat area where the tension would lift the cloth off.
         close: #F, true where the surface lies close to the wearer's body; None if it does everywhere. Elsewhere the cloth hangs, and is not
             held.
@@ -249,8 +249,9 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     demand = Demand.of(fabric, strain_warp - meant[:, 0], strain_weft - meant[:, 1], shear)
     total_area = max(float(weight.sum()), 1e-300)
 
-    def regions(outside: IntArray, most: FloatArray, way: IntArray) -> tuple[Misfit, ...]:
-        """Return the connected regions of some faces, the largest first, by what is asked of each face (#F) and in which way."""
+    def regions(chosen: BoolArray, most: FloatArray, shares: FloatArray) -> tuple[Misfit, ...]:
+        """Return the connected regions of chosen faces (#F), the largest first, by what is asked of each face, and of its ways."""
+        outside, way = np.flatnonzero(chosen), shares.argmax(axis=1)
         if not len(outside):
             return ()
         part = components(surface.faces[outside])
@@ -271,7 +272,6 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
             for k in np.argsort(-area, kind="stable").tolist()
         )
 
-    any_way, held_way = np.abs(demand.shares).argmax(axis=1), demand.held_shares.argmax(axis=1)
     return WornFit(
         strain_warp=strain_warp,
         strain_weft=strain_weft,
@@ -281,8 +281,8 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         pressure=np.maximum(pressure, 0.0),
         area=weight,
         demand=demand,
-        misfits=regions(np.flatnonzero(demand.beyond), demand.most, any_way),
-        held_misfits=regions(np.flatnonzero(demand.held), demand.held_shares.max(axis=1), held_way),
-        slack_misfits=regions(np.flatnonzero(demand.slack), demand.most, any_way),
+        misfits=regions(demand.beyond, demand.most, np.abs(demand.shares)),
+        held_misfits=regions(demand.held, demand.held_shares.max(axis=1), demand.held_shares),
+        slack_misfits=regions(demand.slack, demand.most, np.abs(demand.shares)),
         hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
     )
