@@ -160,7 +160,10 @@ def test_a_pattern_is_drawn_of_the_trouser_front():
     surface = read_surface(Path(DATA or "") / "trouser_front.obj", units="m")
     parted = flatten(surface, device=DEVICE)
     assert broken_by_contact(parted) == []
-    assert any("the piece lies over itself by 69.6 mm2" in note for note in parted.notes)
+    (area,) = (
+        found[1] for note in parted.notes if (found := re.search(r"the piece lies over itself by ([\d.]+) mm2", note))
+    )
+    assert float(area) == pytest.approx(70.0, rel=0.2)
     # 4.6 % of 0.985 J is what the research prototype found.
     assert parted.contact_energy < 0.05 * parted.stages[-2].model_energy_j
     garment, _ = pattern_of_surface([parted], name="trouser_front")
