@@ -16,8 +16,9 @@ from warpflat.draping.worn_layer import Button
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam
 from warpflat.pattern.whole_pieces import hole_edges
+from warpflat.surface.connectivity import join_labels
 
-__all__ = ["FlatMesh", "mesh_pieces"]
+__all__ = ["FlatMesh", "mesh_pieces", "sewn_places", "welded_vertices"]
 
 # Ends of edges on both sides of a seam that are closer than this share of the spacing are sewn to each other.
 _SNAP = 0.35
@@ -106,6 +107,25 @@ def mesh_pieces(
     raise InputError(
         f"the cloth beside {where!r} is too narrow for a mesh of {1e3 * spacing:g} mm; give a smaller spacing"
     )
+
+
+def welded_vertices(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> tuple[IntArray, dict[str, int]]:
+    """Return #P, the vertex of the sewn mesh of each vertex of the meshes one after the other, and where each begins."""
+    ends = np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist()
+    begins = dict(zip(meshes, ends[:-1], strict=True))
+    joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    first, second = np.array(joints, dtype=np.int64).reshape(-1, 2).T
+    return join_labels(ends[-1], first, second), begins
+
+
+def sewn_places(places: Mapping[str, FloatArray], begins: Mapping[str, int], welded: IntArray) -> FloatArray:
+    """Return #V by 3, the middle of the places (#P by 3 [m] by piece) of all that becomes one vertex of the sewn mesh; NaN without any."""
+    total, count = np.zeros((int(welded.max()) + 1, 3)), np.zeros(int(welded.max()) + 1)
+    for name, points in places.items():
+        rows = welded[begins[name] : begins[name] + len(points)]
+        np.add.at(total, rows, points)
+        np.add.at(count, rows, 1.0)
+    return np.where(count[:, None] > 0.0, total / np.maximum(count, 1.0)[:, None], np.nan)
 
 
 def _parts(length: float, spacing: float, finer: int) -> int:
