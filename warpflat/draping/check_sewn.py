@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import warp as wp
 
-from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import StepError
 from warpflat.core.launch import launch_each
 from warpflat.draping.body import Body
@@ -19,14 +19,12 @@ from warpflat.kernels.pierced import find_pierced
 
 __all__ = ["check_sewn", "pierced_edges"]
 
-# An opening shorter than this goes around no limb [m].
-_SHORT = 0.12
-# Cloth is tangled where more than this share of a piece's edges pierce cloth, or more than this share of it is stretched by so much.
+# Cloth is tangled if more than this share of its edges pierce it elsewhere, or more than this share of it is stretched by so much.
 _PIERCED, _TORN = 0.1, (0.05, 0.5)
 _REMEDY = 'say in [[pieces]] where it is, as at = "left arm", and in top how high it hangs, or draw it where it is worn'
 
 
-def pierced_edges(cloth: SewnCloth, positions: FloatArray) -> tuple[BoolArray, FloatArray]:
+def pierced_edges(cloth: SewnCloth, positions: FloatArray) -> tuple[BoolArray, IntArray]:
     """Return which edges of worn cloth (#E) pierce it elsewhere, and their vertices (#E by 2).
 
     Args:
@@ -48,6 +46,8 @@ def check_sewn(
     openings: Sequence[Opening],
     limbs: Sequence[str],
     lines: Mapping[str, FloatArray],
+    *,
+    buttoned: bool = False,
 ) -> None:
     """Refuse cloth that was sewn beside a limb, or tangled.
 
@@ -57,31 +57,33 @@ def check_sewn(
         openings: of the garment.
         limbs: around which limb each of them should go; "" for the trunk and the neck.
         lines: the body's limbs: see :func:`warpflat.draping.limbs.limb_lines`.
+        buttoned: whether buttons or ties close the garment, which its openings do not tell.
 
     Raises:
         StepError: it was; the words name a piece, and say what would help.
     """
-    for opening, limb in zip(openings, limbs, strict=True):
-        found = links(positions[opening.vertices], lines)
-        asked = (
-            {each for each in found if found[each]} == {limb} and abs(found[limb]) == 1 if limb else any(found.values())
+    around = [links(positions[opening.vertices], lines) for opening in openings]
+    if around and not buttoned and not any(any(found.values()) for found in around):
+        raise StepError(
+            "falls off: the garment goes around no part of the body; close it by a seam, buttons or ties, or say in top how high it hangs"
         )
-        if opening.length >= _SHORT and not asked:
-            where = f"beside the {limb} instead of around it" if limb else "beside the body"
+    for opening, limb, found in zip(openings, limbs, around, strict=True):
+        # A hole in the cloth, as of a pocket, goes around nothing.
+        if limb and opening.turn > -np.pi and (abs(found[limb]) != 1 or sum(map(bool, found.values())) > 1):
             raise StepError(
-                f"piece {min(opening.pieces)!r}: its opening of {1e3 * opening.length:.0f} mm was sewn {where}: {_REMEDY}"
+                f"piece {min(opening.pieces)!r}: its opening of {1e3 * opening.length:.0f} mm was sewn beside the {limb} instead of "
+                f"around it: {_REMEDY}"
             )
     hit, edges = pierced_edges(cloth, positions)
-    corner, face, _, area = cloth.cells()
+    corner, _, _, area = cloth.cells()
     torn = stretches(cloth, positions) > _TORN[1]
-    for name, rows in cloth.piece_vertices.items():
-        own = np.zeros(len(positions), dtype=bool)
-        own[cloth.welded[rows]] = True
-        of_piece = own[edges].all(axis=1)
-        cells = np.isin(face, np.arange(len(face))[cloth.piece_faces[name]])
-        pierced, share = hit[of_piece].mean(), area[cells & torn].sum() / area[cells].sum()
-        if pierced > _PIERCED or share > _TORN[0]:
-            raise StepError(
-                f"piece {name!r} was sewn into a tangle: {100 * pierced:.0f} % of its edges pierce cloth, {100 * share:.0f} % of it is "
-                f"stretched by over {100 * _TORN[1]:.0f} %: {_REMEDY}"
-            )
+    pierced, share = float(hit.mean()), float(area[torn].sum() / area.sum())
+    if pierced > _PIERCED or share > _TORN[0]:
+        count = np.bincount(np.concatenate([edges[hit].ravel(), corner[torn].ravel()]), minlength=len(positions))
+        worst = max(
+            cloth.piece_vertices, key=lambda name: float(count[cloth.welded[cloth.piece_vertices[name]]].mean())
+        )
+        raise StepError(
+            f"the pieces were sewn into a tangle, most at {worst!r}: {100 * pierced:.0f} % of their edges pierce cloth, "
+            f"{100 * share:.0f} % of it is stretched by over {100 * _TORN[1]:.0f} %: {_REMEDY}"
+        )

@@ -27,7 +27,7 @@ from warpflat.draping.sew_around import sew_around
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.draping.wrap_pieces import UNITS, continue_pieces, hood_beside_head, wrap_pieces
+from warpflat.draping.wrap_pieces import UNITS, continue_pieces, find_sleeves, hood_beside_head, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.head import head_of
 from warpflat.mannequin.mannequin import Mannequin
@@ -217,24 +217,24 @@ def _sew(
     cloth, lines = _cloth(pieces, meshes, welds, placed, fabric, turned), limb_lines(body)
     start, openings = cloth.designed, find_openings(meshes, welds)
     high = max(float(points[:, 1].max()) for points in placed.values())
-    solid = _worn_body(body, head=high > body.line("collar")[:, 1].max() + _OVER_NECK, device=device)
-    # Sleeves hang on the arms' lines. The trunk lies inside them, and what begins below them passes through.
-    armholes = [lines[f"{side} arm"][1] for side in ("left", "right")]
-    on_arms = {name for name, points in placed.items() if on_arm(points, lines).mean() > 0.5}
-    trunk, below = np.ones(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
+    hooded = high > body.line("collar")[:, 1].max() + _OVER_NECK or any(each.role == "hood" for each in pieces.values())
+    solid = _worn_body(body, head=hooded, device=device)
+    # The trunk starts inside the arms, and what begins below them passes through.
+    on_arms = set[str]().union(
+        *find_sleeves(meshes, welds, {name: piece.at for name, piece in pieces.items()}, openings)
+    )
+    armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
+    sleeved, below = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
     for name, rows in cloth.piece_vertices.items():
-        trunk[cloth.welded[rows]] &= name not in on_arms
-    for name, rows in cloth.piece_vertices.items():
-        below[cloth.welded[rows]] |= placed[name][:, 1].max() < min(
-            float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right")
-        )
+        sleeved[cloth.welded[rows]] |= name in on_arms
+        below[cloth.welded[rows]] |= placed[name][:, 1].max() < armpit
     limbs = limbs_of(openings, start, on_arms)
-    hems = [each.vertices for each, limb in zip(openings, limbs, strict=True) if limb.endswith("leg")][:2]
-    start = around_legs(start, cloth.faces, hems, body) if len(hems) == 2 else start
-    start = np.where(trunk[:, None], inside_arms(start, lines), start)
+    hems = [each.vertices for each, limb in zip(openings, limbs, strict=True) if limb.endswith("leg")]
+    start = around_legs(start, cloth.faces, hems, lines) if len(hems) == 2 else start
+    start = np.where(sleeved[:, None], start, inside_arms(start, lines))
     thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
     sewn = sew_around(cloth, start, thin)
-    check_sewn(cloth, sewn, openings, limbs, lines)
+    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(closures(pieces)))
     lifts = {
         name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
         for name, mesh in meshes.items()

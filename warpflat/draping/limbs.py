@@ -14,25 +14,27 @@ from warpflat.mannequin.mannequin import Mannequin
 
 __all__ = ["around_legs", "inside_arms", "limb_lines", "links", "on_arm"]
 
-# A limb goes on by so much [m] beyond its end, and an arm is nowhere thicker than this [m].
-_BEYOND, _ARM = 3.0, 0.09
+# A limb goes on by so much [m] beyond its end, the face is so far above the neck, and an arm is nowhere thicker than this [m].
+_BEYOND, _FACE, _ARM = 3.0, 0.15, 0.09
 # Cloth of the trunk starts so far inside the line of an arm, and beside the middle, at least [m].
 _INSIDE, _LEAST = 0.04, 0.1
-# Height of a slice of a leg, way from the crotch to where its line counts fully, and a leg's distance from the middle at least [m].
-_SLICE, _RAMP, _OFF = 0.02, 0.10, 0.005
-# Slices over which a leg's line is averaged.
-_AVERAGED = 5
+# Steps down from the crotch to where two legs part, way from there to where a leg's line counts fully, and distance of cloth from the
+# middle at least [m].
+_STEP, _RAMP, _OFF = 0.02, 0.10, 0.005
 
 
 def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
-    """Return by "head", "left arm", "right arm", "left leg" and "right leg" the points from the chest out and beyond (#P by 3 [m])."""
-    ways = {"head": ("neck", "collar")}
+    """Return by "head", "left arm", "right arm", "left leg" and "right leg" the points from the chest out and beyond (#P by 3 [m]).
+
+    That of the head leaves through the face, as it does in a hood.
+    """
+    chest, neck = body.line("bust").mean(axis=0), body.line("collar").mean(axis=0)
+    ways, face = dict[str, tuple[str, str]](), neck + np.array([0.0, _FACE, 0.0])
     for side in ("left", "right"):
         ways |= {f"{side} arm": (f"armhole {side}", f"wrist {side}"), f"{side} leg": (f"thigh {side}", f"ankle {side}")}
-    found = {}
-    for limb, lines in ways.items():
-        chest, near, end = (body.line(line).mean(axis=0) for line in ("bust", *lines))
-        end = near + np.array([0.0, 0.1, 0.0]) if limb == "head" else end
+    found = {"head": np.array([chest, neck, face, face + np.array([0.0, 0.0, _BEYOND])])}
+    for limb, ends in ways.items():
+        near, end = (body.line(line).mean(axis=0) for line in ends)
         found[limb] = np.array([chest, near, end, end + _BEYOND * (end - near) / np.linalg.norm(end - near)])
     return found
 
@@ -86,8 +88,10 @@ def inside_arms(points: FloatArray, lines: Mapping[str, FloatArray]) -> FloatArr
     return np.column_stack([x, y, z])
 
 
-def around_legs(points: FloatArray, faces: IntArray, hems: Sequence[IntArray], body: Mannequin) -> FloatArray:
-    """Return sewn cloth (#V by 3 [m]) with its two legs moved sideways around the legs of a body, slice by slice, from the crotch down.
+def around_legs(
+    points: FloatArray, faces: IntArray, hems: Sequence[IntArray], lines: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Return sewn cloth (#V by 3 [m]) with its two legs moved sideways around the legs of a body, from the crotch down.
 
     Cloth of a leg is what hangs together with its hem below the height from which on both hang together. It is narrowed where it reaches
     over the middle.
@@ -96,12 +100,12 @@ def around_legs(points: FloatArray, faces: IntArray, hems: Sequence[IntArray], b
         points: #V by 3 [m].
         faces: #F by 4, of the sewn cloth.
         hems: the vertices of the openings of both legs.
-        body: with its crotch.
+        lines: the body's limbs.
     """
-    crotch, skin = body.levels()["crotch front"].height, body.surface().vertices
+    top = min(lines["left leg"][1, 1], lines["right leg"][1, 1])
     i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
     high = np.maximum(points[i, 1], points[j, 1])
-    for cut in np.arange(crotch, points[np.concatenate(list(hems)), 1].max(), -_SLICE):
+    for cut in np.arange(top, points[np.concatenate(list(hems)), 1].max(), -_STEP):
         below = high < cut
         graph = coo_array((np.ones(below.sum()), (i[below], j[below])), shape=(len(points),) * 2)
         part = connected_components(graph, directed=False)[1]
@@ -109,21 +113,13 @@ def around_legs(points: FloatArray, faces: IntArray, hems: Sequence[IntArray], b
             break
     else:
         return points
-    x = points[:, 0].copy()
+    x, y = points[:, 0].copy(), points[:, 1]
     for hem in hems:
-        side = np.sign(x[hem].mean())
-        rows = np.flatnonzero((part == part[hem[0]]) & (points[:, 1] < cut))
-        level = np.floor(points[rows, 1] / _SLICE).astype(int)
-        leg = skin[(skin[:, 0] * side > 0) & (skin[:, 1] < crotch)]
-        table = []
-        for k in (levels := np.unique(level)):
-            lowest = max(k * _SLICE, leg[:, 1].min() + _SLICE)
-            mine, its = side * x[rows[level == k]], side * leg[np.abs(leg[:, 1] - lowest) < 2 * _SLICE, 0]
-            axis, half = 0.5 * (its.min() + its.max()), 0.5 * float(np.ptp(mine))
-            table.append((0.5 * (mine.min() + mine.max()), axis, min(1.0, (axis - _OFF) / max(half, 1e-6))))
-        padded = np.pad(np.array(table), ((_AVERAGED // 2, _AVERAGED // 2), (0, 0)), mode="edge")
-        smooth = [np.convolve(column, np.ones(_AVERAGED) / _AVERAGED, mode="valid") for column in padded.T]
-        middle, axis, share = (np.interp(points[rows, 1], levels * _SLICE, column) for column in smooth)
-        goes = side * (axis + (side * x[rows] - middle) * share)
-        x[rows] += (goes - x[rows]) * np.clip((cut - points[rows, 1]) / _RAMP, 0.0, 1.0)
+        side = "left" if x[hem].mean() > 0.0 else "right"
+        rows = np.flatnonzero((part == part[hem[0]]) & (y < cut))
+        line = lines[f"{side} leg"][:0:-1]
+        axis, middle = np.interp(y[rows], line[:, 1], line[:, 0]), 0.5 * (x[hem].min() + x[hem].max())
+        narrowed = np.minimum(1.0, (abs(axis) - _OFF) / max(0.5 * float(np.ptp(x[hem])), 1e-6))
+        goes = axis + (x[rows] - middle) * narrowed
+        x[rows] += (goes - x[rows]) * np.clip((cut - y[rows]) / _RAMP, 0.0, 1.0)
     return np.column_stack([x, points[:, 1:]])

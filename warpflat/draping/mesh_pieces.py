@@ -15,6 +15,7 @@ from warpflat.core.polyline import points_at_lengths
 from warpflat.draping.worn_layer import Button
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam
+from warpflat.pattern.seam_difference import eased_length
 from warpflat.pattern.whole_pieces import hole_edges
 from warpflat.surface.connectivity import join_labels
 
@@ -146,7 +147,7 @@ def _divide(
     ]
     whole, other = ends[0][-1], ends[1][-1]
     along = np.linspace(0.0, whole, 4001)
-    across = np.array([seam.reach(t, whole) for t in along])
+    across = eased_length(along, whole, seam.ease, seam.eased)
     across *= other / across[-1]
     breaks = {float(t): (number, -1) for number, t in enumerate(ends[0])}
     for number, t in enumerate(np.interp(ends[1], across, along).tolist()):

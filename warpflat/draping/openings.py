@@ -1,10 +1,9 @@
-"""The openings of a sewn garment, and what its seams say of them: which pieces are sleeves, and around which limb an opening goes."""
+"""The openings of a sewn garment, and around which limb each goes."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -13,10 +12,8 @@ from warpflat.core.errors import InputError
 from warpflat.draping.mesh_pieces import FlatMesh, Weld, welded_vertices
 from warpflat.surface.connectivity import border_loops, orient
 
-__all__ = ["Opening", "find_openings", "limbs_of", "sleeves"]
+__all__ = ["Opening", "find_openings", "limbs_of"]
 
-# Cuffs of both sleeves are equally long but for this share.
-_ALIKE = 0.05
 # An opening whose middle lies this far aside, as a share of its width, is that of a limb.
 _ASIDE = 0.3
 
@@ -29,11 +26,13 @@ class Opening:
         vertices: its vertices in their order, in the numbering of the sewn mesh.
         length: in the flat pieces [m].
         pieces: those that have an edge on it.
+        turn: by how much it turns in the flat cloth [rad]: -2 pi around a hole, nothing at the end of a tube.
     """
 
     vertices: IntArray
     length: float
     pieces: frozenset[str]
+    turn: float
 
 
 def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> list[Opening]:
@@ -45,7 +44,15 @@ def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]
     except InputError:
         return []
     lengths: dict[tuple[int, int], tuple[float, str]] = {}
+    angle = np.zeros(len(welded))
     for name, mesh in meshes.items():
+        for k in range(3):
+            corner, *others = (mesh.points[mesh.triangles[:, (k + step) % 3]] @ [1.0, 1j] for step in range(3))
+            np.add.at(
+                angle,
+                welded[mesh.triangles[:, k] + begins[name]],
+                np.angle((others[1] - corner) / (others[0] - corner)),
+            )
         edges = np.concatenate([mesh.triangles[:, [0, 1]], mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]]])
         along = np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).tolist()
         pairs = np.sort(welded[edges + begins[name]], axis=1).tolist()
@@ -54,40 +61,9 @@ def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]
     for loop in loops:
         on = [lengths[a, b] for a, b in np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()]
         pieces = frozenset(name for _, name in on)
-        found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces))
+        turn = float((np.pi - angle[loop]).sum())
+        found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces, turn=turn))
     return sorted(found, key=lambda each: -each.length)
-
-
-def sleeves(openings: Sequence[Opening], sewn: set[tuple[str, str]], names: Sequence[str]) -> list[set[str]]:
-    """Return the pieces of both sleeves, or nothing, from the seams alone.
-
-    A piece goes with the opening that is the fewest seams away. A sleeve goes with one opening, has a twin whose opening is as long, and
-    is not sewn to it, as the legs of trousers are.
-
-    Args:
-        openings: of the garment.
-        sewn: pairs of pieces that a seam joins, either first.
-        names: of all pieces.
-    """
-    away = dict.fromkeys(names, -1)
-    of = {name: {number for number, each in enumerate(openings) if name in each.pieces} for name in names}
-    ring, steps = [name for name in names if of[name]], 0
-    while ring:
-        away |= dict.fromkeys(ring, steps)
-        steps += 1
-        ring = [
-            name for name in names if away[name] < 0 and any(away[other] == steps - 1 for a, other in sewn if a == name)
-        ]
-        for name in ring:
-            of[name] = set().union(*(of[other] for a, other in sewn if a == name and away[other] == steps - 1))
-    groups = [{name for name in names if of[name] == {number}} for number in range(len(openings))]
-    twins = [
-        (abs(openings[i].length / openings[j].length - 1.0), i, j)
-        for i, j in combinations(range(len(openings)), 2)
-        if groups[i] and groups[j] and not any((a, b) in sewn for a in groups[i] for b in groups[j])
-    ]
-    alike, i, j = min(twins, default=(1.0, 0, 0))
-    return [groups[i], groups[j]] if alike < _ALIKE and len(openings) > 2 else []
 
 
 def limbs_of(openings: Sequence[Opening], positions: FloatArray, on_arms: Collection[str]) -> list[str]:

@@ -20,8 +20,8 @@ __all__ = ["ThinBody", "draw_out_limbs"]
 
 # How far legs and arms are drawn out, in steps of so much [m]; an arm gets narrower by this share in a step.
 _LEG, _ARM, _STEP, _NARROWS = 0.30, 0.18, 0.02, 0.03
-# Beside its end a limb is looked at from so far to so far [m]; it hangs if it points down by more than this share.
-_BESIDE, _HANGS = (0.05, 0.10), 0.7
+# Beside its end a limb is looked at from so far to so far [m]. Legs end below this share of the body's height.
+_BESIDE, _LOW = (0.05, 0.10), 0.3
 # The thin body has lost this share of its inscribed balls. No ball is larger than this [m].
 _THIN, _LARGEST = 0.65, 0.3
 # Rounds of the shrinking ball, and of averaging its radius over neighbours.
@@ -41,9 +41,9 @@ def draw_out_limbs(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, I
         middle = vertices[loop].mean(axis=0)
         far = np.linalg.norm(vertices - middle, axis=1)
         way = middle - vertices[(far > _BESIDE[0]) & (far < _BESIDE[1])].mean(axis=0)
-        way /= np.linalg.norm(way)
-        hangs = way[1] < -_HANGS
-        way, length, narrows = (np.array([0.0, -1.0, 0.0]), _LEG, 0.0) if hangs else (way, _ARM, _NARROWS)
+        is_leg = middle[1] < vertices[:, 1].min() + _LOW * np.ptp(vertices[:, 1])
+        length, narrows = (_LEG, 0.0) if is_leg else (_ARM, _NARROWS)
+        way = np.array([0.0, -1.0, 0.0]) if is_leg else way / np.linalg.norm(way)
         steps = np.arange(1, round(length / _STEP) + 1)[:, None, None]
         rings = middle + (1.0 - narrows * steps) * (vertices[loop] - middle) + _STEP * steps * way
         count = sum(map(len, rows))

@@ -9,7 +9,8 @@ arms. The garment goes up or down to where it hangs: on the shoulders, at its ow
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,10 +19,10 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.draping.mesh_pieces import FlatMesh, Weld, sewn_places, welded_vertices
-from warpflat.draping.openings import find_openings, limbs_of, sleeves
+from warpflat.draping.openings import Opening, find_openings, limbs_of
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["UNITS", "continue_pieces", "hood_beside_head", "wrap_pieces"]
+__all__ = ["UNITS", "continue_pieces", "find_sleeves", "hood_beside_head", "wrap_pieces"]
 
 #: Where a file's units stand.
 UNITS = (
@@ -32,10 +33,12 @@ _LEAST_GIRTH = 0.5
 
 # The trunk is rolled up as an ellipse so many times as wide as deep.
 _WIDTH_OVER_DEPTH = 1.4
+# Openings of both sleeves are equally long but for this share.
+_ALIKE = 0.05
 # Sides of a seam that are farther apart than this share of the pieces' width meet behind the body.
 _FAR = 0.25
-# Pieces that hang from the shoulders start this much higher [m]. Cloth is above a point of the shoulder within so much beside it [m].
-_ABOVE, _OVER = 0.01, 0.015
+# Pieces that hang from the shoulders start this much higher [m].
+_ABOVE = 0.01
 # Pieces that hang around another place than the body, sideways or forwards by so much [m], are moved to it.
 _ASIDE = np.array([0.02, np.inf, 0.1])
 # The highest of a sleeve, whose middle is laid above the arm, is what reaches up to this share of its height.
@@ -87,11 +90,7 @@ def wrap_pieces(
     """
     at, hung, names = dict(at or {}), hung or {}, list(meshes)
     joins, openings = _joins(welds, names), find_openings(meshes, welds)
-    # Sleeves: those that are told, those that the seams tell, those that are called so.
-    groups = [{name for name in names if at.get(name) == f"{side} arm"} for side in ("left", "right")]
-    if not any(groups):
-        sewn = {pair for join in joins for pair in (join.pieces, join.pieces[::-1])}
-        groups = sleeves(openings, sewn, names) or [{name} for name in names if "sleeve" in name.lower()]
+    groups = find_sleeves(meshes, welds, at, openings)
     on_arms = set[str]().union(*groups)
     trunk = [name for name in names if name not in on_arms]
     if not trunk:
@@ -104,6 +103,7 @@ def wrap_pieces(
         )
     if isinstance(top, str) and top not in heights:
         raise InputError(f"top: level {top!r} is unknown: {nearest(top, heights)}")
+    shoulder = max(float(body.line(f"shoulder {side}")[:, 1].max()) for side in ("left", "right"))
     middle = 0.5 * (waist.min(axis=0) + waist.max(axis=0))
     placed, is_hung = dict[str, FloatArray](), hung.keys() >= set(trunk)
     if is_hung:
@@ -119,8 +119,8 @@ def wrap_pieces(
         width, _ = _girth(plane, inner)
         frame = _Frame(middle * [0.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
         # The pieces in tiers above each other: those of one are joined by upright seams.
-        upright = [join for join in inner if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane))]
-        for tier in _parts(upright, list(plane)):
+        sides = [join for join in inner if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane))]
+        for tier in _parts(sides, list(plane)):
             laid = {name: plane[name] for name in tier}
             of_tier, meets = _girth(laid, [join for join in inner if set(join.pieces) <= laid.keys()])
             if meets:
@@ -128,30 +128,31 @@ def wrap_pieces(
             placed |= {
                 name: frame.roll(flat, of_tier if meets else width, _WIDTH_OVER_DEPTH) for name, flat in laid.items()
             }
-    # Armholes: where a sleeve is sewn on, or an opening of the trunk.
+    # Pieces with an armhole hang from the shoulders: where a sleeve is sewn on, or an opening of the trunk is beside its middle.
     welded, begins = welded_vertices(meshes, welds)
-    places = sewn_places(placed, begins, welded)
     free = [each for each in openings if not each.pieces & on_arms]
-    limbs = limbs_of(free, places, ())
-    armholes = [
-        (min(each.pieces), places[each.vertices])
-        for each, limb in zip(free, limbs, strict=True)
-        if limb.endswith("arm") and not on_arms
-    ]
+    limbs = limbs_of(free, sewn_places(placed, begins, welded), ())
+    armholed = {name for each, limb in zip(free, limbs, strict=True) if limb.endswith("arm") for name in each.pieces}
+    upright = dict(meshes)
     for group in groups:
-        both = [(join.pieces, join.vertices) for join in joins] + [
-            (join.pieces[::-1], join.vertices[::-1]) for join in joins
-        ]
-        seams = [(a, placed[a][own]) for (a, b), (own, _) in both if a in placed and b in group]
+        seams = [(a, b, placed[a][own], its) for (a, b), (own, its) in _both_ways(joins) if a in placed and b in group]
         if seams:
-            armholes.append((seams[0][0], np.concatenate([points for _, points in seams])))
-            side = "left" if armholes[-1][1][:, 0].mean() > 0.0 else "right"
+            armholed |= {a for a, _, _, _ in seams}
+            side = "left" if np.concatenate([points for _, _, points, _ in seams])[:, 0].mean() > 0.0 else "right"
             at = at | {name: f"{side} arm" for name in group if not at.get(name, "").endswith(" arm")}
+        for name in {b for _, b, _, _ in seams}:
+            # A sleeve may lie in its file; by quarter turns its cap comes up.
+            flat, cap = meshes[name].points, np.concatenate([its for _, b, _, its in seams if b == name])
+            x, y = flat[cap].mean(axis=0) - flat.mean(axis=0)
+            turn = np.linalg.matrix_power([[0, -1], [1, 0]], round(np.arctan2(x, y) / (0.5 * np.pi)) % 4)
+            upright[name] = replace(meshes[name], points=flat @ turn.T)
     # Each garment of a suit hangs by itself: with its top where that is asked for, else by its armholes, else at its own levels.
     for part in _parts(joins, names):
         own = [name for name in part if name in placed]
+        if not own:
+            continue
         shift, high = dict.fromkeys(own, 0.0), max(float(placed[name][:, 1].max()) for name in own)
-        tops = [points[points[:, 1].argmax()] for name, points in armholes if name in part]
+        tops = [float(placed[name][:, 1].max()) for name in own if name in armholed]
         lines: dict[str, list[float]] = {}
         for level, height in (levels[name] for name in own if levels and name in levels):
             lines.setdefault(level, []).append(height)
@@ -159,11 +160,8 @@ def wrap_pieces(
             below = heights[top] if isinstance(top, str) else float(top)
             shift = dict.fromkeys(own, below - high)
         elif tops:
-            line = np.concatenate([body.line(f"shoulder {side}") for side in ("left", "right")])
-            line = line[np.abs(line[:, 0]).argsort()]
-            goes = [float(np.interp(abs(p[0]), np.abs(line[:, 0]), line[:, 1])) + _ABOVE - p[1] for p in tops]
-            shift = dict.fromkeys(own, float(np.mean(goes)))
-        elif not lines and not (is_hung and heights["hip"] < high < body.line("shoulder left")[:, 1].max()):
+            shift = dict.fromkeys(own, shoulder + _ABOVE - max(tops))
+        elif not lines and not (is_hung and heights["hip"] < high < shoulder):
             shift = dict.fromkeys(own, heights["waist"] - high)
         for level, row in lines.items():
             height = float(np.mean(row))
@@ -171,8 +169,47 @@ def wrap_pieces(
             shift |= dict.fromkeys(hangs, heights[level] - height)
         placed |= {name: placed[name] + [0.0, by, 0.0] for name, by in shift.items()}
     for side in ("left", "right"):
-        placed |= _on_arm(meshes, joins, [name for name in names if at.get(name) == f"{side} arm"], side, body)
+        placed |= _on_arm(upright, joins, [name for name in names if at.get(name) == f"{side} arm"], side, body)
     return placed
+
+
+def find_sleeves(
+    meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], at: Mapping[str, str], openings: Sequence[Opening]
+) -> list[set[str]]:
+    """Return the pieces of each sleeve: those that are told, else those that the seams tell, else those that are called so.
+
+    By the seams a piece goes with the opening that is the fewest seams away. A sleeve goes with one opening, has a twin whose opening is
+    as long, and is not sewn to it, as the legs of trousers are.
+
+    Args:
+        meshes: the pieces.
+        welds: for each seam the vertices that it joins.
+        at: by piece "left arm" or "right arm", where that is told.
+        openings: of the garment.
+    """
+    told = [{name for name in meshes if at.get(name) == f"{side} arm"} for side in ("left", "right")]
+    if any(told):
+        return [each for each in told if each]
+    beside: dict[str, set[str]] = {name: set() for name in meshes}
+    for (a, b), _ in _both_ways(_joins(welds, list(meshes))):
+        beside[a].add(b)
+    of = {name: {number for number, each in enumerate(openings) if name in each.pieces} for name in meshes}
+    while ring := {
+        name: found
+        for name in meshes
+        if not of[name] and (found := set[int]().union(*(of[other] for other in beside[name])))
+    }:
+        of |= ring
+    groups = [{name for name in meshes if of[name] == {number}} for number in range(len(openings))]
+    twins = [
+        (abs(openings[i].length / openings[j].length - 1.0), i, j)
+        for i, j in combinations(range(len(openings)), 2)
+        if groups[i] and groups[j] and not any(beside[name] & groups[j] for name in groups[i])
+    ]
+    alike, i, j = min(twins, default=(1.0, 0, 0))
+    if alike < _ALIKE and len(openings) > 2:
+        return [groups[i], groups[j]]
+    return [{name} for name in meshes if "sleeve" in name.lower()]
 
 
 @dataclass(frozen=True)
@@ -210,6 +247,11 @@ def _joins(welds: Sequence[Sequence[Weld]], names: Sequence[str]) -> list[_Join]
                 first, second = np.array(rows, dtype=np.int32).T
                 joins.append(_Join(both, (first, second)))
     return joins
+
+
+def _both_ways(joins: Sequence[_Join]) -> list[tuple[tuple[str, str], tuple[IntArray, IntArray]]]:
+    """Return pieces and vertices of each join, either first."""
+    return [pair for join in joins for pair in ((join.pieces, join.vertices), (join.pieces[::-1], join.vertices[::-1]))]
 
 
 def _whole_sides(joins: Sequence[_Join], points: Mapping[str, FloatArray]) -> list[_Join]:
@@ -339,16 +381,12 @@ def continue_pieces(
     while lost := [name for name in meshes if name not in found]:
         # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
         sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
-        for join in _joins(welds, list(meshes)):
-            for (name, other), (own, its) in (
-                (join.pieces, join.vertices),
-                (join.pieces[::-1], join.vertices[::-1]),
-            ):
-                if name in lost and other in found:
-                    across = _border_frames(meshes[name], own).transpose(0, 2, 1)
-                    # Into this piece is out of the other one, or back into it.
-                    flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
-                    sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
+        for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+            if name in lost and other in found:
+                across = _border_frames(meshes[name], own).transpose(0, 2, 1)
+                # Into this piece is out of the other one, or back into it.
+                flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
+                sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
         lengths = {
             name: sum(
                 float(np.linalg.norm(np.diff(meshes[name].points[own], axis=0), axis=1).sum()) for own, _, _ in rows
@@ -388,13 +426,9 @@ def hood_beside_head(
         By half its points, #P by 3 [m].
     """
     rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
-    for join in _joins(welds, list(meshes)):
-        for (name, other), (own, its) in (
-            (join.pieces, join.vertices),
-            (join.pieces[::-1], join.vertices[::-1]),
-        ):
-            if name in hood and other in placed and other not in hood:
-                rows[name].append((own, placed[other][its]))
+    for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+        if name in hood and other in placed and other not in hood:
+            rows[name].append((own, placed[other][its]))
     found = {}
     for name, seams in rows.items():
         if not seams:
