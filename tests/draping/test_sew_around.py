@@ -132,7 +132,7 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     assert pierced_edges(worn.cloth, worn.positions)[0].mean() < 0.1
     # The same places, moved off the arm, or crumpled.
     limbs = limbs_of(openings, worn.positions, {"l", "r"})
-    beside = worn.positions + [0.0, 0.0, 0.5]
+    beside = worn.positions + np.array([0.0, 0.0, 0.5])
     check = {"openings": openings, "limbs": limbs, "lines": lines}
     with pytest.raises(InputError, match="falls off: the garment goes around no part of the body"):
         check_sewn(worn.cloth, beside, **check)
