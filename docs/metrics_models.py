@@ -514,6 +514,8 @@ class Drape(Entry):
     """At rest, and no place that fails."""
     residual: float
     steps: int
+    stalled: bool
+    """Given up, as its forces did not become smaller."""
     seconds: float
     vertices: int
     friction: float

@@ -235,6 +235,7 @@ class Drape:
             "fits": self.fits,
             "residual": self.worn.residual,
             "steps": self.worn.steps,
+            "stalled": self.worn.stalled,
             "seconds": self.worn.seconds,
             "vertices": len(self.positions),
             "friction": self.options.friction,
