@@ -7,8 +7,8 @@ that of a person in decimetres, centimetres or millimetres is scaled by itself.
 
 Columns: strain energy [J] and share beyond the limit [%] before (in one piece, `--seams none`, at most a minute), parted where every
 garment of its kind is, and with darts and further seams, the last two sewn; strains along warp and weft at 5 and 95 % of the cloth, shear
-at 95 %; left and right seams apart; both sides of seams apart; seconds of the whole command with its exit code; distance of the sewn cloth from the mesh, draped over
-it (mean, 95 %).
+at 95 %; left and right seams apart; both sides of seams apart; seconds of the whole command with its exit code; distance of the sewn cloth
+from the mesh, draped over it (mean, 95 %).
 """
 
 from __future__ import annotations

@@ -75,13 +75,15 @@ def keep_apart(
             costly = outcome.energies.potential > before + least
             if costly and len(surface.vertices) <= _MOST_SWIRLED:
                 # Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be
-                # wound up or unwound.
-                layout = state.positions()
-                for turn in _SWIRLS:
+                # wound up or unwound. So it begins once more where the piece began, and with what comes of that, swirled.
+                layout, settled = start, state.positions()
+                for turn in (0.0, *_SWIRLS):
                     other = Relaxation(
                         state.network, state.options, start=swirl(layout, turn), alignments=state.alignments
                     )
                     wound = relax_with_contact(other, 1e-3 * state.options.gap_mm)
+                    if layout is start:
+                        layout = settled if wound is None else other.positions()
                     if wound is not None and wound.converged and wound.energies.potential < outcome.energies.potential:
                         state, outcome = other, wound
             after = outcome.energies.potential

@@ -155,14 +155,13 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     began, start = time.perf_counter(), state.positions()
     align_grain(state.alignments, start)
     energy = Energy(state, Barrier.of(state.network, gap))
-    problem = Cloth(energy, Metric(LaplacianFactor(state.network), state.alignments), due=0)
+    problem = Cloth(energy, Metric(LaplacianFactor(state.network), state.alignments))
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return None
     descent, at_rest = Descent(problem, point), False
     estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
     most = min(_MOST_ITERATIONS, _MOST_WORK // len(start), state.options.max_steps)
-    problem.factor_stiffness(descent)
     while not at_rest and descent.iterations < most and descent.step():
         left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         at_rest = left.is_small(state.options) or descent.is_at_rest(state.options)

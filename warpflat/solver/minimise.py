@@ -77,13 +77,13 @@ class Cloth:
 
     energy: Energy
     metric: Metric
-    due: int = _FACTORED
+    _due: int = _FACTORED
 
     def factor_stiffness(self, descent: Descent[Point]) -> None:
-        """Take the stiffness of the cloth where a descent is as the metric, if cells are the cloth, after 15 iterations, 30, 60 and so on."""
+        """Take the cloth's own stiffness as the metric, if cells are the cloth, after 15 iterations of a descent, 30, 60 and so on."""
         state, positions = self.energy.state, descent.point.positions
-        if descent.iterations == self.due and state.network.model == "membrane" and len(positions) <= CHEAP:
-            self.due = max(_LATER * self.due, _FACTORED)
+        if descent.iterations == self._due and state.network.model == "membrane" and len(positions) <= CHEAP:
+            self._due *= _LATER
             own = StiffnessFactor(state.network, positions, state.alignments, dtype=np.float32)
             self.metric = Metric(own, state.alignments)
             descent.renew(forget=True)
