@@ -13,8 +13,8 @@ from devices import DEVICE
 
 import warpflat
 from warpflat.core.errors import InputError
+from warpflat.export.fit_picture import write_wear_sheet
 from warpflat.fabric.library import find_fabric
-from warpflat.flattening.fit_picture import write_wear_sheet
 from warpflat.flattening.fit_report import fit_lines, garment_wear
 from warpflat.flattening.verdict import judge
 from warpflat.model.fit import MAPS, assess_pattern
@@ -311,7 +311,7 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
         drawn.append(figure)
         path.touch()
 
-    monkeypatch.setattr("warpflat.flattening.fit_picture.write_figure", keep)
+    monkeypatch.setattr("warpflat.export.fit_picture.write_figure", keep)
     write_wear_sheet(tmp_path / "wear.png", results, title="sleeves")
     assert (tmp_path / "wear.png").exists()
     figure = drawn[0]
