@@ -130,7 +130,9 @@ def row(offer: GarmentOffer, wearer: str, chosen: Mapping[str, str], out: Path |
         f"{edges_left(drafted, size, steps):>4} {len(steps):>5} {'LATE' if late else 'good':>5} {time.process_time() - start:>4.0f}"
     ]
     failing = [each for each in (verdict or {"findings": ()})["findings"] if each["fails"]]
-    return "\n".join([*lines, *(f"    {each['words']}; {each['remedy']}" for each in failing), *(f"    {x}" for x in late)])
+    return "\n".join(
+        [*lines, *(f"    {each['words']}; {each['remedy']}" for each in failing), *(f"    {x}" for x in late)]
+    )
 
 
 def main() -> None:
