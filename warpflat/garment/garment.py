@@ -17,7 +17,6 @@ from warpflat.cutting.separate_pieces import separate
 from warpflat.export.piece_files import write_pieces
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.as_cut import CutPattern
-from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening, run_metrics
@@ -68,6 +67,7 @@ class Garment:
         curves: its borders as they are drawn; None if they are as the cloth rests.
         remarks: what could not be had of girths and curves, one sentence each.
         as_cut: how a pattern that was taken as it is compares with what flattening gives; None if it was not.
+        drape: the entry `drape` of `metrics.json`, by which the garment is judged then; None if it was not draped.
     """
 
     name: str
@@ -84,6 +84,7 @@ class Garment:
     curves: Curves | None = None
     remarks: tuple[str, ...] = ()
     as_cut: CutPattern | None = None
+    drape: Mapping[str, Any] | None = None
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
@@ -229,7 +230,7 @@ class Garment:
         if self.form is not None and self.mannequin is not None:
             wearer = {} if self.wearer is None else {"against": "form", "wearer": self.wearer.as_dict()}
             more = {
-                "wear": {**garment_wear(pieces), **wearer},
+                "wear": wearer,
                 "mannequin": self.mannequin.metrics(),
                 "pairs": [list(pair) for pair in self.pairs],
                 "girths": pattern_girths(self.mannequin, self.form, self.positions),
@@ -238,6 +239,8 @@ class Garment:
             }
         if self.as_cut is not None:
             more = {"pattern_of_file": self.as_cut.as_dict()}
+        if self.drape is not None:
+            more["drape"] = self.drape
         device = next(iter(self.pieces.values())).network.device
         return run_metrics(pieces, device, {**more, **self.sewing_metrics()})
 
@@ -388,12 +391,8 @@ def flatten_form(
         full[name] = give_fullness(full[name], edges, plain, options=relax)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
     held = (*constraints, *straight_hems(form, constraints), *dart_constraints(form))
-    # A knit gives: its girths matter where they are to be smaller than the body.
     knit = next(iter(pieces.values())).fabric.is_knit
-    wants = min(form.ease.values(), default=0.0) < 0.0 if knit else bool(form.ease)
-    girths = (
-        girth_constraints(mannequin, form, {name: piece.positions for name, piece in full.items()}) if wants else []
-    )
+    girths = girth_constraints(mannequin, form, {name: piece.positions for name, piece in full.items()})
 
     def sewn_under(held: Sequence[Constraint]) -> Garment:
         result = sew(full, garment.stitching, constraints=held, folds=folds, options=relax)

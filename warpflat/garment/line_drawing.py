@@ -91,7 +91,7 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
     knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
-    verdict = judge(garment.metrics()) if garment.form is not None else None
+    verdict = judge(garment.metrics())
     failing = dict.fromkeys(finding.kind for finding in verdict.findings if finding.fails) if verdict else {}
     mens = garment.mannequin is not None and re.search(r"\bmen\b", garment.mannequin.source) is not None
     fabrics = {flat.fabric.name: flat.fabric for flat in pieces}

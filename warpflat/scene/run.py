@@ -178,7 +178,8 @@ def _run(
             require_open_darts(scene, graded.values())
             sizes = {**graded, own_size: garment}
             pattern = Beside(partial(_draft, plan, sizes, own_size, folder), "drafting the pattern")
-            if vertices < _MANY:
+            # The paper tells the verdict, which a drape gives.
+            if vertices < _MANY and settings.drape is None:
                 beside.enter_context(pattern)
 
         files = list(film.files)
@@ -189,6 +190,7 @@ def _run(
             with optional_step("it was not draped", of=StepError):
                 draped, drape_files = write_drape(scene, garment, folder, device=device)
                 files = list(dict.fromkeys([*drape_files, *files]))
+                sizes[own_size] = replace(sizes[own_size], drape=draped["drape"])
         # What is ready is packed for the review while other processes write.
         page, reviewed = folder / "review.html", output.picture and output.review
         packed: Mapping[str, Any] | None = None
