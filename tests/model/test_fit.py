@@ -165,15 +165,16 @@ def test_a_place_beyond_both_limits_counts_once():
     assert both.misfits[0].words.startswith("stretched 6.0 % along w")
 
 
-def test_an_isotropic_sheet_has_no_threads_that_lock():
-    """Sheared along its grain it keeps its lengths there; the same cell along its diagonals is stretched and pressed."""
+@pytest.mark.parametrize("turn", [0.0, 45.0])
+def test_an_isotropic_sheet_has_no_threads_and_is_judged_by_its_principal_strains(turn: float):
+    """The same strain along the grain and across it: sheared by g, a diagonal is sqrt(1 + sin g) - 1 longer."""
     sheet = find_fabric("isotropic")
-    sheared_sheet = sheared(30.0, triangles=False)
-    along = assess_pattern(sheared_sheet, sheet, SQUARE)
-    assert along.fits
-    assert along.shear_limit is None
-    assert along.shear[0] == pytest.approx(30.0)
-    assert assess_pattern(sheared_sheet, sheet, SQUARE, grain_angle=45.0).outside == pytest.approx(1.0)
+    for share in (0.9, 1.1):
+        shear = math.degrees(math.asin(1.0 - (1.0 - share * sheet.strain_limit) ** 2))
+        fit = assess_pattern(sheared(shear, triangles=False), sheet, SQUARE, grain_angle=turn)
+        assert fit.outside == pytest.approx(float(share > 1.0))
+        assert fit.shear_limit is None
+    assert fit.misfits[0].words.startswith("slack 5.5 % (limit 5 %), ")
 
 
 @pytest.mark.parametrize(
