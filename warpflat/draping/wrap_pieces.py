@@ -210,8 +210,8 @@ def find_roles(
     alike, i, j = min(twins, default=(1.0, 0, 0))
     sleeves = [{name for name in meshes if at.get(name) == f"{side} arm"} for side in ("left", "right")]
     if not any(sleeves):
-        found = alike < _ALIKE and len(openings) > 2
-        sleeves = [groups[i], groups[j]] if found else [{name} for name in meshes if "sleeve" in name.lower()]
+        twin = alike < _ALIKE and len(openings) > 2
+        sleeves = [groups[i], groups[j]] if twin else [{name} for name in meshes if "sleeve" in name.lower()]
     on_arms, hood = set[str]().union(*sleeves), set[str]()
     for group in groups if len(openings) > 3 else ():
         ends = [
