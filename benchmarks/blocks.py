@@ -29,6 +29,7 @@ import numpy as np
 
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import Garment
+from warpflat.model.fit import TOLERATED
 from warpflat.scene.load import load_scene, make_scene
 from warpflat.scene.plan import plan_garment
 
@@ -201,7 +202,7 @@ def quality(garment: Garment) -> str:
     return (
         f"converged {metrics['sewing']['converged']}, flips {sum(p['flipped_faces'] for p in metrics['pieces'].values())}, "
         f"seams within {seams:.3f} mm, girths within {1e3 * max(girths):.1f} mm, model energy {1e3 * energy:.0f} mJ, "
-        f"fits: {sum(bool(wear.get('fits')) for wear in wears)} of {len(wears)} pieces"
+        f"fits: {sum(wear['held'] <= TOLERATED for wear in wears)} of {len(wears)} pieces"
     )
 
 

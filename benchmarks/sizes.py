@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.garment.pattern_files import garment_files
+from warpflat.model.fit import TOLERATED
 from warpflat.scene.load import load_scene, make_scene
 from warpflat.scene.plan import plan_garment
 
@@ -54,8 +55,8 @@ def measure(scene_name: str, size: str) -> dict[str, Any]:
         "bends": sum(max(0, line["inflections_after"] - 1) for line in curves["lines"]),
         "drawn": 1e3 * curves["price_j"],
         "converged": metrics["sewing"]["converged"],
-        "wearer": metrics["wear"]["wearer"]["fits"],
-        "where": next((place for wear in wears for place in wear["where_not"] if not wear["fits"]), ""),
+        "wearer": metrics["verdict"]["fits"],
+        "where": next((place for wear in wears for place in wear["where_not"] if wear["held"] > TOLERATED), ""),
     }
 
 

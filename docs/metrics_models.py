@@ -42,7 +42,6 @@ class Remedy(Entry):
 class PieceWear(Entry):
     """How a piece is strained when worn; strains are shares, shear degrees, tensions N/m, pressures Pa."""
 
-    fits: bool
     strain_limit: float
     shear_limit: float | None
     """[degrees]; none of an isotropic sheet, which has no threads: its principal strains count."""
@@ -52,7 +51,7 @@ class PieceWear(Entry):
     hollow: float
     """Share of the cloth over hollows, where no pressure is known."""
     held: float
-    """Share of the cloth that is stretched or sheared beyond a limit where it lies close to the body; what `fits` is about."""
+    """Share of the cloth that is stretched or sheared beyond a limit where it lies close to the body; at most 1 % is tolerated."""
     slack: float
     """Share of the cloth that lies in folds: longer than the surface by more than the limit."""
     where_not: list[str]
@@ -229,8 +228,8 @@ class BodyPressure(Entry):
 class WearerFit(Entry):
     """How a garment fits the body itself, whatever form its pattern was made on."""
 
-    fits: bool
-    """No row around the body is stretched beyond the limit of the cloth."""
+    strain_limit: float
+    """Of the cloth; no row around the body may be stretched beyond it."""
     levels: dict[str, WearerLevel]
     touching: float
     """Share of the cloth that goes around the body and is stretched there."""
@@ -239,10 +238,8 @@ class WearerFit(Entry):
 
 
 class GarmentWear(Entry):
-    """How the whole garment fits."""
+    """How the cloth of all pieces is strained; `verdict` says whether that fits."""
 
-    fits: bool
-    """At most 1 % of the cloth is held beyond its limits; `verdict` says all."""
     outside: float
     held: float
     slack: float
@@ -510,10 +507,10 @@ class Drape(Entry):
     """The garment on its body."""
 
     converged: bool
-    fits: bool
-    """At rest, and no place that fails."""
     residual: float
     steps: int
+    stalled: bool
+    """Given up, as its forces did not become smaller."""
     seconds: float
     vertices: int
     friction: float

@@ -20,7 +20,7 @@ from warpflat.draping.openings import find_openings, limbs_of
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sew_around import sew_around, stretches
 from warpflat.draping.thin_body import ThinBody, draw_out_limbs
-from warpflat.draping.wrap_pieces import find_sleeves, wrap_pieces
+from warpflat.draping.wrap_pieces import find_roles, wrap_pieces
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.surface.connectivity import border_loops
@@ -109,7 +109,7 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     openings = find_openings(meshes, welds)
     assert [each.length for each in openings] == pytest.approx([1.0, ARMHOLE, ARMHOLE, 0.36])
     assert [round(each.turn, 6) for each in openings[:3]] == [0.0, 0.0, 0.0]
-    assert find_sleeves(meshes, welds, {}, openings) == [{"l"}, {"r"}]
+    assert find_roles(meshes, welds, {}, openings) == ([{"l"}, {"r"}], set())
     placed = wrap_pieces(meshes, welds, body)
     for name, side in (("l", "left"), ("r", "right")):
         wrist, cap = (

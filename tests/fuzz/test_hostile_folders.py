@@ -124,7 +124,7 @@ def test_a_damaged_result_is_a_failure_of_its_task(batch: str, file: str, comman
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("strain_energy_j", "x"), ("strain_energy_j", float("inf")), ("converged", None), ("wear", {"fits": "\x1b[31m"})],
+    [("strain_energy_j", "x"), ("strain_energy_j", float("inf")), ("converged", None), ("wear", {"held": "\x1b[31m"})],
 )  # fmt: skip
 def test_a_result_of_wrong_types_with_a_seal_does_not_stop_the_batch(
     batch: str, key: str, value: object, command: Command

@@ -11,8 +11,12 @@ from bodies import body_of_size
 
 from warpflat.core.toml_file import read_toml
 from warpflat.flattening.verdict import Verdict, judge
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
+from warpflat.garment.to_pattern import pattern_of_garment
+from warpflat.mannequin.mannequin import Mannequin
 from warpflat.scene.load import make_scene
+from warpflat.scene.outside_pattern import OutsideJob, RunGirth, SewingTable
 from warpflat.scene.plan import plan_scene
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -65,6 +69,7 @@ def test_a_bodice_without_darts_does_not_fit():
 
 def test_folds_and_missed_ease_are_told(block: Garment):
     metrics = block.metrics()
+    metrics["wear"]["slack"] = 0.2
     for piece in metrics["pieces"].values():
         piece["wear"] = {
             **piece["wear"],
@@ -82,3 +87,26 @@ def test_folds_and_missed_ease_are_told(block: Garment):
     assert kinds["folds"].startswith("20.0 % of the cloth lies in folds; ")
     assert kinds["ease"].startswith("ease: bust +")
     assert np.isclose(metrics["girths"]["bust"]["ease_m"], metrics["girths"]["bust"]["ease_wanted_m"] + 0.01)
+
+
+@pytest.mark.parametrize(("size", "kind"), [("EU 34", "too large"), ("EU 38", None)])
+def test_a_garment_is_too_large_for_a_smaller_body_than_its_own(block: Garment, size: str, kind: str | None):
+    girths = {level: RunGirth(**girth) for level, girth in block.metrics()["girths"].items()}
+    job = OutsideJob(
+        path=Path("block"), name="block", pattern=pattern_of_garment({"": block}, name="block")[0], sewing=SewingTable(),
+        body=Mannequin.from_size(size, resolution_mm=20.0), lifts={}, girths=girths, sources=(),
+    )  # fmt: skip
+    drape = {"converged": True, "places": []}
+    found = judge({"pieces": {}, "drape": drape, "girths": job.girths_on_body()})
+    assert found is not None
+    assert [finding.kind for finding in found.findings if finding.fails][:1] == ([kind] if kind else [])
+    assert found.fits or found.findings[0].words == "too large: bust +13.0 cm, +5.0 were drafted"
+
+
+def test_the_paper_says_what_a_drape_found(block: Garment):
+    drape = {"converged": True, "places": [{"words": "the neck gapes by 9.0 mm", "kind": "misfit", "fails": True}]}
+    draped = replace(block, drape=drape)
+    assert verdict_of(draped).words == "does not fit as draped"
+    worn = pattern_of_garment({"": draped}, name="block")[0].worn
+    assert worn is not None
+    assert worn.failing == ("misfit",)

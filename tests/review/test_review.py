@@ -16,6 +16,7 @@ import pytest
 from PIL import Image
 
 from warpflat.cli.main import main
+from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.verdict import judge
 from warpflat.review.film import open_film
 from warpflat.review.page import verdict_words
@@ -193,7 +194,7 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
 def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error() -> None:
     strain = {"p95": 0.10}
     fit = {
-        "fits": True, "held": 0.0, "slack": 0.0, "outside": 0.0, "strain_limit": 0.15, "where_not": [], "where_slack": [],
+        "held": 0.0, "slack": 0.0, "outside": 0.0, "strain_limit": 0.15, "where_not": [], "where_slack": [],
         "would_help": [], "strain_warp": {"p95": 0.01}, "strain_weft": strain,
     }  # fmt: skip
     piece = {"flipped_faces": 0, "converged": True, "area_m2": 0.5, "wear": fit}
@@ -206,7 +207,8 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
         "over": "head",
     }
 
-    def told(metrics: dict[str, object]) -> str:
+    def told(metrics: dict[str, Any]) -> str:
+        metrics["wear"] = garment_wear(metrics["pieces"])
         verdict = judge(metrics)
         assert verdict is not None
         return verdict_words({**metrics, "verdict": verdict.as_dict()})
@@ -226,7 +228,7 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
     assert "stands off by 20&nbsp;mm" in words
     unfit = {
         **piece,
-        "wear": {**fit, "fits": False, "held": 0.1, "where_not": ["stretched 9 %, 3 cm2"]},
+        "wear": {**fit, "held": 0.1, "where_not": ["stretched 9 %, 3 cm2"]},
         "converged": False,
     }
     words = told({"pieces": {"front": unfit, "back": piece}})

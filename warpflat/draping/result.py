@@ -208,11 +208,6 @@ class Drape:
             places.append(replace(place, fails=self._fails(place)))
         return tuple(places)
 
-    @property
-    def fits(self) -> bool:
-        """True if the cloth is at rest and no place fails."""
-        return self.converged and not any(place.fails for place in self.places)
-
     def _fails(self, place: Place) -> bool:
         """Return whether a garment does not fit because of a place: it is held beyond a limit, or gapes at the neck or an armhole.
 
@@ -232,9 +227,9 @@ class Drape:
         fabric, areas = self.cloth.fabric, self.areas
         found: dict[str, Any] = {
             "converged": self.worn.converged,
-            "fits": self.fits,
             "residual": self.worn.residual,
             "steps": self.worn.steps,
+            "stalled": self.worn.stalled,
             "seconds": self.worn.seconds,
             "vertices": len(self.positions),
             "friction": self.options.friction,

@@ -324,7 +324,7 @@ class WornEntry(Entry):
     measures: dict[Text, list[MeasureEntry]] = Field(default_factory=dict)
     needed: list[NeededEntry] = Field(default_factory=list)
     knits: list[Text] = Field(default_factory=list)
-    failing: list[Literal["held", "pressing", "too large"]] = Field(default_factory=list)
+    failing: list[Literal["held", "pressing", "too large", "misfit", "not at rest"]] = Field(default_factory=list)
     cloths: dict[Text, ClothEntry] = Field(default_factory=dict)
     buttonholes: Literal["left", "right"] = "right"
 

@@ -40,6 +40,8 @@ FAILING = {
     "held": "This garment does not fit: its cloth is stretched or sheared beyond what it bears.",
     "pressing": "This garment does not fit: it presses on the body.",
     "too large": "This garment does not fit: it is larger than it was drafted.",
+    "misfit": "This garment does not fit: draped, it does not lie where it was drafted.",
+    "not at rest": "Whether this garment fits is not known: its drape has not come to rest.",
 }
 #: Size of the drawing of a technique [m], and of the box in which its strokes are given; by style their colour, width [pt] and dashes.
 TECHNIQUE, BOX = np.array([0.0176, 0.011]), np.array([48.0, 30.0])

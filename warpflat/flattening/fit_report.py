@@ -96,13 +96,12 @@ def garment_wear(pieces: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """
     worn = {name: piece["wear"] for name, piece in pieces.items()}
     area = {name: float(piece["area_m2"]) for name, piece in pieces.items()}
-    unfit = {name: wear for name, wear in worn.items() if not wear["fits"]}
+    unfit = {name: wear for name, wear in worn.items() if wear["held"] > TOLERATED}
     shares = {
         key: sum(wear[key] * area[name] for name, wear in worn.items()) / sum(area.values())
         for key in ("outside", "held", "slack")
     }
     return {
-        "fits": shares["held"] <= TOLERATED,
         **shares,
         "where_not": [f"{name}: {words}" for name, wear in unfit.items() for words in wear["where_not"]],
         "would_help": [{"piece": name, **remedy} for name, wear in unfit.items() for remedy in wear["would_help"]],
@@ -174,7 +173,7 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
             ranges += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
         lines.append(f"{name}: {shares} ({ranges})")
         lines += [f"  folds: {words}" for words in wear["where_slack"]]
-        if wear["fits"]:
+        if wear["held"] <= TOLERATED:
             continue
         lines += [f"  held: {words}" for words in wear["where_not"]]
         sewn = "outside_unsewn" in wear

@@ -16,7 +16,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.applied_cut import AppliedCut, cut_sides, measure_cut
 from warpflat.flattening.develop import Development
-from warpflat.flattening.fit_report import Remedy, wear_measures
+from warpflat.flattening.fit_report import Remedy, garment_wear, wear_measures
 from warpflat.flattening.progress import CONTACT, Stage
 from warpflat.flattening.stretched_faces import StretchedFaces, find_stretched_faces
 from warpflat.flattening.verdict import judge
@@ -242,5 +242,7 @@ def run_metrics(
         "pieces": dict(pieces),
         **(more or {}),
     }
+    if any("wear" in piece for piece in pieces.values()):
+        metrics["wear"] = {**garment_wear(pieces), **metrics.get("wear", {})}
     verdict = judge(metrics)
     return metrics if verdict is None else {**metrics, "verdict": verdict.as_dict()}

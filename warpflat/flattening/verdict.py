@@ -16,14 +16,14 @@ from typing import Any, Literal
 from warpflat.flattening.fit_report import no_cut_words, remedy_words
 from warpflat.model.fit import TOLERATED
 
-__all__ = ["Finding", "Verdict", "judge"]
+__all__ = ["MAIN_GIRTHS", "Finding", "Verdict", "judge"]
 
 # Cloth that presses harder is felt as too tight [Pa]: discomfort begins at 60 gf/cm2 (Denton 1972, Fit, stretch and comfort).
 _COMFORT = 5.9e3
 # A garment is too large if its girth exceeds the drafted one by this share: two thirds of the step between sizes, 4 cm on 88.
 _TOO_LARGE = 0.03
-# Girths that every garment is judged by; others where ease was asked for.
-_MAIN_GIRTHS = ("bust", "waist", "hip")
+#: Girths that every garment is judged by; others where ease was asked for.
+MAIN_GIRTHS = ("bust", "waist", "hip")
 # Ease that is missed by more is told [m].
 _EASE_MISSED = 5e-3
 _MOST_PLACES = 5
@@ -94,8 +94,8 @@ def judge(metrics: Mapping[str, Any]) -> Verdict | None:
     if drape is not None:
         found += _draped(drape)
     else:
-        found += _held(worn, {name: float(metrics["pieces"][name]["area_m2"]) for name in worn})
-        found += _on_the_wearer(metrics.get("wear", {}).get("wearer") or {})
+        found += _held(metrics["wear"], worn, {name: float(metrics["pieces"][name]["area_m2"]) for name in worn})
+        found += _on_the_wearer(metrics["wear"].get("wearer") or {})
     found += _girths(metrics.get("girths") or {})
     found += [
         Finding(
@@ -111,10 +111,11 @@ def judge(metrics: Mapping[str, Any]) -> Verdict | None:
     return Verdict(by="strain" if drape is None else "drape", findings=tuple(found))
 
 
-def _held(worn: Mapping[str, Mapping[str, Any]], areas: Mapping[str, float]) -> list[Finding]:
+def _held(
+    garment: Mapping[str, Any], worn: Mapping[str, Mapping[str, Any]], areas: Mapping[str, float]
+) -> list[Finding]:
     """Return what the strain of the pieces against their surface tells: cloth held beyond its limit, and folds."""
-    total, found = sum(areas.values()), list[Finding]()
-    held, slack = (sum(wear[key] * areas[name] for name, wear in worn.items()) / total for key in ("held", "slack"))
+    held, slack, found = garment["held"], garment["slack"], list[Finding]()
     if held > TOLERATED:
         worst = max(worn, key=lambda name: worn[name]["held"] * areas[name])
         wear = worn[worst]
@@ -148,9 +149,8 @@ def _held(worn: Mapping[str, Mapping[str, Any]], areas: Mapping[str, float]) -> 
 
 def _on_the_wearer(wearer: Mapping[str, Any]) -> list[Finding]:
     """Return what the strain around the body tells where the garment is smaller than it."""
-    found = []
-    if not wearer.get("fits", True):
-        worst = wearer["most_stretched"]
+    found, worst = [], wearer.get("most_stretched")
+    if worst is not None and worst["strain"] > wearer["strain_limit"]:
         found.append(
             Finding(
                 kind="held",
@@ -177,7 +177,7 @@ def _girths(girths: Mapping[str, Mapping[str, float]]) -> list[Finding]:
     found = []
     for level, girth in girths.items():
         asked = "ease_wanted_m" in girth
-        if not asked and level not in _MAIN_GIRTHS:
+        if not asked and level not in MAIN_GIRTHS:
             continue
         drafted = girth["ease_wanted_m"] if asked else girth["form_m"] - girth["body_m"]
         excess, ease = girth["ease_m"] - drafted, f"{level} {100 * girth['ease_m']:+.1f} cm"

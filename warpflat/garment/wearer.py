@@ -108,7 +108,7 @@ class WearerFit:
         touching = strain > 0.0
         worst = max(self.rows, key=lambda row: row.strain)
         found: dict[str, Any] = {
-            "fits": worst.strain <= self.limit,
+            "strain_limit": self.limit,
             "levels": {row.level: row.as_dict() for row in self.rows if row.level},
             "touching": float(area[touching].sum()) / max(around, 1e-300),
         }

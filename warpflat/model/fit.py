@@ -180,7 +180,6 @@ class WornFit:
             mean = float(values @ self.area) / max(float(self.area.sum()), 1e-300)
             distributions[name] = {"min": float(values.min()), **percentiles, "max": float(values.max()), "mean": mean}
         return {
-            "fits": self.fits,
             "strain_limit": self.limit,
             "shear_limit": self.shear_limit,
             "outside": self.outside,

@@ -88,7 +88,7 @@ class Worn:
         measures: by size.
         needed: openings that are missing, of the sample size.
         knits: names of its cloths that are knits.
-        failing: why it does not fit, by the verdict of its run: "held", "pressing" or "too large"; nothing where it fits.
+        failing: why it does not fit, the kinds of what fails in its run's verdict; nothing where it fits.
         cloths: by name what a shop knows them by.
         buttonholes: the half that has them and lies above, "right" for women, "left" for men.
     """

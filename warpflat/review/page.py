@@ -216,7 +216,7 @@ def _page(
     area = sum(piece["area_m2"] for piece in pieces)
     fits = [piece["wear"] for piece in pieces if piece.get("wear")]
     stretch = max((each[f"strain_{way}"]["p95"] for each in fits for way in ("warp", "weft")), default=0.0)
-    if stretch > STRETCHED and all(each["fits"] for each in fits):
+    if stretch > STRETCHED and metrics.get("verdict", {}).get("fits"):
         # Cloth that is meant to stretch differs from the body by that, which is no error.
         limit = max(each["strain_limit"] for each in fits)
         differs = [(f"{100 * stretch:.0f} % of {100 * limit:.0f} %", "stretch when worn, of what the cloth allows")]

@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.cutting.remedies import advise
 from warpflat.flattening.fit_report import STRAINS
 from warpflat.flattening.progress import Progress
+from warpflat.flattening.verdict import judge
 from warpflat.garment.garment import Garment
 from warpflat.scene.comparison import Comparison
 from warpflat.scene.drape import drape_scene
@@ -134,7 +135,7 @@ def comparison_table(comparison: Comparison) -> str:
             ("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]),
             *_strain_rows([m["wear"] for m in measures], "min", "max"),
             ("beyond limit [%]", [f"{100 * m['wear']['outside']:.1f}" for m in measures]),
-            ("fits", ["yes" if m["wear"]["fits"] else "no" for m in measures]),
+            ("held beyond it [%]", [f"{100 * m['wear']['held']:.1f}" for m in measures]),
             ("converged", ["yes" if m["converged"] else "NO" for m in measures]),
             *[(f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in distances)]) for point in distances[0]],
         ]
@@ -142,6 +143,7 @@ def comparison_table(comparison: Comparison) -> str:
     if comparison.drapes:
         # Gap, strain and pressure of each drape.
         found = [comparison.drapes[fabric].measures() for fabric in comparison.fabrics]
+        verdicts = [verdict for m in found if (verdict := judge({"pieces": {}, "drape": m}))]
 
         def millimetres(key: str, part: str) -> list[str]:
             return [f"{1e3 * m[key][part]:.1f}" for m in found]
@@ -161,7 +163,7 @@ def comparison_table(comparison: Comparison) -> str:
                     ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
                     ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
                     ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
-                    ("fits", ["yes" if m["fits"] else "no" for m in found]),
+                    ("fits", ["yes" if verdict.fits else "no" for verdict in verdicts]),
                     ("at rest", ["yes" if m["converged"] else "NO" for m in found]),
                 ],
             )

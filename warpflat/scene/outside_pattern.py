@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
 from warpflat.core.input_files import read_json
 from warpflat.core.text import format_count
 from warpflat.core.toml_file import Table, check_table, read_toml
+from warpflat.flattening.verdict import MAIN_GIRTHS
 from warpflat.mannequin.table import MannequinTable, mannequin_from_table
 from warpflat.scene.load import errors_named, expand_variables
 from warpflat.scene.run import SceneResult
@@ -69,6 +70,28 @@ class SewingTable(Table):
     drape: DrapeTable = Field(default_factory=DrapeTable)
 
 
+class RunGirth(BaseModel):
+    """A girth in the `metrics.json` of a run [m]."""
+
+    body_m: float
+    form_m: float
+    pattern_m: float
+    ease_wanted_m: float | None = None
+
+
+class RunBody(BaseModel):
+    """The body in the `metrics.json` of a run."""
+
+    table: dict[str, Any] | None = None
+
+
+class Run(BaseModel):
+    """What a drape reads in the `metrics.json` of a run."""
+
+    mannequin: RunBody = Field(default_factory=RunBody)
+    girths: dict[str, RunGirth] = Field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True)
 class OutsideJob:
     """A pattern from outside, read and ready to be draped.
@@ -80,6 +103,7 @@ class OutsideJob:
         sewing: how they are sewn and worn.
         body: what they are put on; None for the designed surface itself.
         lifts: by piece the way to its designed surface, for the folder of a run.
+        girths: by level, as it was drafted.
         sources: files that were read.
     """
 
@@ -89,6 +113,7 @@ class OutsideJob:
     sewing: SewingTable
     body: Mannequin | None
     lifts: dict[str, Lift]
+    girths: Mapping[str, RunGirth]
     sources: tuple[Path, ...]
 
     @classmethod
@@ -112,7 +137,8 @@ class OutsideJob:
         sources: list[Path] = []
         with listening_to_reads(sources.append):
             table = SewingTable() if sewing is None else check_table(SewingTable, read_toml(sewing), str(sewing))
-            pattern, lifts, run_body = _read(path, table, units)
+            pattern, lifts, run = _read(path, table, units)
+            run_body = run.mannequin.table
             with errors_named(str(sewing)):
                 # The pattern with the folds, quantities and seams of the sewing file, whose seams replace the
                 # pattern's.
@@ -143,8 +169,22 @@ class OutsideJob:
             mannequin, lifts = worn or (_body(body, table, run_body, path, designed=bool(lifts)), lifts)
         name = make_file_name((path if path.is_dir() else path.with_suffix("")).resolve().name)
         return cls(
-            path=path, name=name, pattern=pattern, sewing=table, body=mannequin, lifts=lifts, sources=tuple(sources)
-        )
+            path=path, name=name, pattern=pattern, sewing=table, body=mannequin, lifts=lifts,
+            girths=run.girths, sources=tuple(sources),
+        )  # fmt: skip
+
+    def girths_on_body(self) -> dict[str, dict[str, float]]:
+        """Return the garment's girths at the levels that it is judged by, against the body that it is put on."""
+        levels, found = {} if self.body is None else self.body.levels(), dict[str, dict[str, float]]()
+        for level, girth in self.girths.items():
+            drafted = girth.ease_wanted_m
+            if level in MAIN_GIRTHS and drafted is None:
+                drafted = girth.form_m - girth.body_m
+            if level in levels and drafted is not None:
+                body = levels[level].girth
+                ease = {"ease_m": girth.pattern_m - body, "ease_wanted_m": drafted}
+                found[level] = {"body_m": body, "form_m": girth.form_m, "pattern_m": girth.pattern_m, **ease}
+        return found
 
 
 def is_pattern_file(path: Path) -> bool:
@@ -175,8 +215,8 @@ def edge_table(
     return lines, tuple(pattern.notes)
 
 
-def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, dict[str, Lift], dict[str, Any] | None]:
-    """Return the pattern, the ways to its designed surface, and the run's table of its body."""
+def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, dict[str, Lift], Run]:
+    """Return the pattern, the ways to its designed surface, and what its run says of body and girths."""
     from warpflat.draping.lift import read_lift, surface_lift
     from warpflat.export.read_pattern import read_pattern
     from warpflat.surface.io.read import SUFFIXES
@@ -185,25 +225,22 @@ def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, d
         from warpflat.garment.as_cut import read_cut_pattern
 
         worn = read_cut_pattern(path, units=units, name=make_file_name(path.stem))
-        return worn.pattern, {name: surface_lift(*each) for name, each in worn.surfaces.items()}, None
+        return worn.pattern, {name: surface_lift(*each) for name, each in worn.surfaces.items()}, Run()
     if units is not None:
         raise InputError(f"--units: is for a mesh whose texture is its pattern; {path} says its own")
     allowance = None if table.allowance_mm is None else 1e-3 * table.allowance_mm
     folder = path if path.is_dir() else None
     pattern = read_pattern(path / "pattern.json" if folder else path, allowance=allowance)
     if folder is None:
-        return pattern, {}, None
+        return pattern, {}, Run()
     lifts = {
         piece.name: read_lift(folder / f"{piece.name}.obj")
         for piece in pattern.pieces[pattern.sample]
         if (folder / f"{piece.name}.obj").is_file()
     }
     if not (folder / "metrics.json").exists():
-        return pattern, lifts, None
-    metrics = read_json(folder / "metrics.json")
-    body = metrics.get("mannequin") if isinstance(metrics, dict) else None
-    found = body.get("table") if isinstance(body, dict) else None
-    return pattern, lifts, found if isinstance(found, dict) else None
+        return pattern, lifts, Run()
+    return pattern, lifts, check_table(Run, read_json(folder / "metrics.json"), str(folder / "metrics.json"))
 
 
 def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:
@@ -393,7 +430,7 @@ def drape_outside(
             files += written.files
             more = [*more, *written.notes, _correction_words(found)]
         files.append("metrics.json")
-        body = {} if job.body is None else {"mannequin": job.body.metrics()}
+        body = {} if job.body is None else {"mannequin": job.body.metrics(), "girths": job.girths_on_body()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": entry})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)
     return SceneResult(metrics=metrics, files=tuple(files), notes=(*pattern.notes, *notes, *more, *stale))
