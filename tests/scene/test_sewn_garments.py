@@ -40,6 +40,7 @@ SEWN: tuple[tuple[str, dict[str, str]], ...] = (
     ("sweatshirt", {"armhole": "raglan"}),
     ("shift_dress", {"hem": "ruffle", "collar": "flat"}),
     ("gored_skirt", {"hem": "slanted"}),
+    ("jacket", {"lining": "full"}),
 )
 
 
