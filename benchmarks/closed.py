@@ -95,7 +95,7 @@ def main() -> None:
         piece = warpflat.flatten(surface, device="cpu")
         seconds = time.process_time() - begun
         if chosen.picture:
-            piece.save(chosen.picture / name.replace(", ", "_").replace(" ", "_"), frames=False)
+            warpflat.save_piece(piece, chosen.picture / name.replace(", ", "_").replace(" ", "_"), frames=False)
         notes = [note for note in piece.notes if "nearly closed" in note]
         print(
             f"{name:26} {len(surface.vertices):7,} {piece.flipped_faces:5d} {np.isfinite(piece.positions).all()!s:>6} "

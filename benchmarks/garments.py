@@ -6,9 +6,9 @@ Default: $WARPFLAT_DATA/garments. A file in another unit than metres is given as
 that of a person in decimetres, centimetres or millimetres is scaled by itself.
 
 Columns: strain energy [J] and share beyond the limit [%] before (in one piece, `--seams none`, at most a minute), parted where every
-garment of its kind is, and with darts and further seams, the last two sewn; stretches at 5 and 95 % of the cloth; left and right seams
-apart; both sides of seams apart; seconds of the whole command with its exit code; distance of the sewn cloth from the mesh, draped over
-it (mean, 95 %).
+garment of its kind is, and with darts and further seams, the last two sewn; strains along warp and weft at 5 and 95 % of the cloth, shear
+at 95 %; left and right seams apart; both sides of seams apart; seconds of the whole command with its exit code; distance of the sewn cloth
+from the mesh, draped over it (mean, 95 %).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
+from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
@@ -111,22 +112,23 @@ def strain(garment: Garment) -> list[str]:
     return [f"{energy:.2f}", f"{100 * float((outside * area).sum() / area.sum()):.2f}"]
 
 
-def stretches(garment: Garment) -> str:
-    """Return the principal stretches, space over pattern, at 5 and 95 % of the cloth."""
-    values, weights = [], []
-    for piece in garment.pieces.values():
-        faces = piece.faces[:, :3]
-        p, q = piece.positions[faces], piece.network.surface.vertices[faces]
-        flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=2)
-        space = np.stack([q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]], axis=2)
-        gradient = space @ np.linalg.inv(flat)
-        values.append(np.sqrt(np.linalg.eigvalsh(gradient.transpose(0, 2, 1) @ gradient)).ravel())
-        weights.append(np.repeat(0.5 * np.abs(np.linalg.det(flat)), 2))
-    value, weight = np.concatenate(values), np.concatenate(weights)
-    order = np.argsort(value)
-    share = np.cumsum(weight[order]) / weight.sum()
-    low, high = (value[order][np.searchsorted(share, part)] for part in (0.05, 0.95))
-    return f"{low:.3f}-{high:.3f}"
+def strains(garment: Garment) -> list[str]:
+    """Return the strains along warp and along weft at 5 and 95 % of the cloth [%], and the shear at 95 % [degrees]."""
+    fits = [piece.fit for piece in garment.pieces.values()]
+    area = np.concatenate([fit.area for fit in fits])
+
+    def at(name: str, *shares: float) -> list[float]:
+        return weighted_percentiles(
+            np.concatenate([np.abs(getattr(fit, name)) if name == "shear" else getattr(fit, name) for fit in fits]),
+            area,
+            shares,
+        )
+
+    warp, weft = (
+        "{:+.1f} to {:+.1f}".format(*(100.0 * value for value in at(name, 0.05, 0.95)))
+        for name in ("strain_warp", "strain_weft")
+    )
+    return [warp, weft, f"{at('shear', 0.95)[0]:.1f}"]
 
 
 def left_and_right_apart(found: FoundSeams) -> float:
@@ -184,11 +186,12 @@ def measure(path: str, fabric: str, wanted: warpflat.SeamOptions, *, quick: bool
         found.what[:34],
         str(sum(len(layer.faces) for layer in layers)),
         str(len(found.pieces)),
+        str(sum(seam.name.startswith("dart") for seam in found.seams)),
         f"{length / np.sqrt(area):.1f}",
         *(["", ""] if quick else before(layers, fabric)),
         *strain(plain),
         *strain(garment),
-        stretches(garment),
+        *strains(garment),
         f"{max(map(left_and_right_apart, (parted, found))):.1f}",
         f"{max((1e3 * abs(seam.lengths[0] - seam.lengths[1]) for seam in garment.seams), default=0.0):.2f}",
         *(["", ""] if quick else [whole_command(layers, fabric), draped(garment, layers)]),
@@ -211,7 +214,7 @@ def main() -> None:
         if Path(str(file).partition(":")[0]).suffix.lower() in SUFFIXES and "avatar" not in str(file)
     ]
     heads = (
-        "garment|what|faces|pieces|seam/sqrt(A)|before J|%|parted J|%|with darts J|%|stretch|left-right mm|sides mm"
+        "garment|what|faces|pieces|darts|seam/sqrt(A)|before J|%|parted J|%|with darts J|%|warp %|weft %|shear deg|left-right mm|sides mm"
         "|command s (rc)|draped mm"
     )
     print(" | ".join(heads.split("|")), flush=True)

@@ -6,9 +6,11 @@
 
 With `--rounding` each case runs once for each seed, under the noise of `tests/rounding.py`; its name is followed by the seed.
 
-Cases: every scene and the batch, as commands; the meshes of WARPFLAT_DATA, flattened in an isotropic and in a woven cloth; its
-bodies, as mannequins; twelve scripts. Each is a process of its own on one thread. Columns: model energy before and after, its
-largest ratio, the ratio of strain energies, the distance of the outlines, the largest change of a length, files missing and new,
+Cases: every scene and the batch, as commands; three drapes; the meshes of WARPFLAT_DATA, flattened in an isotropic and in a woven
+cloth; eight of its garments and two of its plush toys with seams that are found; three garments fitted to another body; its bodies, as
+mannequins; twelve scripts. Each is a process of its own on one thread. Columns: model energy before and after, its
+largest ratio, the ratio of strain energies, the distance of the outlines, the largest change of a length, the distance of lines on
+paper, files missing and new,
 processor seconds before and after. The exit code is 1 where a word is in capitals, a fault:
 
 | word | meaning |
@@ -18,12 +20,14 @@ processor seconds before and after. The exit code is 1 where a word is in capita
 | FILES, PIECES, CODE | other files, pieces or lengths, another exit code |
 | COUNTS, REST | other vertices or faces, more flipped faces; no longer at rest |
 | NUMBER | a derivative differs by more than 1e-3 |
+| DRAWN, WORDS | a cutting line or a seam on paper is more than 0.2 mm elsewhere, while the layout is not; other labels or sewing steps |
 | lower, moved | a model energy is more than 1e-3 below the record; and an outline or a length differs by more than 0.2 mm |
 | message | the program refuses in other words |
 
-An outline is all borders of a flat piece, those of its cuts among them. The distance is the largest from a corner of either outline
-to the other one, after the rigid motion that fits best. Pieces that are sewn to each other are minimised together, and their energies
-count as a sum. The strain energy is not minimised: layouts that are equal within the solver's tolerance differ more in it.
+An outline is all borders of a flat piece, those of its cuts among them; or the cutting line and the seams of a drawn one. The distance
+is the largest from a corner of either outline to the other one, after the rigid motion that fits best. Pieces that are sewn to each
+other are minimised together, and their energies count as a sum. The strain energy is not minimised: layouts that are equal within the
+solver's tolerance differ more in it.
 """
 
 from __future__ import annotations
@@ -47,6 +51,8 @@ import shapely
 from scipy.optimize import least_squares
 
 import warpflat
+from warpflat.export.pattern_json import read_pattern_json
+from warpflat.pattern.sewing_order import sewing_steps
 
 ROUNDING = Path(__file__).parents[1] / "tests" / "rounding.py"
 sys.path.insert(0, str(ROUNDING.parent))
@@ -56,6 +62,14 @@ RECORD = Path(__file__).with_suffix(".json.gz")
 SCENES = Path(__file__).parents[1] / "scenes"
 DATA = os.environ.get("WARPFLAT_DATA")
 SLOW = ("Female_T_Shirt",)  # takes minutes as one piece
+DRAPED = ("basic_block", "tshirt", "trousers")
+FOUND = {
+    "garments/dress.obj": "woven", "garments/long_sleeve_shirt.obj": "woven", "garments/cardigan_scan.obj": "woven",
+    "garments/Women_Skirt.usd": "woven", "garments/leggings.ply": "interlock", "garments/female_casualsuit01.obj": "interlock",
+    "garments/female_sportsuit01.obj": "interlock", "garments/male_casualsuit04.obj": "woven",
+    "things/koala.obj": "woven", "things/penguin.obj": "woven",
+}  # fmt: skip
+FITTED = {"long_sleeve_shirt.obj": "EU 44", "leggings.ply": "EU 42", "dress.obj": "EU 36"}
 
 LARGEST_RISE = 1e-3  # of an energy or a derivative, over the record's
 FARTHEST = 0.2  # of outlines and lengths [mm]
@@ -63,6 +77,12 @@ NO_ENERGY = 1e-9  # added to both energies, for surfaces that are developable [J
 GRID = 0.01  # on which outlines are recorded, and how far a corner that is left out may be from the outline [mm]
 
 Record = dict[str, Any]
+
+
+def line_record(line: shapely.LineString) -> list[int]:
+    """Return the corners of a line [mm] that it needs, x, y, x, y ... in hundredths of a millimetre."""
+    simple = shapely.simplify(line, GRID, preserve_topology=False)
+    return np.rint(shapely.get_coordinates(simple) / GRID).astype(int).ravel().tolist()
 
 
 def piece_record(measures: Mapping[str, Any], points: np.ndarray, faces: Iterable[Iterable[int]]) -> Record:
@@ -77,10 +97,8 @@ def piece_record(measures: Mapping[str, Any], points: np.ndarray, faces: Iterabl
     sides = {side for face in corners for side in zip(face, [*face[1:], face[0]], strict=True)}
     border = np.array(sorted((a, b) for a, b in sides if (b, a) not in sides))
     merged = shapely.line_merge(shapely.multilinestrings(shapely.linestrings(1e3 * points[border])))
-    lines = shapely.get_parts(shapely.simplify(merged, GRID, preserve_topology=False))
     kept = ("model_energy_j", "strain_energy_j", "vertices", "faces", "flipped_faces", "converged")
-    outline = [np.rint(shapely.get_coordinates(line) / GRID).astype(int).ravel().tolist() for line in lines]
-    return {key: measures[key] for key in kept} | {"outline": outline}
+    return {key: measures[key] for key in kept} | {"outline": [line_record(line) for line in shapely.get_parts(merged)]}
 
 
 def pattern_record(
@@ -94,11 +112,13 @@ def pattern_record(
     made = {
         name: piece_record(each.layout_measures, each.positions, each.faces.tolist()) for name, each in pieces.items()
     }
-    return {"pieces": made, "together": together, "lengths": dict(lengths or {}), "numbers": dict(numbers or {})}
+    return {
+        "pieces": made, "together": together, "lengths": dict(lengths or {}), "numbers": dict(numbers or {}), "drawn": {}, "words": [],
+    }  # fmt: skip
 
 
 def folder_record(folder: Path) -> Record:
-    """Return the record of the run in a folder: its pieces, its seams, the levels of its mannequin."""
+    """Return the record of the run in a folder: its pieces, its seams, the levels of its mannequin, its drawing."""
     metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     pieces, lengths = {}, {}
     for name, measures in metrics.get("pieces", {}).items():
@@ -110,7 +130,22 @@ def folder_record(folder: Path) -> Record:
         lengths |= {f"{seam['name']}: {n}, {side}": seam["length_mm"][n] for n, side in enumerate(seam["sides"])}
     for level, values in metrics.get("mannequin", {}).get("levels", {}).items():
         lengths |= {f"{level} {key}": 1e3 * values[key] for key in ("height_m", "girth_m") if key in values}
-    return {"pieces": pieces, "together": "sewing" in metrics, "lengths": lengths, "numbers": {}}
+    drawn, words = {}, list[str]()
+    if (folder / "pattern.json").exists():
+        pattern = read_pattern_json(folder / "pattern.json")
+        for size, row in pattern.pieces.items():
+            words += [f"{size}: {step.words}" for step in sewing_steps(pattern, size)]
+            for piece in row:
+                title = f"{size} {piece.name}"
+                lines = [np.vstack([piece.cut_line, piece.cut_line[:1]]), *(edge.line for edge in piece.edges)]
+                drawn[title] = [line_record(shapely.LineString(1e3 * line)) for line in lines]
+                label = " ".join(text for text, _ in piece.label.lines)
+                words.append(f"{title}: {' '.join(label.split())}")
+                notches = {f"{title}: notch {n}, {notch.edge}": notch for n, notch in enumerate(piece.notches)}
+                lengths |= {name: 1e3 * notch.length for name, notch in notches.items()}
+    return {
+        "pieces": pieces, "together": "sewing" in metrics, "lengths": lengths, "numbers": {}, "drawn": drawn, "words": words,
+    }  # fmt: skip
 
 
 def command(arguments: Sequence[str], folder: Path, *, seed: int | None) -> Record:
@@ -142,15 +177,18 @@ def command(arguments: Sequence[str], folder: Path, *, seed: int | None) -> Reco
     return record
 
 
-def flatten_mesh(mesh: Path, fabric: str, folder: Path, *, seed: int | None) -> Record:
-    """Flatten all pieces of a mesh. The suits are in decimetres, which is no unit of the program."""
+def flatten_mesh(mesh: Path, fabric: str, folder: Path, *, which: str = "all", seed: int | None) -> Record:
+    """Flatten all pieces of a mesh, or its largest one with the seams that are found.
+
+    The suits are in decimetres, which is no unit of the program.
+    """
     if "suit" in mesh.name:
         rows = [line.split() for line in mesh.read_text(encoding="utf-8").splitlines()]
         rows = [["v", *(f"{float(x) / 10.0}" for x in row[1:4])] if row[:1] == ["v"] else row for row in rows]
         mesh = folder / mesh.name
         mesh.write_text("".join(f"{' '.join(row)}\n" for row in rows), encoding="utf-8")
     units = [] if mesh.suffix == ".usd" else ["--units", "m"]
-    how = ["--component", "all", "--fabric", fabric, "--frames", "0", "--no-picture"]
+    how = ["--component", which, "--fabric", fabric, "--frames", "0", "--no-picture"]
     return command(["flatten", str(mesh), *units, *how], folder, seed=seed)
 
 
@@ -307,6 +345,15 @@ def all_cases(seed: int | None) -> dict[str, Callable[[Path], Record]]:
         else:
             for fabric in ("isotropic", "woven"):
                 cases[f"mesh {mesh.stem} {fabric}"] = partial(flatten_mesh, mesh, fabric, seed=seed)
+    for name in DRAPED:
+        cases[f"drape {name}"] = partial(command, ["drape", str(SCENES / f"{name}.toml")], seed=seed)
+    if DATA:
+        for name, fabric in FOUND.items():
+            mesh = Path(DATA) / name
+            cases[f"found {mesh.stem}"] = partial(flatten_mesh, mesh, fabric, which="largest", seed=seed)
+        for name, size in FITTED.items():
+            mesh = Path(DATA) / "garments" / name
+            cases[f"fit {mesh.stem}"] = partial(command, ["fit", str(mesh), "--units", "m", "--to", size], seed=seed)
     return cases
 
 
@@ -354,16 +401,20 @@ def compare(before: Record, after: Record) -> Record:
         "FILES": bool(lost or new),
         "PIECES": before["runs"].keys() != after["runs"].keys(),
     }
-    ratios, outlines, lengths, energies, strains = [1.0], [0.0], [0.0], np.zeros(2), np.zeros(2)
+    kinds = ("pieces", "lengths", "numbers", "drawn")
+    ratios, outlines, lengths, on_paper, energies, strains = [1.0], [0.0], [0.0], [0.0], np.zeros(2), np.zeros(2)
     for run, then in before["runs"].items():
-        now = after["runs"].get(run, {"pieces": {}, "lengths": {}, "numbers": {}})
-        differs["PIECES"] |= any(then[key].keys() != now[key].keys() for key in ("pieces", "lengths", "numbers"))
+        now = after["runs"].get(run, {key: {} for key in kinds} | {"words": []})
+        differs["PIECES"] |= any(then[key].keys() != now[key].keys() for key in kinds)
         pairs = [(piece, now["pieces"][name]) for name, piece in then["pieces"].items() if name in now["pieces"]]
         model = np.array([[piece["model_energy_j"] for piece in pair] for pair in pairs]).reshape(-1, 2)
         energies += model.sum(axis=0)
         strains += np.array([[piece["strain_energy_j"] for piece in pair] for pair in pairs]).reshape(-1, 2).sum(axis=0)
         minimised = model.sum(axis=0, keepdims=True) if then["together"] else model
         ratios += ((minimised[:, 1] + NO_ENERGY) / (minimised[:, 0] + NO_ENERGY)).tolist()
+        drawn = [(lines, now["drawn"][name]) for name, lines in then["drawn"].items() if name in now["drawn"]]
+        on_paper += [outline_distance(*pair) for pair in drawn]
+        differs["WORDS"] = differs.get("WORDS", False) or then["words"] != now["words"]
         for old, piece in pairs:
             outlines.append(outline_distance(old["outline"], piece["outline"]))
             counts = any(old[key] != piece[key] for key in ("vertices", "faces"))
@@ -376,9 +427,10 @@ def compare(before: Record, after: Record) -> Record:
     far = {"OUTLINE": max(outlines) > FARTHEST, "LENGTH": max(lengths) > FARTHEST}
     differs |= {"HIGHER": max(ratios) > 1.0 + LARGEST_RISE, "lower": lower}
     differs |= {"moved": any(far.values())} if lower else far
+    differs["DRAWN"] = max(on_paper) > FARTHEST and not any(far.values())
     return {
         "energies": energies, "ratio": max(ratios, key=lambda ratio: abs(ratio - 1.0)), "outline": max(outlines), "length": max(lengths),
-        "strain": (strains[1] + NO_ENERGY) / (strains[0] + NO_ENERGY), "lost": lost, "new": new,
+        "strain": (strains[1] + NO_ENERGY) / (strains[0] + NO_ENERGY), "drawn": max(on_paper), "lost": lost, "new": new,
         "words": [word for word, is_so in differs.items() if is_so],
     }  # fmt: skip
 
@@ -414,9 +466,7 @@ def main() -> None:
     # The longest first, so that all processes end at about the same time.
     names.sort(key=lambda name: -golden[name]["seconds"] if name in golden else -np.inf)
     if not chosen.record:
-        columns = (
-            f"{'before J':>10} {'after J':>10} {'ratio':>8} {'strain':>8} {'outline mm':>10} {'length mm':>9} files"
-        )
+        columns = f"{'before J':>10} {'after J':>10} {'ratio':>8} {'strain':>8} {'outline mm':>10} {'length mm':>9} {'drawn mm':>8} files"
         print(f"{'case':36} {columns} {'s':>11}", flush=True)
     faults = 0
     with ThreadPoolExecutor(chosen.jobs) as pool:
@@ -439,7 +489,7 @@ def main() -> None:
             told += "".join(f"; {word}: {', '.join(row[word][:5])}" for word in ("lost", "new") if row[word])
             print(
                 f"{title:36} {row['energies'][0]:10.4g} {row['energies'][1]:10.4g} {row['ratio']:8.5f} {row['strain']:8.5f} "
-                f"{row['outline']:10.3f} {row['length']:9.3f} -{len(row['lost'])} +{len(row['new'])} "
+                f"{row['outline']:10.3f} {row['length']:9.3f} {row['drawn']:8.3f} -{len(row['lost'])} +{len(row['new'])} "
                 f"{golden[name]['seconds']:5.1f} {record['seconds']:5.1f}  {' '.join(row['words']) or 'equal'}  {told}",
                 flush=True,
             )

@@ -75,7 +75,7 @@ def measure(surface: Surface, chosen: argparse.Namespace) -> tuple[str, bool]:
     seconds = time.process_time() - begun
     if chosen.picture:
         chosen.picture.mkdir(parents=True, exist_ok=True)
-        piece.save(chosen.picture / surface.name, frames=False)
+        warpflat.save_piece(piece, chosen.picture / surface.name, frames=False)
     contact, before = piece.stages[-1], piece.stages[-2]
     if contact.name != CONTACT:
         before = contact

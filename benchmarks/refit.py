@@ -6,17 +6,23 @@ A form of warpflat is built on two bodies; the first is carried to the second on
 to both, and compared with the second. Columns: by how much the edges of its pieces grow from the one body to the other (median, most),
 by how much the carried ones miss that (median, 90 %, most) [mm], the difference of its area [%], and of its ease at bust, waist and hip
 from what it was [mm].
+
+With --patterns the flat pieces are compared, from the known pattern of the first body: median over their edges of what flattening the
+carried garment anew misses, of what the known edges miss that grow as those of the carried garment do, and of what the graded pattern
+misses [mm]; and how far the grain of flattening and of the graded pattern lies from that of the second body's pattern, at most [degrees].
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 
 import numpy as np
 
 import warpflat
 from warpflat.core.polyline import polyline_length
+from warpflat.flattening.graded import graded_layout
 from warpflat.garment.carry import carry
 from warpflat.garment.level_ease import level_ease, widened
 from warpflat.mannequin.common_body import common_body_of_mannequin, skin_triangles
@@ -66,12 +72,47 @@ def compare(form: str, first: str, second: str) -> str:
     )
 
 
+def compare_patterns(form: str, first: str, second: str) -> str:
+    """Return the line of a form's pattern that is graded from one size to another."""
+    bodies = [Mannequin.from_size(size) for size in (first, second)]
+    made = [body.form(form) for body in bodies]
+    patterns = [warpflat.flatten_form(body, each) for body, each in zip(bodies, made, strict=True)]
+    faces = np.concatenate([piece.grid_vertices[piece.surface.faces] for piece in made[0].pieces.values()])
+    used, number = np.unique(faces, return_inverse=True)
+    garment = warpflat.make_surface(made[0].vertices[used], number.reshape(-1, 4), name="garment", weld=False)
+    one, other = (common_body_of_mannequin(body, name=size) for body, size in zip(bodies, (first, second), strict=True))
+    carried = np.zeros_like(made[0].vertices)
+    carried[used] = carry(garment, one.vertices, other.in_pose_of(one).vertices, skin_triangles())
+    missed, turned = np.zeros((0, 3)), np.zeros((0, 2))
+    for name, piece in made[0].pieces.items():
+        known, wanted = (pattern.pieces[name].positions for pattern in patterns)
+        worn, now = made[0].vertices[piece.grid_vertices], carried[piece.grid_vertices]
+        graded = graded_layout(piece.surface, now, known)
+        anew = warpflat.flatten(replace(piece.surface, vertices=now)).positions
+        for row in piece.edges.values():
+            flat = [polyline_length(layout[row]) for layout in (known, wanted, anew, graded)]
+            grown = flat[0] * polyline_length(now[row]) / polyline_length(worn[row])
+            missed = np.vstack([missed, [1e3 * abs(each - flat[1]) for each in (flat[2], grown, flat[3])]])
+        turns = [(layout - layout.mean(axis=0)).T @ (wanted - wanted.mean(axis=0)) for layout in (anew, graded)]
+        angles = [np.degrees(np.arctan2(t[0, 1] - t[1, 0], t[0, 0] + t[1, 1])) for t in turns]
+        turned = np.vstack([turned, np.abs(angles)])
+    medians = " ".join(f"{value:7.2f}" for value in np.median(missed, axis=0))
+    return f"{form:14}{first + ' > ' + second:18}{medians}  " + " ".join(f"{v:6.2f}" for v in turned.max(axis=0))
+
+
 def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--form", nargs="+", default=FORMS)
     parser.add_argument("--pairs", nargs="+", default=PAIRS)
+    parser.add_argument("--patterns", action="store_true", help="compare the flat pieces")
     given = parser.parse_args()
+    if given.patterns:
+        print(f"{'form':14}{'bodies':18}{'anew':>7}{'grown':>8}{'graded':>8}{'grain anew':>12}{'graded':>8}")
+        for form in given.form:
+            for pair in given.pairs:
+                print(compare_patterns(form, *pair.split(",")), flush=True)
+        return 0
     print(f"{'form':14}{'bodies':18}{'edges grow':>14}  {'missed by: median 90 % most':>21}  area %  ease off")
     for form in given.form:
         for pair in given.pairs:

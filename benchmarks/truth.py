@@ -4,10 +4,10 @@
 
 A worn garment whose texture is its sewn pattern (Style3D, CLO, GarmentCode) says what its flat pieces should be. Each island is flattened
 and laid on its panel, turned, moved and perhaps mirrored, never scaled; the distances of all vertices are measured in millimetres. Rows:
-the whole garment as `warpflat flatten` leaves it ("sewn"), with `--hang` the same after the weight of the cloth below is
-taken off ("unhung"), each panel on its own by springs and by the membrane, and beside them libigl's ARAP and
-LSCM, where it is installed. Columns of a panel: mean, 95 % of its vertices, 95 % of those on its outline. The last
-lines are means over all panels, weighted by their areas; and without bands, which lie far off where they are not cut straight.
+the whole garment as `warpflat flatten` leaves it ("sewn"), with `--hang` the same after the weight of the cloth below is taken off
+("unhung"), each panel on its own ("alone"), and beside them libigl's ARAP and LSCM, where it is installed. Columns of a panel: mean, 95 %
+of its vertices, 95 % of those on its outline. The last lines are means over all panels, weighted by their areas; and without bands, which
+lie far off where they are not cut straight.
 """
 
 from __future__ import annotations
@@ -131,8 +131,7 @@ def layouts(
     found = {
         "sewn": sewn(alone),
         **({} if hang is None else {"unhung": sewn(flatten_all(unhung(panels, hang), fabric=fabric))}),
-        "springs": [piece.positions for piece in alone],
-        "membrane": [piece.positions for piece in flatten_all(surfaces, fabric=fabric, model="membrane")],
+        "alone": [piece.positions for piece in alone],
     }
     for panel in panels:
         for name, layout in peers(panel).items():

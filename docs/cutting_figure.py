@@ -13,6 +13,7 @@ import numpy as np
 
 import warpflat
 from warpflat.export.picture import PicturePiece, write_picture
+from warpflat.export.piece_files import picture_piece
 from warpflat.flattening.result import Flattening
 
 RESOLUTION = 65
@@ -29,7 +30,7 @@ def row(result: Flattening, title: str, uncut: Flattening) -> PicturePiece:
     for name, (now, then) in change.items():
         captions[name] = f"{1e3 * now:.0f} mJ" + (f" ({100 * (now / then - 1):.1f} %)" if result is not uncut else "")
     captions["length error"] = f"{100 * result.measures['length_error']:.2f} %"
-    return replace(result.picture_piece(), name=title, captions=captions)
+    return replace(picture_piece(result), name=title, captions=captions)
 
 
 def main(file: str) -> None:

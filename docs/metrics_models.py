@@ -44,7 +44,7 @@ class PieceWear(Entry):
 
     strain_limit: float
     shear_limit: float | None
-    """[degrees]; none of an isotropic sheet, which has no threads."""
+    """[degrees]; none of an isotropic sheet, which has no threads: its principal strains count."""
     outside: float
     """Share of the cloth beyond its limits: stretched, slack or sheared; a place counts once."""
     outside_unsewn: float | None = None

@@ -35,4 +35,4 @@ for fabric in ("denim", "interlock"):
         f"  at rest  {last.work_units:5.1f} units of work model energy {1e3 * last.model_energy_j:9.4f} mJ, residual {last.residual:.1e}"
     )
     print(f"  length error {100 * pattern.measures['length_error']:.2f} %, flips {pattern.flipped_faces}")
-    pattern.save(f"out/scripted/{fabric}")
+    warpflat.save_piece(pattern, f"out/scripted/{fabric}")

@@ -2,7 +2,7 @@
 
 >>> import warpflat
 >>> result = warpflat.flatten("bodice.obj", units="m", fabric="woven")
->>> result.save("out")
+>>> warpflat.save_piece(result, "out")
 
 Every name that a script needs is `warpflat.NAME`; it is loaded when it is first used.
 """
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from warpflat.draping.result import Drape
     from warpflat.draping.write import save_drape
     from warpflat.export.pattern_json import read_pattern_json
+    from warpflat.export.piece_files import plot, save_piece
     from warpflat.export.read_dxf import read_dxf
     from warpflat.export.read_pattern import read_pattern
     from warpflat.export.read_svg import read_svg
@@ -171,6 +172,7 @@ _HOME = {
     "move_dart": "cutting.dart_move",
     "open_tube": "cutting.open_tube",
     "pattern_of_garment": "garment.to_pattern",
+    "plot": "export.piece_files",
     "read_dxf": "export.read_dxf",
     "read_layers": "seams.layers",
     "read_pattern": "export.read_pattern",
@@ -183,6 +185,7 @@ _HOME = {
     "run_scene": "scene.run",
     "save_comparison": "scene.compare",
     "save_drape": "draping.write",
+    "save_piece": "export.piece_files",
     "separate": "cutting.separate_pieces",
     "sew": "garment.sewing",
     "sew_pieces": "garment.sew_pieces",
@@ -261,6 +264,7 @@ __all__ = [
     "move_dart",
     "open_tube",
     "pattern_of_garment",
+    "plot",
     "read_dxf",
     "read_layers",
     "read_pattern",
@@ -273,6 +277,7 @@ __all__ = [
     "run_scene",
     "save_comparison",
     "save_drape",
+    "save_piece",
     "separate",
     "sew",
     "sew_pieces",

@@ -35,6 +35,7 @@ from warpflat.scene.load import make_scene
 from warpflat.surface.io.read import METRES_PER_UNIT
 
 ROOT = Path(__file__).resolve().parents[2]
+SAVES = r"\.save(_piece)?\("
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 RESOLUTION_MM = 40.0
 # What completes a part of a scene: a form, a surface by formula, a file.
@@ -219,7 +220,7 @@ def test_commands_and_snippets_of_a_page_run(page: Path, folder: Path, capfd: py
             elif block.language == "python":
                 check_names(block.text)
                 # Those of the page on Python that write files have a test of their own.
-                if not block.is_only_parsed(block.text) and (page.stem != "python" or ".save(" not in block.text):
+                if not block.is_only_parsed(block.text) and (page.stem != "python" or not re.search(SAVES, block.text)):
                     for name, unit in re.findall(r'"(\w+\.obj)", units="(\w+)"', block.text):
                         make_inputs([name, "--units", unit], folder)
                     exec(compile(with_coarse_meshes(block.text), place, "exec"), names)
@@ -249,7 +250,7 @@ def check_toml(block: Block, folder: Path) -> None:
 
 def test_the_scripts_of_the_page_on_python_write_what_they_say(folder: Path) -> None:
     page = ROOT / "docs" / "python.md"
-    piece, garment = (block.text for block in blocks(page) if ".save(" in block.text)
+    piece, garment = (block.text for block in blocks(page) if re.search(SAVES, block.text))
     (of_piece,) = re.findall(r"`(warpflat\.surface_files\(.*?\))`", page.read_text(encoding="utf-8"))
     for script in (f"{piece}\n{of_piece}", garment):
         exec(with_coarse_meshes(script), {})

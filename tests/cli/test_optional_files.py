@@ -33,7 +33,7 @@ frames = 4
 # What is made to fail, by the file that goes missing: all that goes into a function, from the first line on.
 SURFACE = {
     "picture.png": "warpflat.export.picture.draw_figure",
-    "dome.wear.png": "warpflat.flattening.fit_picture.write_wear_picture",
+    "dome.wear.png": "warpflat.export.fit_picture.write_wear_picture",
     "frames.usdc": "warpflat.export.usd.FrameWriter.__enter__",
     "review.html": "warpflat.review.page._page",
     "the guide": "warpflat.export.pdf.guide_pages",
@@ -45,7 +45,7 @@ DRAPE = {
 }
 GARMENT = {
     "picture.png": "warpflat.export.picture_garment.GarmentViews.draw",
-    "wear.png": "warpflat.flattening.fit_picture._Sheet.of",
+    "wear.png": "warpflat.export.fit_picture._Sheet.of",
     "walked.png": "warpflat.export.picture_walked.write_figure",
     "frames.usdc": "warpflat.scene.frames.KeyFile.append",
     "review.html": "warpflat.review.page.pack_pictures",
@@ -162,7 +162,7 @@ def test_a_film_that_fails_anywhere_is_left_out(place: str, monkeypatch: pytest.
     [
         (
             ("cuts", "bodice.toml"),
-            "warpflat.cutting.ledger_picture.write_ledger_picture",
+            "warpflat.export.ledger_picture.write_ledger_picture",
             "ledger.png",
             ["ledger.json"],
         ),

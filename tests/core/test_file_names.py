@@ -104,7 +104,7 @@ def test_nothing_is_written_outside_the_folder_whoever_gave_the_name(tmp_path: P
     out = tmp_path / "out"
     dome = make_shape("dome", resolution=5)
     with pytest.raises(InputError, match="cannot name a file"):
-        warpflat.flatten(replace(dome, name="../evil"), device="cpu").save(out)
+        warpflat.save_piece(warpflat.flatten(replace(dome, name="../evil"), device="cpu"), out)
     tables = {"surface": {"shape": "dome", "resolution": 9}, "output": {"frames": 0, "picture": False}}
     run_scene(make_scene(tables, name="cap", folder=tmp_path, where="test"), out)
     drawn = json.loads((out / "pattern.json").read_text())

@@ -13,7 +13,7 @@ import warp
 before = warp.config.log_level
 import warpflat
 pattern = warpflat.flatten(warpflat.make_shape("dome", resolution=5))
-pattern._repr_png_()
+warpflat.plot(pattern)
 assert warp.config.log_level == before
 """
 

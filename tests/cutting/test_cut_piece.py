@@ -20,6 +20,7 @@ from warpflat.cutting.dart_move import move_dart
 from warpflat.cutting.ledger import AutoCut, cut_automatically, make_ledger
 from warpflat.cutting.refine_piece import refine_along
 from warpflat.cutting.separate_pieces import separate
+from warpflat.export.piece_files import save_piece
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
@@ -313,7 +314,7 @@ def test_a_cut_from_border_to_border_leaves_two_pieces_with_names(bodice: Flatte
     assert sum(len(part.faces) for part in parts) == len(bodice.faces)
     assert sum(stored(part) for part in parts) < stored(bodice)
     assert [part.datum_name for part in parts] == ["centre", "centre"]
-    assert parts[0].save(tmp_path, picture=False, frames=False)[0] == f"{parts[0].surface.name}.obj"
+    assert save_piece(parts[0], tmp_path, picture=False, frames=False)[0] == f"{parts[0].surface.name}.obj"
     text = (tmp_path / f"{parts[0].surface.name}.obj").read_text()
     assert text.count("\nv ") == len(bodice.surface.input_vertices)
     assert text.count("\nvt ") == len(parts[0].positions)
@@ -323,7 +324,7 @@ def test_a_cut_from_border_to_border_leaves_two_pieces_with_names(bodice: Flatte
 
 
 def test_a_doubled_vertex_is_doubled_in_the_pattern_only(bust_cut: Flattening, tmp_path: Path):
-    bust_cut.save(tmp_path, picture=False, frames=False)
+    save_piece(bust_cut, tmp_path, picture=False, frames=False)
     text = (tmp_path / "bodice.obj").read_text()
     assert text.count("\nv ") == N * N
     assert text.count("\nvt ") == len(bust_cut.positions) == N * N + sum(len(p) - 1 for p in paper_cuts()[0].paths)

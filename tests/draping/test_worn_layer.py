@@ -499,7 +499,7 @@ def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
         angle, height = points[:, 0] / radius - np.pi, points[:, 1] + neck - 0.4
         return np.column_stack([-radius * np.sin(angle), height, -radius * np.cos(angle)])
 
-    monkeypatch.setattr("warpflat.draping.drape_pattern.draw_together", kept)
+    monkeypatch.setattr("warpflat.draping.drape_pattern.sew_around", kept)
     for role in ("hood", "collar"):
         pattern = replace(pattern, pieces={"": [shell, replace(hood, role=role)]})
         worn, _ = drape_pattern(

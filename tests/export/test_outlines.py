@@ -202,6 +202,17 @@ def test_a_line_of_a_file_stays_as_it_is_drawn(tmp_path: Path) -> None:
     assert np.linalg.norm(cut - cut.min(axis=0) - (250, 400), axis=1).min() < 1e-3
 
 
+def test_a_block_that_is_drawn_within_another_one_alone_is_a_part_of_it(tmp_path: Path) -> None:
+    drawing = Drawing()
+    outer = drawing.block("front")
+    line(drawing.document.blocks.new("half"), HALF, "1", close=True)
+    outer.add_blockref("half", (0, 0), dxfattribs={"xscale": 2.0, "yscale": 2.0})
+    line(drawing.block("back"), HALF, "1", close=True)
+    found = drawing.read(tmp_path)
+    assert found.piece_names == ("front", "back")
+    assert sum(sides(found, "front")) == pytest.approx(2.0 * sum(sides(found, "back")))
+
+
 SHAPES = {
     "circle": ('<circle id="a" cx="200" cy="200" r="100"/>', [628.3]),
     "ellipse": ('<ellipse id="a" cx="200" cy="200" rx="100" ry="50"/>', [484.4]),
@@ -213,6 +224,12 @@ SHAPES = {
     "skew": ('<rect id="a" transform="skewX(45)" width="100" height="100"/>', [200 + 200 * np.sqrt(2)]),
     "used": ('<defs><path id="a" d="M0 0 H100 V50 H0 Z"/></defs><use xlink:href="#a" transform="rotate(30)" x="9"/>', [300.0]),
     "symbol": ('<symbol id="s"><path id="a" d="M0 0 H100 V50 H0 Z"/></symbol><use href="#s" x="9"/>', [300.0]),
+    "symbol in its size": (
+        '<symbol id="s" viewBox="5 0 10 5"><path id="a" d="M5 0 h10 v5 h-10 Z"/></symbol><use href="#s" width="100" height="50"/>', [300.0],
+    ),
+    "stretched": (
+        '<svg width="100" height="50" viewBox="0 0 5 5" preserveAspectRatio="none"><rect id="a" width="5" height="5"/></svg>', [300.0],
+    ),
     "nested": ('<svg width="100" height="50" viewBox="0 0 10 5"><rect id="a" width="10" height="5"/></svg>', [300.0]),
 }  # fmt: skip
 

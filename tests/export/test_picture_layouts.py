@@ -17,10 +17,9 @@ from export_meshes import grid, surface
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from warpflat.cutting import ledger_picture
 from warpflat.draping import correction_picture, picture
 from warpflat.draping.correct_pattern import Correction
-from warpflat.export import picture_walked
+from warpflat.export import fit_picture, ledger_picture, picture_walked
 from warpflat.export.figure import DPI, PAGE_WIDTH, keep_words_on_page, new_figure
 from warpflat.export.geometry import face_areas
 from warpflat.export.letters import all_letters
@@ -28,7 +27,6 @@ from warpflat.export.picture import PicturePiece, draw_figure
 from warpflat.export.picture_garment import Body
 from warpflat.fabric.library import find_fabric
 from warpflat.fabric.limits import Amount, Demand
-from warpflat.flattening import fit_picture
 from warpflat.model.fit import MAPS as MAPS_OF_FIT
 from warpflat.model.fit import Misfit, WornFit
 from warpflat.pattern.drafted import SeamReport

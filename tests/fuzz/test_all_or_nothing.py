@@ -20,6 +20,7 @@ from warpflat.cli.main import main
 from warpflat.core import output
 from warpflat.core.errors import InputError
 from warpflat.core.output import atomic_path, output_folder, prepare_folder, remove_file, write_json
+from warpflat.export.piece_files import save_piece
 from warpflat.export.usd import FrameWriter
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.mannequin.mannequin import Mannequin
@@ -77,7 +78,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, int]
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         Path("cap.toml").write_text(SCENE + CUT)
-        flatten(make_shape("dome", resolution=13)).save("mesh", picture=False, frames=False)
+        save_piece(flatten(make_shape("dome", resolution=13)), "mesh", picture=False, frames=False)
         Path("mesh/dome.obj").rename("mesh.obj")
         for name, command in COMMANDS.items():
             before = times(folder)
@@ -123,12 +124,12 @@ def test_a_fresh_folder_is_not_there_after_a_failure(tmp_path: Path, monkeypatch
 def test_saving_is_all_or_nothing(tmp_path: Path):
     result = flatten(make_shape("dome", resolution=9))
     with file_limit(20_000), pytest.raises(InputError, match="cannot write"):
-        result.save(tmp_path / "out")
+        save_piece(result, tmp_path / "out")
     assert not (tmp_path / "out").exists()
-    result.save(tmp_path / "out")
+    save_piece(result, tmp_path / "out")
     before = files(tmp_path)
     with file_limit(20_000), pytest.raises(InputError, match="cannot write"):
-        result.save(tmp_path / "out")
+        save_piece(result, tmp_path / "out")
     with file_limit(20_000), pytest.raises(InputError, match="cannot write"):
         write_mannequin(Mannequin.from_size("EU 38", resolution_mm=40), tmp_path / "out")
     assert files(tmp_path) == before

@@ -8,12 +8,16 @@ from __future__ import annotations
 import os
 import shutil
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command import Command, Ended
 
 from warpflat.core.file_kinds import FOREIGN
+from warpflat.surface.io.read import read_surface
 
 _DATA = os.environ.get("WARPFLAT_DATA")
 _FAULTS = Path(_DATA or "") / "faults"
@@ -170,8 +174,44 @@ def test_22_a_missing_part_is_named(row: Path, command: Command) -> None:
     assert "'back.usda', which is missing" in command("flatten", "garment.usda", "--component", "all", "-q").refusal
 
 
+def test_23_pieces_apart_are_drawn_with_their_guide(row: Path, command: Command) -> None:
+    ended = flattened(command, "m.obj", "--units", "m", "--component", "all")
+    assert (row / "out" / "pattern.pdf").is_file()
+    assert "Error" not in ended.err
+    assert "left out" not in ended.err
+
+
 def test_24_an_unknown_required_extension_is_refused(row: Path, command: Command) -> None:
     assert "requires the extension 'KHR_evil'" in command("flatten", "m.gltf").refusal
+
+
+def laid(file: Path) -> np.ndarray:
+    """Return the warp and weft of the cloth on the body over those in its pattern, #F by 2, of an OBJ of the package with its texture."""
+    surface = read_surface(file, units="m")
+    rows = [line.split() for line in file.read_text().splitlines()]
+    places = np.array([row[1:3] for row in rows if row[0] == "vt"], dtype=float)
+    corners = np.array([[word.split("/")[:2] for word in row[1:4]] for row in rows if row[0] == "f"], dtype=int) - 1
+    points = surface.input_vertices[corners[:, :, 0]]
+    worn, flat = (np.swapaxes(each[:, 1:] - each[:, :1], 1, 2) for each in (points, places[corners[:, :, 1]]))
+    return np.linalg.norm(worn @ np.linalg.inv(flat), axis=1)[:, ::-1]
+
+
+def test_25_the_only_fabric_of_a_file_is_meant(row: Path, command: Command) -> None:
+    """A tube of 2.5133 m around and 2 kPa: the hoop's 800 N/m stretch 500 kN/m by .16 %."""
+    ended = flattened(command, "tube.obj", "--units", "m", "--fabric-file", "pvc.toml", "--pressure", "2000")
+    assert ended.code == 0
+    assert np.abs(laid(row / "out" / "tube.obj") - [1.0, 1.0016]).max() < 2e-5
+
+
+def test_26_pressure_loads_a_ball_both_ways(row: Path, command: Command) -> None:
+    """A gore of a ball of .5 m radius, 500 Pa, 5 kN/m: 2.5 % both ways, and as much as its own curvature strains it."""
+    subprocess.run([sys.executable, "ballgore.py"], cwd=row, check=True)
+    ended = flattened(
+        command, "ballgore.obj", "--units", "m", "--fabric-file", "film.toml", "--fabric", "film", "--model", "membrane",
+        "--pressure", "500",
+    )  # fmt: skip
+    assert ended.code == 0
+    np.testing.assert_allclose(np.median(laid(row / "out" / "ballgore.obj"), axis=0), [1.025, 1.025], atol=4e-3)
 
 
 def test_27_what_misses_by_hundredths_of_a_millimetre_closes(row: Path, command: Command) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+from warpflat.export.piece_files import save_piece
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.surface.shapes import make_shape
 
@@ -68,7 +69,7 @@ def test_a_killed_run_leaves_no_half_result(tmp_path: Path):
     out = tmp_path / "out"
     (tmp_path / "cap.toml").write_text(SCENE)
     # Compiles what the commands need, too.
-    flatten(make_shape("dome", resolution=21)).save(tmp_path / "mesh", picture=False, frames=False)
+    save_piece(flatten(make_shape("dome", resolution=21)), tmp_path / "mesh", picture=False, frames=False)
     (tmp_path / "mesh" / "dome.obj").rename(tmp_path / "mesh.obj")
     seconds = {}
     for command in ("run", "export"):

@@ -11,6 +11,7 @@ import pytest
 from warpflat.cli.main import main
 from warpflat.core.errors import CannotWriteError, InputError
 from warpflat.core.output import remove_stale
+from warpflat.export.piece_files import save_piece
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.pattern_files import export_patterns
 from warpflat.scene.load import make_scene
@@ -135,7 +136,7 @@ def test_nothing_is_removed_by_a_run_that_fails(tmp_path: Path, monkeypatch: pyt
 
 def test_saving_a_result_by_hand_removes_nothing_and_forgets_nothing(tmp_path: Path):
     run(tmp_path, formats=("svg",))
-    flatten(make_shape("bodice", resolution=9)).save(tmp_path / "out", picture=False, frames=False)
+    save_piece(flatten(make_shape("bodice", resolution=9)), tmp_path / "out", picture=False, frames=False)
     assert {"cap.svg", "cap.obj", "bodice.obj"} < files(tmp_path)
     run(tmp_path)
     assert files(tmp_path) == {"cap.obj", "bodice.obj", "metrics.json"}
@@ -211,7 +212,7 @@ def test_metrics_of_another_program_are_not_replaced(
 def test_a_result_saved_by_hand_does_not_replace_the_metrics_of_another_program(tmp_path: Path):
     (tmp_path / "metrics.json").write_text('{"accuracy": 0.9}')
     with pytest.raises(InputError, match="is not of warpflat"):
-        flatten(make_shape("dome", resolution=5)).save(tmp_path)
+        save_piece(flatten(make_shape("dome", resolution=5)), tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
 
 

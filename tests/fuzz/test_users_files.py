@@ -19,6 +19,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.input_files import listening_to_reads
 from warpflat.core.toml_file import read_toml
 from warpflat.export.obj import write_obj
+from warpflat.export.piece_files import save_piece, write_pieces
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.mannequin.table import MannequinTable, mannequin_from_table
 from warpflat.scene.load import make_scene
@@ -241,7 +242,7 @@ def a_scene_file_and_a_fabric_file() -> Commands:
 
 
 def frames_and_the_layers_they_refer_to() -> Commands:
-    flatten(make_shape("dome", resolution=5)).save(".", picture=False)
+    save_piece(flatten(make_shape("dome", resolution=5)), ".", picture=False)
     Path("scene.usda").write_text("#usda 1.0\n(\n metersPerUnit = 1\n subLayers = [@./frames.usdc@]\n)\n")
     options = ("--prim", "/World/dome/dome_surface", "--out", ".", "--name", "other")
     return [("flatten", "frames.usdc", *options), ("flatten", "scene.usda", *options)]
@@ -310,8 +311,8 @@ def test_a_result_is_not_saved_over_its_mesh(tmp_path: Path, monkeypatch: pytest
     Path("front.obj").write_text(SQUARE)
     result = flatten("front.obj", units="m")
     for save in (
-        lambda: result.save(tmp_path, picture=False, frames=False),
-        lambda: result.write_obj(tmp_path),
+        lambda: save_piece(result, tmp_path, picture=False, frames=False),
+        lambda: write_pieces([result], tmp_path, picture=False, frames=False),
         lambda: write_obj(tmp_path / "front.obj", result.surface, result.positions),
     ):
         with pytest.raises(InputError, match="is read by this run"):
@@ -319,15 +320,15 @@ def test_a_result_is_not_saved_over_its_mesh(tmp_path: Path, monkeypatch: pytest
     assert {path.name for path in tmp_path.iterdir()} == {"front.obj", "cap.toml", "b.toml", "mesh.obj"}
     assert (tmp_path / "front.obj").read_text() == SQUARE
     # What was saved may be saved again, from another folder too, and a mesh that only happens to have been read may be replaced.
-    result.save("there", picture=False, frames=False)
+    save_piece(result, "there", picture=False, frames=False)
     read_surface("there/front.obj", units="m")
     monkeypatch.chdir("there")
     with pytest.raises(InputError, match="is read by this run"):
-        result.save("..", picture=False, frames=False)
-    result.save(".", picture=False, frames=False)
+        save_piece(result, "..", picture=False, frames=False)
+    save_piece(result, ".", picture=False, frames=False)
     again = flatten(read_surface("front.obj", units="m"))
     with pytest.raises(InputError, match="is read by this run"):
-        again.save(".", picture=False, frames=False)
+        save_piece(again, ".", picture=False, frames=False)
     assert (tmp_path / "front.obj").read_text() == SQUARE
 
 

@@ -17,6 +17,7 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment import to_pattern
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.sew_pieces import meeting_borders, sew_pieces
+from warpflat.garment.sewing import SewingNetwork
 from warpflat.garment.to_pattern import LACKING, pattern_of_garment
 from warpflat.pattern.pieces import Pattern
 from warpflat.pattern.whole_pieces import whole_pieces
@@ -249,3 +250,17 @@ def test_a_seam_of_a_single_edge_is_sewn():
     )
     assert _sewn_length(pattern) == pytest.approx(0.1)
     assert not any(note.startswith(LACKING) for note in notes)
+
+
+def test_pieces_that_their_seams_drive_apart_are_kept_as_they_lie_on_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Two halves of a barrel whose sewing ends many times as large as they are, as that of a closed thing may."""
+    measured = SewingNetwork.blown_up
+    monkeypatch.setattr(SewingNetwork, "blown_up", lambda network, layout: measured(network, 50.0 * layout))
+    _write_obj(tmp_path / "barrel.obj", _barrel())
+    data = {"surface": {"file": str(tmp_path / "barrel.obj"), "units": "m", "component": "all"}, **QUIET}
+    result = run_scene(make_scene(data, name="barrel", folder=tmp_path, where="barrel.toml"), tmp_path / "out")
+    assert any("the pieces are not sewn" in note and "front, back" in note for note in result.metrics["notes"])
+    assert all(piece["stages"][-1]["name"] != "sew" for piece in result.metrics["pieces"].values())
+    assert len(read_pattern_json(tmp_path / "out" / "pattern.json").pieces[""]) == 2

@@ -13,8 +13,8 @@ from devices import DEVICE
 
 import warpflat
 from warpflat.core.errors import InputError
+from warpflat.export.fit_picture import write_wear_sheet
 from warpflat.fabric.library import find_fabric
-from warpflat.flattening.fit_picture import write_wear_sheet
 from warpflat.flattening.fit_report import fit_lines, garment_wear
 from warpflat.flattening.verdict import judge
 from warpflat.model.fit import MAPS, assess_pattern
@@ -165,15 +165,16 @@ def test_a_place_beyond_both_limits_counts_once():
     assert both.misfits[0].words.startswith("stretched 6.0 % along w")
 
 
-def test_an_isotropic_sheet_has_no_threads_that_lock():
-    """Sheared along its grain it keeps its lengths there; the same cell along its diagonals is stretched and pressed."""
+@pytest.mark.parametrize("turn", [0.0, 45.0])
+def test_an_isotropic_sheet_has_no_threads_and_is_judged_by_its_principal_strains(turn: float):
+    """The same strain along the grain and across it: sheared by g, a diagonal is sqrt(1 + sin g) - 1 longer."""
     sheet = find_fabric("isotropic")
-    sheared_sheet = sheared(30.0, triangles=False)
-    along = assess_pattern(sheared_sheet, sheet, SQUARE)
-    assert along.fits
-    assert along.shear_limit is None
-    assert along.shear[0] == pytest.approx(30.0)
-    assert assess_pattern(sheared_sheet, sheet, SQUARE, grain_angle=45.0).outside == pytest.approx(1.0)
+    for share in (0.9, 1.1):
+        shear = math.degrees(math.asin(1.0 - (1.0 - share * sheet.strain_limit) ** 2))
+        fit = assess_pattern(sheared(shear, triangles=False), sheet, SQUARE, grain_angle=turn)
+        assert fit.outside == pytest.approx(float(share > 1.0))
+        assert fit.shear_limit is None
+    assert fit.misfits[0].words.startswith("slack 5.5 % (limit 5 %), ")
 
 
 @pytest.mark.parametrize(
@@ -308,7 +309,7 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
         drawn.append(figure)
         path.touch()
 
-    monkeypatch.setattr("warpflat.flattening.fit_picture.write_figure", keep)
+    monkeypatch.setattr("warpflat.export.fit_picture.write_figure", keep)
     write_wear_sheet(tmp_path / "wear.png", results, title="sleeves")
     assert (tmp_path / "wear.png").exists()
     figure = drawn[0]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import warpflat
 from warpflat.core.errors import InputError
+from warpflat.export.piece_files import save_piece
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import find_fabric
 from warpflat.model.network import SpringNetwork
@@ -204,7 +205,7 @@ def test_faces_that_open_are_told_of_with_their_place(tmp_path: Path):
     assert "make a dart or a seam, or take a fabric that shears less" in note
     assert (
         note
-        in json.loads((tmp_path / piece.save(tmp_path, picture=False, frames=False)[-1]).read_text())["pieces"][
+        in json.loads((tmp_path / save_piece(piece, tmp_path, picture=False, frames=False)[-1]).read_text())["pieces"][
             "piece"
         ]["notes"]
     )

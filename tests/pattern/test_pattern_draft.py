@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import shapely
@@ -12,10 +14,13 @@ from matplotlib.textpath import TextPath
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
+from warpflat.core.output import LeftOut, listening_to_left_out
 from warpflat.core.polyline import arc_lengths, turning_angles
+from warpflat.pattern import draft
 from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece, nest_label
 from warpflat.pattern.drawing import OnPaper, draw_nest, draw_piece
+from warpflat.pattern.fitting import uncrossed
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
@@ -586,3 +591,51 @@ def test_a_nest_on_paper_has_one_fold():
         if stroke.role == "fold" and not stroke.hidden
     ]
     assert seen == ["38"]
+
+
+def test_a_piece_that_cannot_be_drawn_costs_itself_and_its_seams(monkeypatch: pytest.MonkeyPatch):
+    """Of three squares sewn in a row, the middle one's label finds no place in a polygon that GEOS refuses."""
+
+    def placed(piece: Piece, *rest: object) -> object:
+        if piece.name == "middle":
+            raise shapely.errors.GEOSException(
+                "TopologyException: side location conflict at 0 0. This can occur if invalid."
+            )
+        return label(piece, *rest)
+
+    label = draft.place_label
+    monkeypatch.setattr(draft, "place_label", placed)
+    names = ["left", "middle", "right", "other"]
+    seams = [
+        Seam(
+            name=f"{a} to {b}",
+            sides=((SeamSide(piece=a, edge="right"),), (SeamSide(piece=b, edge="left", reversed=True),)),
+        )
+        for a, b in pairwise(names)
+    ]
+    heard: list[LeftOut] = []
+    with listening_to_left_out(heard.append):
+        drafted = draft_garment(Pattern(name="row", pieces={"": [square(name) for name in names]}, seams=seams))
+    assert drafted.piece_names == ("left", "right", "other")
+    assert [seam.name for seam in drafted.garment.seams] == ["right to other"]
+    (note,) = (each.note for each in heard)
+    assert note.startswith("middle was left out of the pattern: its lines lie over each other as they are drawn")
+    assert "This can" not in note
+    with pytest.raises(InputError, match="none of the pieces"):
+        drafted.garment.without(["left", "right", "other"])
+
+
+def test_edges_that_cross_once_they_are_drawn_keep_to_their_layout():
+    """Both long sides of a sliver, whose curves bulge across each other: each is drawn as its chords."""
+    x = np.linspace(0.0, 0.2, 21)
+    low, high = (np.column_stack([x, level * np.sin(np.pi * x / 0.2)]) for level in (0.01, 0.0102))
+    edges = [Edge(name="low", points=low), Edge(name="high", points=high[::-1])]
+    piece = Piece(name="sliver", edges=edges)
+    lines = {("sliver", edge.name): edge.points for edge in edges}
+    curves = {key: fit_curve(line) for key, line in lines.items()}
+    assert uncrossed([piece], lines, curves) == curves
+    wavy = np.column_stack([x, low[:, 1] + 0.002 * np.sin(np.pi * x / 0.1)])
+    swollen = curves | {("sliver", "low"): fit_curve(wavy)}
+    clean = uncrossed([piece], lines, swollen)
+    for key, line in lines.items():
+        np.testing.assert_array_equal(clean[key].sample(), line)

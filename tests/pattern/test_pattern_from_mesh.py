@@ -252,3 +252,23 @@ def test_a_hole_that_lies_on_itself_is_not_cut_and_drawn_dashed():
     assert heard[0].note.startswith("hole_1 of kite is not cut, and drawn dashed: ")
     strokes = draw_piece(draft_piece(piece)).strokes
     assert [stroke.name for stroke in strokes if stroke.role == "left_out"] == ["hole_1 left out"]
+
+
+def test_a_hole_that_meets_the_border_at_a_point_opens_there():
+    """Two squares without cloth, one on the border and one beside it, which meet at a vertex."""
+    faces, flat, _, index = grid()
+    missing = [
+        np.isin(faces, index[row : row + 2, column : column + 2]).all(axis=1) for row, column in ((0, 4), (1, 5))
+    ]
+    faces, double = faces[~np.any(missing, axis=0)].copy(), len(flat)
+    # Its cloth on either side has a vertex of its own.
+    at = index[1, 5]
+    right = (faces == at) & (faces == index[0, 5]).any(axis=1, keepdims=True)
+    faces[right] = double
+    piece = make_piece(faces, np.vstack([flat, flat[at]]), name="clipped")
+    outline = shapely.Polygon(piece.outline)
+    cell = 0.02 * 0.025
+    assert outline.is_valid
+    assert not piece.holes
+    assert outline.area == pytest.approx(0.06 - 2 * cell, abs=1e-6)
+    assert shapely.Polygon(draft_piece(piece).cut_line).is_valid

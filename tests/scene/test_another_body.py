@@ -16,16 +16,17 @@ from command import Command
 from warpflat.core.errors import InputError
 from warpflat.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.mannequin.fit_body import Mesh
-from warpflat.scene.fit import FitJob, Fitted, ease_wishes, require_own_study, study_table
+from warpflat.scene.fit import FitJob, Fitted, ease_wishes, fit_to, require_own_study, study_table
 from warpflat.seams.layers import read_garment
 from warpflat.surface.io.file_seams import file_seams
+from warpflat.surface.io.sewn_panels import read_sewn_panels
 
 BARE = ("--frames", "0", "--no-picture", "--quiet")
 ON = ("--from", "EU 36")
 
 
-def _skirt(path: Path, *, texture: bool = True, shift: float = 0.0, unit: float = 1.0) -> None:
-    """Write a skirt on the body of EU 36, with a panel in front and one behind as its texture."""
+def _skirt(path: Path, *, texture: bool = True, shift: float = 0.0, unit: float = 1.0, measured: float = 1.0) -> None:
+    """Write a skirt on the body of EU 36, with a panel in front and one behind as its texture, in so many units per metre."""
     hips = body_of_size(20.0, "EU 36")
     turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     rings = [hips.line(level)[:-1] for level in ("hip", "waist")]
@@ -40,8 +41,9 @@ def _skirt(path: Path, *, texture: bool = True, shift: float = 0.0, unit: float 
         x, z = centre[0] + wide[0] * np.sin(turn), centre[2] + wide[2] * np.cos(turn)
         lines += [f"v {(a + shift) / unit:.6f} {height / unit:.6f} {b / unit:.6f}" for a, b in zip(x, z, strict=True)]
     if texture:
-        lines += [f"vt {0.02 * k:.4f} {height:.4f}" for height in heights for k in range(21)]
-        lines += [f"vt {0.6 + 0.02 * k:.4f} {height:.4f}" for height in heights for k in range(21)]
+        for first in (0.0, 0.6):
+            places = [(measured * (first + 0.024 * k), measured * height) for height in heights for k in range(21)]
+            lines += [f"vt {x:.4f} {y:.4f}" for x, y in places]
     for row in range(21):
         for k in range(40):
             corners = [40 * row + k, 40 * row + (k + 1) % 40, 40 * row + 40 + (k + 1) % 40, 40 * row + 40 + k]
@@ -84,6 +86,31 @@ def test_a_skirt_is_fitted_to_another_size(command: Command):
     # A second time it replaces what it has written.
     again = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *BARE)
     assert (again.code, again.err) == (0, "")
+
+
+def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):
+    """Panels that are measured in millimetres, as of Style3D: 480 mm wide each, as much wider as the skirt is."""
+    _skirt(tmp_path / "skirt.obj", measured=1e3)
+    job = FitJob.start(tmp_path / "skirt.obj", units="m", body="EU 36")
+    assert job.keeps_pattern({})
+    assert not job.keeps_pattern({"find_seams": {"find": "auto"}})
+    result = fit_to(
+        job, job.to("EU 42", {}), {"output": {"frames": 0, "picture": False}}, tmp_path / "out", name="skirt"
+    )
+    files = (tmp_path / "skirt.obj", tmp_path / "out" / "skirt.fitted.obj")
+    before, after = (read_sewn_panels(file, units="m") for file in files)
+    for was, now in zip(before, after, strict=True):
+        # Up and down the middle of the panel it runs as it did; rings are as much longer as they are in space.
+        middle = np.flatnonzero(np.abs(was.cut[:, 0] - was.cut[:, 0].mean()) < 0.005)
+        way = now.cut[middle[np.argmax(now.cut[middle, 1])]] - now.cut[middle[np.argmin(now.cut[middle, 1])]]
+        assert abs(np.degrees(np.arctan2(way[0], way[1]))) < 1.0
+        grown = now.worn_area / was.worn_area
+        assert grown > 1.04
+        assert now.area / was.area == pytest.approx(grown, rel=0.003)
+    assert len(result.metrics["pieces"]) == 2
+    assert result.metrics["pattern_of_file"]["area_ratio"] == pytest.approx(0.8, abs=0.1)
+    _skirt(tmp_path / "painted.obj")
+    assert not FitJob.start(tmp_path / "painted.obj", units="m", body="EU 36").panels
 
 
 def test_several_bodies_are_a_study_with_asked_ease(command: Command):

@@ -113,7 +113,9 @@ def test_darts_are_made_until_the_cloth_keeps_its_limit():
         garment = plan_garment(shaped).flatten()
         assert {(dart.piece, dart.asked.name) for dart in garment.form.darts} == {("front", dart) for dart in darts}
         assert "front.shoulder dart along princess front left releases" in notes[0]
-        assert garment.pieces["front"].fit.fits
+        # An isotropic sheet does not shear more easily than it stretches; a book has no dart for what is left of it.
+        fit = garment.pieces["front"].fit
+        assert fit.outside < (0.01 if fabric == "woven" else 0.1 * bare.outside)
 
 
 def test_auto_cut_leaves_pieces_that_have_enough():

@@ -56,7 +56,7 @@ def test_scenes_are_valid_by_the_published_schema() -> None:
 
 def test_metrics_of_a_run_are_as_published(reference: ModuleType, tmp_path: Path) -> None:
     surface = warpflat.make_shape("dome", resolution=9)
-    warpflat.flatten(surface, datum="centre", fabric="woven").save(tmp_path, picture=False)
+    warpflat.save_piece(warpflat.flatten(surface, datum="centre", fabric="woven"), tmp_path, picture=False)
     assert reference.check_metrics(tmp_path / "metrics.json") == []
     schema = json.loads((ROOT / "schemas" / "metrics.schema.json").read_text(encoding="utf-8"))
     metrics = json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8"))

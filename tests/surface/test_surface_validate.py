@@ -500,3 +500,14 @@ def test_crossed_quads_are_those_that_a_look_at_every_quad_finds(spread: float):
     expected = quads[_quad_corners(vertices[faces[quads]], 1e-3)[3]]
     assert len(expected) or spread < 0.1
     np.testing.assert_array_equal(find_crossed_quads(vertices, faces), expected)
+
+
+def test_components_count_by_area():
+    """A panel of one quad, and a button of twelve small triangles, which the file has first."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    button = np.vstack([[0.0, 0.0, 0.0], 0.01 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])])
+    panel = [[1.0, 0.0, 0.0], [1.4, 0.0, 0.0], [1.4, 0.6, 0.0], [1.0, 0.6, 0.0]]
+    fan = [[0, 1 + k, 1 + (k + 1) % 12, -1] for k in range(12)]
+    vertices, faces = np.vstack([button, panel]), [*fan, [13, 14, 15, 16]]
+    for component, count in (("largest", 1), (0, 1), (1, 12)):
+        assert len(make_surface(vertices, faces, component=component).faces) == count

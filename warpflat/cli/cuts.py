@@ -98,7 +98,7 @@ def cuts(
     from warpflat.cli.tables import ledger_table
     from warpflat.core.output import optional_file, output_folder, write_report
     from warpflat.core.toml_file import tables_as_toml
-    from warpflat.cutting.ledger_picture import write_ledger_picture
+    from warpflat.export.ledger_picture import write_ledger_picture
     from warpflat.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.scene.run import files_of_run, run_scene
 

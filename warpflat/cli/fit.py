@@ -16,6 +16,7 @@ from warpflat.core.text import plain_letters, quote_value
 
 __all__ = ["fit"]
 
+_ANEW = "--seams auto finds new seams, --seams uv flattens its pieces anew"
 _FILES = """\b
   NAME.fitted.obj  the garment on the other body [m], with the islands, groups and materials of its file
   NAME.body.obj    that body, standing as the first one does [m]
@@ -92,8 +93,9 @@ def fit(
 ) -> int:
     """Carry a garment from its body to another one, keep its ease, and flatten it.
 
-    Each point of the cloth goes with the skin under it and keeps its distance, so the style stays. Then seams are found, pieces are
-    flattened and the pattern is drafted, as by warpflat flatten.
+    Each point of the cloth goes with the skin under it and keeps its distance, so the style stays. A garment whose texture is its sewn
+    pattern keeps that pattern and its grain, graded by the growth of the cloth. Of others seams are found, pieces are flattened and the
+    pattern is drafted, as by warpflat flatten.
 
     \b
     Examples:
@@ -152,7 +154,12 @@ def fit(
         to = folder if len(bodies) == 1 else folder / make_file_name(one.body).replace(" ", "_")
         with ProgressBar(name, hidden=not shown) as bar:
             result = fit_to(job, one, tables, to, name=name, device=device, on_progress=bar)
-        told = [*(job.notes if shown and one is carried[0] else ()), *one.notes]
+        kept = (
+            [f"its own pattern is kept, and graded by the growth of the cloth; {_ANEW}"]
+            if job.keeps_pattern(tables)
+            else []
+        )
+        told = [*([*job.notes, *kept] if shown and one is carried[0] else ()), *one.notes]
         for note in told:
             click.echo(f"warpflat: note: {note}", err=True)
         if len(bodies) > 1 and shown:

@@ -25,7 +25,7 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
 @click.option(
     "--component",
     metavar="WHICH",
-    help="Which connected part: largest, or 0, 1, ... by size; all makes a piece of each, and seams of edges that meet.",
+    help="Which connected part: largest, or 0, 1, ... by area; all makes a piece of each, and seams of edges that meet.",
 )
 @click.option(
     "--seams",

@@ -255,7 +255,7 @@ def _more(of: Mapping[str, float], name: str) -> str:
 
 def ledger_table(ledger: Ledger) -> str:
     """Return the cuts of a ledger as text, best first, with the numbers that `--apply` takes."""
-    from warpflat.cutting.ledger_picture import candidate_words
+    from warpflat.export.ledger_picture import candidate_words
 
     head = (
         "", "cut", "per cm", "released", "left", "length", "opening", "angle", "length error", "area error", "beyond the limit",

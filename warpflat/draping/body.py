@@ -43,6 +43,12 @@ class Body:
             indices=wp.array(self.triangles.ravel(), dtype=wp.int32, device=device),
         )
 
+    def move(self, vertices: FloatArray) -> None:
+        """Move the surface that is searched to #V by 3 places [m]; `vertices` stay what they were."""
+        self.mesh.points.assign(vertices.astype(np.float32))
+        self.mesh.refit()
+        self.normals.assign(vertex_normals(vertices, self.triangles).astype(np.float32))
+
     def nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the nearest place of the surface (#P by 3 [m]) and its interpolated unit normal there, for #P by 3 points [m]."""
         given = wp.array(points, dtype=wp.vec3d, device=self.device)

@@ -249,7 +249,8 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
     difference = edge_lengths(drape.cloth.flat, seams[:, 0]) - edge_lengths(drape.cloth.flat, seams[:, 1])
 
     def told(worn: Drape, share: float) -> Round:
-        stretched = float(worn.face_areas[worn.demand.stretched].sum() / worn.face_areas.sum())
+        strained = worn.demand.held_by_way[:, :2].any(axis=1)
+        stretched = float(worn.face_areas[strained].sum() / worn.face_areas.sum())
         return replace(_round(worn, share, True), strained=stretched)
 
     before, history, reason = drape, [told(drape, 0.0)], f"{rounds} rounds"

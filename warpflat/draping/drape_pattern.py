@@ -14,21 +14,25 @@ from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError
 from warpflat.core.short_repr import short_repr
 from warpflat.draping.body import Body
+from warpflat.draping.check_sewn import check_sewn
 from warpflat.draping.drape_garment import held_vertices, hip_level, thread_elastics
-from warpflat.draping.lift import Lift, whole_lifts
-from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
+from warpflat.draping.lift import Lift, surface_lift, whole_lifts
+from warpflat.draping.limbs import around_legs, inside_arms, limb_lines, on_arm
+from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces, sewn_places, welded_vertices
+from warpflat.draping.openings import find_openings, limbs_of
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
+from warpflat.draping.sew_around import sew_around
 from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.draping.wrap_pieces import UNITS, continue_pieces, draw_together, hood_beside_head, wrap_pieces
+from warpflat.draping.wrap_pieces import UNITS, continue_pieces, find_sleeves, hood_beside_head, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.head import head_of
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.pattern.pieces import Pattern, Piece
+from warpflat.pattern.pieces import Pattern, Piece, Seam
 from warpflat.pattern.whole_pieces import MIRRORED, whole_pieces
-from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mirror import mirror_plane
 
 __all__ = ["Placement", "drape_pattern", "place_pieces"]
@@ -39,6 +43,8 @@ _SIZES = (0.05, 10.0)
 _WITHIN, _DEEP = 0.05, 0.01
 # Nor where its top, from this share of its vertices on, lies so far [m] off, or less than this share of it looks as the skin does.
 _TOP, _OFF, _ALIKE = 0.9, 0.05, 0.75
+# Pieces are sewn on a mesh of this spacing at least [m]. Cloth that starts so far above the neck's base [m] is worn around a head.
+_COARSE, _OVER_NECK = 0.02, 0.1
 # The halves of a hood start this far beside the head [m].
 _BESIDE_HEAD = 0.01
 
@@ -120,13 +126,8 @@ def drape_pattern(
     start_warp()
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
-    surface = None if body is None else body.surface()
-    solid = None if surface is None else Body(surface.vertices, surface.faces, device=where)
     hood = {name for name, piece in pieces.items() if piece.role == "hood"}
-    head = head_of(body) if body is not None and hood else None
-    if surface is not None and head is not None:
-        faces = np.column_stack([head[1] + len(surface.vertices), np.full(len(head[1]), -1)])
-        solid = Body(np.concatenate([surface.vertices, head[0]]), np.concatenate([surface.faces, faces]), device=where)
+    solid = None if body is None else _worn_body(body, head=bool(hood), device=where)
     # On another body than that of its designed surface a garment starts as one that has none, if it can.
     placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
     lifted = len(placed) == len(meshes) or bool(placed and body is not None)
@@ -137,64 +138,24 @@ def drape_pattern(
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
     if body is not None and (not lifted or elsewhere):
         try:
-            placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
+            solid, lifts = _sew(pieces, seams, body, placement, fabric, turned, where)
         except InputError:
             if not lifted:
                 raise
         else:
             if lifted:
                 notes.append(f"{elsewhere}: the pieces are placed by their seams")
-            lifted = False
+            lifted, placed = False, {name: lifts[name](mesh.points) for name, mesh in meshes.items()}
     drafted = [name for name in meshes if name not in placed]
-    if head is not None:
-        # A hood is worn up.
-        halves = hood_beside_head(placed, meshes, welds, hood, float(np.abs(head[0][:, 0]).max()) + _BESIDE_HEAD)
-        placed = {name: points for name, points in placed.items() if name not in hood} | halves
-    placed = continue_pieces(placed, meshes, welds, turned_down(pieces))
-    # The meshes are joined along their seams; vertices that become one start in the middle of their places.
-    counts = [len(mesh.points) for mesh in meshes.values()]
-    ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
-    begins = dict(zip(meshes, ends[:-1], strict=True))
-    joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
-    first, second = (np.array(column, dtype=np.int64) for column in zip(*joints, strict=True))
-    welded = join_labels(ends[-1], first, second)
-    space = np.concatenate([placed[name] for name in meshes])
-    total = np.stack([np.bincount(welded, column) for column in space.T], axis=1)
-    flat_faces = np.concatenate(
-        [np.column_stack([m.triangles + begins[n], np.full(len(m.triangles), -1)]) for n, m in meshes.items()]
-    ).astype(np.int32)
-    cells = [len(mesh.triangles) for mesh in meshes.values()]
-    places = np.cumsum([0, *cells]).tolist()
-    grains = [pieces[name].grain for name in meshes]
-    along = [np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0] for grain in grains]
-    warps = np.repeat([line / np.linalg.norm(line) for line in along], cells, axis=0)
-    lines = {
-        f"{name}.{edge}": welded[row + begins[name]] for name, m in meshes.items() for edge, row in m.edges.items()
-    }
-    inner = {
-        f"{name}.{line}": welded[row + begins[name]] for name, m in meshes.items() for line, row in m.lines.items()
-    }
-    cloth = SewnCloth(
-        fabric=fabric,
-        designed=total / np.bincount(welded)[:, None],
-        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
-        flat_faces=flat_faces,
-        flat=np.concatenate([mesh.points for mesh in meshes.values()]),
-        welded=welded,
-        warp=warps,
-        weft=np.column_stack([warps[:, 1], -warps[:, 0]]),
-        piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
-        piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(meshes)},
-        lines={**inner, **lines},
-        turned=turned,
-    )
+    placed = _continued(placed, pieces, meshes, welds, body)
+    cloth = _cloth(pieces, meshes, welds, placed, fabric, turned)
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if solid is None else solid
     if not lifted or drafted:
-        stays = np.zeros(len(total), dtype=bool)
+        stays = np.zeros(len(cloth.designed), dtype=bool)
         for name in set(meshes) - set(drafted) if lifted else ():
-            stays[welded[cloth.piece_vertices[name]]] = True
-        cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid, fixed=stays))
+            stays[cloth.welded[cloth.piece_vertices[name]]] = True
+        cloth = replace(cloth, designed=sew_around(cloth, cloth.designed, solid, fixed=stays))
     threaded = sorted({elastic.edge for elastic in pattern.elastics})
     cloth, gripped = thread_elastics(cloth, threaded, solid)
     if gripped:
@@ -219,6 +180,122 @@ def drape_pattern(
         hangs_below=hip_level(body),
         threaded=gripped,
     ), notes
+
+
+def _worn_body(body: Mannequin, *, head: bool, device: wp.Device) -> Body:
+    """Return the body that a pattern is worn on: its limbs run on beyond their ends, with a head if asked for and known."""
+    surface = body.surface()
+    vertices, faces = draw_out_limbs(surface.vertices, surface.faces)
+    above = head_of(body) if head else None
+    if above is not None:
+        triangles = np.column_stack([above[1] + len(vertices), np.full(len(above[1]), -1)])
+        vertices, faces = np.concatenate([vertices, above[0]]), np.concatenate([faces, triangles])
+    return Body(vertices, faces.astype(np.int32), device=device)
+
+
+def _sew(
+    pieces: Mapping[str, Piece],
+    seams: Sequence[Seam],
+    body: Mannequin,
+    placement: Placement,
+    fabric: Fabric,
+    turned: frozenset[str],
+    device: wp.Device,
+) -> tuple[Body, dict[str, Lift]]:
+    """Sew pieces around a body on a coarse mesh; return the body, and by piece the map to where it lies.
+
+    Raises:
+        InputError: a piece cannot be meshed or placed, or was sewn beside its limb.
+    """
+    spacing = max(placement.spacing, _COARSE)
+    try:
+        meshes, welds = mesh_pieces(pieces, seams, spacing, closures(pieces))
+    except InputError:
+        meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
+    placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
+    placed = _continued(placed, pieces, meshes, welds, body)
+    cloth, lines = _cloth(pieces, meshes, welds, placed, fabric, turned), limb_lines(body)
+    start, openings = cloth.designed, find_openings(meshes, welds)
+    high = max(float(points[:, 1].max()) for points in placed.values())
+    hooded = high > body.line("collar")[:, 1].max() + _OVER_NECK or any(each.role == "hood" for each in pieces.values())
+    solid = _worn_body(body, head=hooded, device=device)
+    # The trunk starts inside the arms, and what begins below them passes through.
+    on_arms = set[str]().union(
+        *find_sleeves(meshes, welds, {name: piece.at for name, piece in pieces.items()}, openings)
+    )
+    armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
+    sleeved, below = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
+    for name, rows in cloth.piece_vertices.items():
+        sleeved[cloth.welded[rows]] |= name in on_arms
+        below[cloth.welded[rows]] |= placed[name][:, 1].max() < armpit
+    limbs = limbs_of(openings, start, on_arms)
+    hems = [each.vertices for each, limb in zip(openings, limbs, strict=True) if limb.endswith("leg")]
+    start = around_legs(start, cloth.faces, hems, lines) if len(hems) == 2 else start
+    start = np.where(sleeved[:, None], start, inside_arms(start, lines))
+    thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
+    sewn = sew_around(cloth, start, thin)
+    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(closures(pieces)))
+    lifts = {
+        name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
+        for name, mesh in meshes.items()
+    }
+    return solid, lifts
+
+
+def _continued(
+    placed: Mapping[str, FloatArray],
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    body: Mannequin | None,
+) -> dict[str, FloatArray]:
+    """Return the places of all pieces: a hood is worn up, beside a head; what else does not lie goes on from what it is sewn to."""
+    hood = {name for name, piece in pieces.items() if piece.role == "hood"}
+    head = head_of(body) if body is not None and hood else None
+    found = dict(placed)
+    if head is not None:
+        halves = hood_beside_head(placed, meshes, welds, hood, float(np.abs(head[0][:, 0]).max()) + _BESIDE_HEAD)
+        found = {name: points for name, points in placed.items() if name not in hood} | halves
+    return continue_pieces(found, meshes, welds, turned_down(pieces))
+
+
+def _cloth(
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    placed: Mapping[str, FloatArray],
+    fabric: Fabric,
+    turned: frozenset[str],
+) -> SewnCloth:
+    """Join meshes along their seams; vertices that become one start in the middle of their places."""
+    welded, begins = welded_vertices(meshes, welds)
+    flat_faces = np.concatenate(
+        [np.column_stack([m.triangles + begins[n], np.full(len(m.triangles), -1)]) for n, m in meshes.items()]
+    ).astype(np.int32)
+    cells = [len(mesh.triangles) for mesh in meshes.values()]
+    places = np.cumsum([0, *cells]).tolist()
+    grains = [pieces[name].grain for name in meshes]
+    along = [np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0] for grain in grains]
+    warps = np.repeat([line / np.linalg.norm(line) for line in along], cells, axis=0)
+    lines = {
+        f"{name}.{line}": welded[row + begins[name]]
+        for name, m in meshes.items()
+        for line, row in [*m.lines.items(), *m.edges.items()]
+    }
+    return SewnCloth(
+        fabric=fabric,
+        designed=sewn_places(placed, begins, welded),
+        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
+        flat_faces=flat_faces,
+        flat=np.concatenate([mesh.points for mesh in meshes.values()]),
+        welded=welded,
+        warp=warps,
+        weft=np.column_stack([warps[:, 1], -warps[:, 0]]),
+        piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
+        piece_vertices={name: slice(begins[name], begins[name] + len(m.points)) for name, m in meshes.items()},
+        lines=lines,
+        turned=turned,
+    )
 
 
 def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequence[Weld]]) -> dict[str, FloatArray]:

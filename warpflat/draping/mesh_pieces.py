@@ -15,9 +15,11 @@ from warpflat.core.polyline import points_at_lengths
 from warpflat.draping.worn_layer import Button
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Piece, Seam
+from warpflat.pattern.seam_difference import eased_length
 from warpflat.pattern.whole_pieces import hole_edges
+from warpflat.surface.connectivity import join_labels
 
-__all__ = ["FlatMesh", "mesh_pieces"]
+__all__ = ["FlatMesh", "mesh_pieces", "sewn_places", "welded_vertices"]
 
 # Ends of edges on both sides of a seam that are closer than this share of the spacing are sewn to each other.
 _SNAP = 0.35
@@ -108,6 +110,25 @@ def mesh_pieces(
     )
 
 
+def welded_vertices(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> tuple[IntArray, dict[str, int]]:
+    """Return #P, the vertex of the sewn mesh of each vertex of the meshes one after the other, and where each begins."""
+    ends = np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist()
+    begins = dict(zip(meshes, ends[:-1], strict=True))
+    joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    first, second = np.array(joints, dtype=np.int64).reshape(-1, 2).T
+    return join_labels(ends[-1], first, second), begins
+
+
+def sewn_places(places: Mapping[str, FloatArray], begins: Mapping[str, int], welded: IntArray) -> FloatArray:
+    """Return #V by 3, the middle of the places (#P by 3 [m] by piece) of all that becomes one vertex of the sewn mesh; NaN without any."""
+    total, count = np.zeros((int(welded.max()) + 1, 3)), np.zeros(int(welded.max()) + 1)
+    for name, points in places.items():
+        rows = welded[begins[name] : begins[name] + len(points)]
+        np.add.at(total, rows, points)
+        np.add.at(count, rows, 1.0)
+    return np.where(count[:, None] > 0.0, total / np.maximum(count, 1.0)[:, None], np.nan)
+
+
 def _parts(length: float, spacing: float, finer: int) -> int:
     return max(1, int(np.ceil(finer * length / spacing - 1e-9)))
 
@@ -126,7 +147,7 @@ def _divide(
     ]
     whole, other = ends[0][-1], ends[1][-1]
     along = np.linspace(0.0, whole, 4001)
-    across = np.array([seam.reach(t, whole) for t in along])
+    across = eased_length(along, whole, seam.ease, seam.eased)
     across *= other / across[-1]
     breaks = {float(t): (number, -1) for number, t in enumerate(ends[0])}
     for number, t in enumerate(np.interp(ends[1], across, along).tolist()):

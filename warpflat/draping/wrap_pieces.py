@@ -1,32 +1,28 @@
-"""Flat pieces are wrapped around a body by their seams, and drawn together there: where an outside pattern starts to be draped.
+"""Flat pieces are laid around a body by their seams: where a pattern from outside starts to be sewn.
 
-The pieces around the trunk are laid beside and upon each other in the plane, each by the longest seam (longest upwards) that
-joins it to one that lies. The plane is rolled up around the trunk, so that its first and last edge meet; a tier that goes around
-the body by itself, such as a gathered skirt, by its own width. The pieces on an arm are rolled up around it. Where a file says how
-its pieces hang around the trunk, they start there instead. Then the seams are closed, and the cloth is drawn together as rigidly as
-it can be, outside the body, by projective dynamics (Bouaziz et al. 2014): each triangle is laid as near to its place as it goes
-without strain, and one sparse factor joins them.
+The pieces around the trunk start where a file says that they hang. Without that they are laid beside and upon each other in the plane,
+each by the longest seam (longest upwards) that joins it to one that lies. The plane is rolled up around the trunk, so that its first and
+last edge meet; a tier that goes around the body by itself, such as a gathered skirt, by its own width. Sleeves are rolled up around the
+arms. The garment goes up or down to where it hangs: on the shoulders, at its own levels, or with its top at the waist.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import coo_array, diags_array
 from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.sparse import factor_symmetric
-from warpflat.draping.body import Body
-from warpflat.draping.mesh_pieces import FlatMesh, Weld
-from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.core.polyline import polyline_length
+from warpflat.draping.mesh_pieces import FlatMesh, Weld, sewn_places, welded_vertices
+from warpflat.draping.openings import Opening, find_openings, limbs_of
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["UNITS", "continue_pieces", "draw_together", "hood_beside_head", "wrap_pieces"]
+__all__ = ["UNITS", "continue_pieces", "find_sleeves", "hood_beside_head", "wrap_pieces"]
 
 #: Where a file's units stand.
 UNITS = (
@@ -37,22 +33,18 @@ _LEAST_GIRTH = 0.5
 
 # The trunk is rolled up as an ellipse so many times as wide as deep.
 _WIDTH_OVER_DEPTH = 1.4
+# Openings of both sleeves are equally long but for this share.
+_ALIKE = 0.05
 # Sides of a seam that are farther apart than this share of the pieces' width meet behind the body.
 _FAR = 0.25
 # Pieces that hang from the shoulders start this much higher [m].
 _ABOVE = 0.01
-# A piece that hangs beside the body starts this far from it at least [m].
-_BESIDE = 0.02
 # Pieces that hang around another place than the body, sideways or forwards by so much [m], are moved to it.
 _ASIDE = np.array([0.02, np.inf, 0.1])
 # The highest of a sleeve, whose middle is laid above the arm, is what reaches up to this share of its height.
 _CAP = 0.95
-# Rounds at most, and the mean displacement in one of them after which it is still enough for a start [m].
-_ROUNDS, _STILL = 300, 1e-4
-# The cloth is kept this far off the body [m], with this stiffness over the cloth's, and drawn by this share to where it was.
-_OFF, _HOLD_OFF, _INERTIA = 0.001, 30.0, 0.02
-# What stays is held with this stiffness over the cloth's; what is drafted follows so many of the nearest vertices of its seams.
-_STAY, _NEXT = 1e3, 4
+# What is drafted follows so many of the nearest vertices of its seams.
+_NEXT = 4
 
 
 @dataclass(frozen=True)
@@ -88,87 +80,136 @@ def wrap_pieces(
         meshes: the pieces, upright: y runs up along the body, their right side towards the viewer.
         welds: for each seam the vertices that it joins.
         body: with its levels.
-        at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
+        at: by piece "front", "back", "left arm" or "right arm"; others go by their seams, or, where these do not tell, by their names.
         hung: by piece the points (#P by 3 [m]) where it hangs beside a body.
         levels: by piece the level of the body where it hangs, and the height [m] that this has in `hung`.
-        top: the highest point of what does not hang from the shoulders: a level of the body or a height [m]; its waist if not given.
+        top: the highest point of the trunk: a level of the body or a height [m].
 
     Raises:
         InputError: a piece hangs together with no other, the pieces go around half the waist only, or a level is unknown.
     """
-    at, hung = dict(at or {}), hung or {}
-    for name in meshes:
-        words = name.lower().replace("_", " ").split()
-        if name not in at and any(word.startswith("sleeve") for word in words):
-            at[name] = "right arm" if "right" in words or "mirrored" in words else "left arm"
-    trunk = [name for name in meshes if not at.get(name, "").endswith(" arm")]
+    at, hung, names = dict(at or {}), hung or {}, list(meshes)
+    joins, openings = _joins(welds, names), find_openings(meshes, welds)
+    groups = find_sleeves(meshes, welds, at, openings)
+    on_arms = set[str]().union(*groups)
+    trunk = [name for name in names if name not in on_arms]
     if not trunk:
         raise InputError("there are sleeves alone; a garment needs a piece around the trunk")
-    fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
-    waist = body.line("waist")
-    girth = float(np.linalg.norm(np.diff(waist, axis=0, append=waist[:1]), axis=1).sum())
-    shoulder = float(max(body.line(f"shoulder {side}")[:, 1].max() for side in ("left", "right"))) + _ABOVE
-    heights = {name: level.height for name, level in body.levels().items()}
-    at_level = "waist" if top is None else top
-    if isinstance(at_level, str) and at_level not in heights:
-        raise InputError(f"top: level {at_level!r} is unknown: {nearest(at_level, heights)}")
-    below = heights[at_level] if isinstance(at_level, str) else float(at_level)
-    arms = {name: side.removesuffix(" arm") for name, side in at.items() if side.endswith(" arm")}
-    placed = {name: row for side in ("left", "right") for name, row in _on_arm(meshes, welds, arms, side, body).items()}
-    joins, width = _whole_sides(_joins(welds, trunk), {name: meshes[name].points for name in trunk}), 0.0
-    is_hung = hung.keys() >= set(trunk)
+    waist, heights = body.line("waist"), {name: level.height for name, level in body.levels().items()}
+    girth, around = polyline_length(waist, closed=True), max((each.length for each in openings), default=np.inf)
+    if around < _LEAST_GIRTH * girth:
+        raise InputError(
+            f"the pattern goes {1e3 * around:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {UNITS} Is a piece missing?"
+        )
+    if isinstance(top, str) and top not in heights:
+        raise InputError(f"top: level {top!r} is unknown: {nearest(top, heights)}")
+    shoulder = max(float(body.line(f"shoulder {side}")[:, 1].max()) for side in ("left", "right"))
+    middle = 0.5 * (waist.min(axis=0) + waist.max(axis=0))
+    placed, is_hung = dict[str, FloatArray](), hung.keys() >= set(trunk)
     if is_hung:
         # A file may stand anywhere: its pieces go around the body's middle.
         ends = np.concatenate([hung[name] for name in trunk])
-        off = 0.5 * (waist.min(axis=0) + waist.max(axis=0) - ends.min(axis=0) - ends.max(axis=0))
-        aside = np.where(np.abs(off) > _ASIDE, off, 0.0)
-        hung = {name: points + aside for name, points in hung.items()}
-    # A suit of several garments hangs each by itself; what is wrapped hangs together.
-    for part in _parts(joins, trunk) if is_hung else [trunk]:
-        inner = [join for join in joins if set(join.pieces) <= set(part)]
-        plane = _lay_out(meshes, inner, part, [name for name in fronts if name in part] or part[:1])
-        over_shoulders, around, _ = _girth(plane, inner)
-        width = max(width, around)
-        if not is_hung:
+        off = middle - 0.5 * (ends.min(axis=0) + ends.max(axis=0))
+        placed = {name: hung[name] + np.where(np.abs(off) > _ASIDE, off, 0.0) for name in trunk}
+    else:
+        fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
+        inner = [join for join in joins if set(join.pieces) <= set(trunk)]
+        inner = _whole_sides(inner, {name: meshes[name].points for name in trunk})
+        plane = _lay_out(meshes, inner, trunk, fronts or trunk[:1])
+        width, _ = _girth(plane, inner)
+        frame = _Frame(middle * [0.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+        # The pieces in tiers above each other: those of one are joined by upright seams.
+        sides = [join for join in inner if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane))]
+        for tier in _parts(sides, list(plane)):
+            laid = {name: plane[name] for name in tier}
+            of_tier, meets = _girth(laid, [join for join in inner if set(join.pieces) <= laid.keys()])
+            if meets:
+                laid = _centred(laid, of_tier, [name for name in fronts if name in laid])
+            placed |= {
+                name: frame.roll(flat, of_tier if meets else width, _WIDTH_OVER_DEPTH) for name, flat in laid.items()
+            }
+    # Pieces with an armhole hang from the shoulders: where a sleeve is sewn on, or an opening of the trunk is beside its middle.
+    welded, begins = welded_vertices(meshes, welds)
+    free = [each for each in openings if not each.pieces & on_arms]
+    limbs = limbs_of(free, sewn_places(placed, begins, welded), ())
+    armholed = {name for each, limb in zip(free, limbs, strict=True) if limb.endswith("arm") for name in each.pieces}
+    upright = dict(meshes)
+    for group in groups:
+        seams = [(a, b, placed[a][own], its) for (a, b), (own, its) in _both_ways(joins) if a in placed and b in group]
+        if seams:
+            armholed |= {a for a, _, _, _ in seams}
+            side = "left" if np.concatenate([points for _, _, points, _ in seams])[:, 0].mean() > 0.0 else "right"
+            at = at | {name: f"{side} arm" for name in group if not at.get(name, "").endswith(" arm")}
+        for name in {b for _, b, _, _ in seams}:
+            # A sleeve may lie in its file; by quarter turns its cap comes up.
+            flat, cap = meshes[name].points, np.concatenate([its for _, b, _, its in seams if b == name])
+            x, y = flat[cap].mean(axis=0) - flat.mean(axis=0)
+            turn = np.linalg.matrix_power([[0, -1], [1, 0]], round(np.arctan2(x, y) / (0.5 * np.pi)) % 4)
+            upright[name] = replace(meshes[name], points=flat @ turn.T)
+    # Each garment of a suit hangs by itself: with its top where that is asked for, else by its armholes, else at its own levels.
+    for part in _parts(joins, names):
+        own = [name for name in part if name in placed]
+        if not own:
             continue
-        # From the seams over the shoulders, the lowest of them where a hood has such ones too; and from lines at levels of the body.
-        shift = dict.fromkeys(part, 0.0)
-        if top is not None:
-            shift = dict.fromkeys(part, below - max(float(hung[name][:, 1].max()) for name in part))
-        elif over_shoulders:
-            seams = [np.concatenate(join.points(hung))[:, 1].max() for join in over_shoulders]
-            shift = dict.fromkeys(part, shoulder - float(min(seams)))
+        shift, high = dict.fromkeys(own, 0.0), max(float(placed[name][:, 1].max()) for name in own)
+        tops = [float(placed[name][:, 1].max()) for name in own if name in armholed]
         lines: dict[str, list[float]] = {}
-        for level, height in (levels[name] for name in part if levels and name in levels):
+        for level, height in (levels[name] for name in own if levels and name in levels):
             lines.setdefault(level, []).append(height)
+        if top is not None:
+            below = heights[top] if isinstance(top, str) else float(top)
+            shift = dict.fromkeys(own, below - high)
+        elif tops:
+            shift = dict.fromkeys(own, shoulder + _ABOVE - max(tops))
+        elif not lines and not (is_hung and heights["hip"] < high < shoulder):
+            shift = dict.fromkeys(own, heights["waist"] - high)
         for level, row in lines.items():
             height = float(np.mean(row))
-            hangs = [name for name in part if hung[name][:, 1].mean() < height] if top or over_shoulders else part
+            hangs = [name for name in own if placed[name][:, 1].mean() < height] if top is not None or tops else own
             shift |= dict.fromkeys(hangs, heights[level] - height)
-        for name in part:
-            placed[name] = _beside(hung[name] + [0.0, shift[name], 0.0], meshes[name].triangles, body)
-    if width < _LEAST_GIRTH * girth:
-        raise InputError(
-            f"the pattern goes {1e3 * width:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {UNITS} Is a piece missing?"
-        )
-    if is_hung:
-        return placed
-    hangs_at = shoulder if over_shoulders and top is None else below
-    high = max(float(points[:, 1].max()) for points in plane.values())
-    origin = np.array([0.0, hangs_at - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
-    frame = _Frame(origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-    # The pieces in tiers above each other: those of one are joined by upright seams.
-    upright = [join for join in joins if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in join.points(plane))]
-    for tier in _parts(upright, list(plane)):
-        laid = {name: plane[name] for name in tier}
-        inner = [join for join in joins if set(join.pieces) <= laid.keys()]
-        _, of_tier, meets = _girth(laid, inner)
-        if meets:
-            centred = _centred(laid, of_tier, [name for name in fronts if name in laid])
-            placed |= {name: frame.roll(flat, of_tier, _WIDTH_OVER_DEPTH) for name, flat in centred.items()}
-        else:
-            placed |= {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in laid.items()}
+        placed |= {name: placed[name] + [0.0, by, 0.0] for name, by in shift.items()}
+    for side in ("left", "right"):
+        placed |= _on_arm(upright, joins, [name for name in names if at.get(name) == f"{side} arm"], side, body)
     return placed
+
+
+def find_sleeves(
+    meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], at: Mapping[str, str], openings: Sequence[Opening]
+) -> list[set[str]]:
+    """Return the pieces of each sleeve: those that are told, else those that the seams tell, else those that are called so.
+
+    By the seams a piece goes with the opening that is the fewest seams away. A sleeve goes with one opening, has a twin whose opening is
+    as long, and is not sewn to it, as the legs of trousers are.
+
+    Args:
+        meshes: the pieces.
+        welds: for each seam the vertices that it joins.
+        at: by piece "left arm" or "right arm", where that is told.
+        openings: of the garment.
+    """
+    told = [{name for name in meshes if at.get(name) == f"{side} arm"} for side in ("left", "right")]
+    if any(told):
+        return [each for each in told if each]
+    beside: dict[str, set[str]] = {name: set() for name in meshes}
+    for (a, b), _ in _both_ways(_joins(welds, list(meshes))):
+        beside[a].add(b)
+    of = {name: {number for number, each in enumerate(openings) if name in each.pieces} for name in meshes}
+    while ring := {
+        name: found
+        for name in meshes
+        if not of[name] and (found := set[int]().union(*(of[other] for other in beside[name])))
+    }:
+        of |= ring
+    groups = [{name for name in meshes if of[name] == {number}} for number in range(len(openings))]
+    twins = [
+        (abs(openings[i].length / openings[j].length - 1.0), i, j)
+        for i, j in combinations(range(len(openings)), 2)
+        if groups[i] and groups[j] and not any(beside[name] & groups[j] for name in groups[i])
+    ]
+    alike, i, j = min(twins, default=(1.0, 0, 0))
+    if alike < _ALIKE and len(openings) > 2:
+        return [groups[i], groups[j]]
+    return [{name} for name in meshes if "sleeve" in name.lower()]
 
 
 @dataclass(frozen=True)
@@ -208,6 +249,11 @@ def _joins(welds: Sequence[Sequence[Weld]], names: Sequence[str]) -> list[_Join]
     return joins
 
 
+def _both_ways(joins: Sequence[_Join]) -> list[tuple[tuple[str, str], tuple[IntArray, IntArray]]]:
+    """Return pieces and vertices of each join, either first."""
+    return [pair for join in joins for pair in ((join.pieces, join.vertices), (join.pieces[::-1], join.vertices[::-1]))]
+
+
 def _whole_sides(joins: Sequence[_Join], points: Mapping[str, FloatArray]) -> list[_Join]:
     """Join upright seams of the same two pieces on the same side of both, as those that a corner parts.
 
@@ -233,17 +279,12 @@ def _whole_sides(joins: Sequence[_Join], points: Mapping[str, FloatArray]) -> li
 
 
 def _on_arm(
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    arms: Mapping[str, str],
-    side: str,
-    body: Mannequin,
+    meshes: Mapping[str, FlatMesh], joins: Sequence[_Join], names: Sequence[str], side: str, body: Mannequin
 ) -> dict[str, FloatArray]:
     """Roll the pieces on an arm up around it, laid beside each other: their highest point above it, at the armhole's."""
-    names = [name for name, its in arms.items() if its == side]
     if not names:
         return {}
-    plane = _lay_out(meshes, _joins(welds, names), names, names[:1])
+    plane = _lay_out(meshes, [join for join in joins if set(join.pieces) <= set(names)], names, names[:1])
     points = np.concatenate(list(plane.values()))
     hole, wrist = body.line(f"armhole {side}"), body.line(f"wrist {side}").mean(axis=0)
     shoulder = hole[hole[:, 1].argmax()]
@@ -262,22 +303,6 @@ def _on_arm(
     beyond = float((shoulder - hole.mean(axis=0)) @ up)
     frame = _Frame(hole.mean(axis=0) + beyond * up, up, front)
     return {name: frame.roll(flat - [middle, high], width, 1.0) for name, flat in plane.items()}
-
-
-def _beside(points: FloatArray, triangles: IntArray, body: Mannequin) -> FloatArray:
-    """Return a flat piece (#P by 3 [m]) moved out along its normal until no part of the body behind it reaches as far."""
-    corner = points[triangles]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]).sum(axis=0)
-    normal /= np.linalg.norm(normal)
-    skin = body.surface().vertices
-    across = np.eye(3) - np.outer(normal, normal)
-    low, high = (points @ across).min(axis=0), (points @ across).max(axis=0)
-    flat = skin @ across
-    behind = skin[((flat >= low - 1e-9) & (flat <= high + 1e-9)).all(axis=1)]
-    if not len(behind):
-        return points
-    lacking = float((behind @ normal).max()) + _BESIDE - float((points @ normal).max())
-    return points + max(lacking, 0.0) * normal
 
 
 def _lay_out(
@@ -306,7 +331,7 @@ def _lay_out(
                 f"piece {lost!r} is sewn to no other on the same part of the body; join it by a seam, or say in [[pieces]] where it is"
             )
     plane = {name: points + shift[name] for name, points in flat.items()}
-    return _centred(plane, _girth(plane, joins)[1], fronts)
+    return _centred(plane, _girth(plane, joins)[0], fronts)
 
 
 def _centred(plane: Mapping[str, FloatArray], width: float, fronts: Sequence[str]) -> dict[str, FloatArray]:
@@ -317,28 +342,20 @@ def _centred(plane: Mapping[str, FloatArray], width: float, fronts: Sequence[str
     return {name: points - [middle, 0.0] for name, points in plane.items()}
 
 
-def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[list[_Join], float, bool]:
-    """Return the seams over the shoulders, the way around, and whether an upright seam meets behind the body.
+def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[float, bool]:
+    """Return the way around, and whether an upright seam meets behind the body.
 
-    The way around is how far apart the edges lie that meet there [m], or the width of all pieces. Edges half as far apart are those
-    of shoulders or, upright, those inside a leg.
+    The way around is how far apart the edges lie that meet there [m], or the width of all pieces. Upright edges half as far apart are
+    those inside a leg.
     """
     whole = float(np.ptp(np.concatenate(list(plane.values()))[:, 0]))
-    around, shoulders = list[float](), list[_Join]()
+    around = []
     for join in joins:
         rows = join.points(plane)
         apart = abs(float((rows[0] - rows[1])[:, 0].mean()))
-        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in rows):
-            around += [apart] if apart > _FAR * whole else []
-        elif apart > _FAR * whole:
-            flat = all(np.ptp(row[:, 0]) > 0.5 * np.ptp(row[:, 1]) for row in rows)
-            # A waistband's seam is at the top of what it holds, but not of itself.
-            on_top = all(
-                row[:, 1].mean() > 0.5 * (plane[name][:, 1].min() + plane[name][:, 1].max())
-                for name, row in zip(join.pieces, rows, strict=True)
-            )
-            shoulders += [join] if flat and on_top else []
-    return shoulders, max(around, default=whole), bool(around)
+        if all(np.ptp(row[:, 1]) > np.ptp(row[:, 0]) for row in rows) and apart > _FAR * whole:
+            around.append(apart)
+    return max(around, default=whole), bool(around)
 
 
 def continue_pieces(
@@ -364,16 +381,12 @@ def continue_pieces(
     while lost := [name for name in meshes if name not in found]:
         # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
         sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
-        for join in _joins(welds, list(meshes)):
-            for (name, other), (own, its) in (
-                (join.pieces, join.vertices),
-                (join.pieces[::-1], join.vertices[::-1]),
-            ):
-                if name in lost and other in found:
-                    across = _border_frames(meshes[name], own).transpose(0, 2, 1)
-                    # Into this piece is out of the other one, or back into it.
-                    flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
-                    sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
+        for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+            if name in lost and other in found:
+                across = _border_frames(meshes[name], own).transpose(0, 2, 1)
+                # Into this piece is out of the other one, or back into it.
+                flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
+                sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
         lengths = {
             name: sum(
                 float(np.linalg.norm(np.diff(meshes[name].points[own], axis=0), axis=1).sum()) for own, _, _ in rows
@@ -413,13 +426,9 @@ def hood_beside_head(
         By half its points, #P by 3 [m].
     """
     rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
-    for join in _joins(welds, list(meshes)):
-        for (name, other), (own, its) in (
-            (join.pieces, join.vertices),
-            (join.pieces[::-1], join.vertices[::-1]),
-        ):
-            if name in hood and other in placed and other not in hood:
-                rows[name].append((own, placed[other][its]))
+    for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+        if name in hood and other in placed and other not in hood:
+            rows[name].append((own, placed[other][its]))
     found = {}
     for name, seams in rows.items():
         if not seams:
@@ -457,65 +466,3 @@ def _slopes(mesh: FlatMesh, points: FloatArray) -> FloatArray:
     corner, count = mesh.triangles.ravel(), len(points)
     total = np.stack([np.bincount(corner, np.repeat(column, 3), count) for column in of_triangles.T], axis=1)
     return np.asarray((total / np.bincount(corner, np.repeat(area, 3), count)[:, None]).reshape(-1, 3, 2))
-
-
-def draw_together(
-    cloth: SewnCloth, start: FloatArray, body: Body, *, fixed: NDArray[np.bool_] | None = None
-) -> FloatArray:
-    """Draw sewn cloth together around a body, nearly without strain.
-
-    Args:
-        cloth: the sewn cloth.
-        start: #V by 3, where its vertices are [m].
-        body: what it stays outside of.
-        fixed: #V, the vertices that stay there.
-
-    Returns:
-        #V by 3 [m].
-    """
-    corner, _, gradient, area = cloth.cells()
-    count = len(start)
-    # Rows give the derivative of the places along warp and weft in each cell.
-    along = gradient.reshape(-1, 2, 2)
-    weights = np.concatenate([-along.sum(axis=1, keepdims=True), along], axis=1)  # cell, corner, direction
-    rows = np.arange(2 * len(corner)).reshape(-1, 1, 2)
-    places = (np.broadcast_to(rows, weights.shape).ravel(), np.repeat(corner.ravel(), 2))
-    derivative = coo_array((weights.ravel(), places), shape=(2 * len(corner), count)).tocsr()
-    stiffness = np.repeat(area, 2)
-    weight = cloth.vertex_areas()
-    weight = weight / weight.mean()
-    laplacian = derivative.T @ diags_array(stiffness) @ derivative
-    hold = laplacian.diagonal().mean()
-    x = start.copy()
-    outside = np.zeros(count, dtype=bool)
-    stays = np.zeros(count, dtype=bool) if fixed is None else fixed
-    solve = None
-    for number in range(_ROUNDS):
-        centre, normal = body.nearest(x)
-        depth = np.einsum("ij,ij->i", x - centre, normal)
-        near = (depth < _OFF) & (np.linalg.norm(x - centre, axis=1) < 0.2)
-        # The factor is renewed where contact has changed, not in every round.
-        if solve is None or number % 10 == 0:
-            outside = near
-            pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside + _STAY * stays)
-            solve = factor_symmetric(laplacian + diags_array(pull))
-        target = np.where((near & outside)[:, None], centre + _OFF * normal, x)
-        target[stays] = start[stays]
-        pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside + _STAY * stays)
-        turned = _nearest_isometries((derivative @ x).reshape(-1, 2, 3))
-        right = derivative.T @ (stiffness[:, None] * turned.reshape(-1, 3)) + pull[:, None] * target
-        before, x = x, solve(right)
-        if np.linalg.norm(x - before, axis=1).mean() < _STILL:
-            break
-    return np.asarray(x)
-
-
-def _nearest_isometries(frames: FloatArray) -> FloatArray:
-    """Return the pairs of orthonormal rows nearest to pairs of rows F (#C by 2 by 3): (F F^T)^(-1/2) F, in closed form."""
-    square = np.einsum("cik,cjk->cij", frames, frames)
-    square[:, [0, 1], [0, 1]] += 1e-12
-    root = np.sqrt(square[:, 0, 0] * square[:, 1, 1] - square[:, 0, 1] ** 2)
-    root = np.maximum(root, 1e-12)[:, None, None] * np.eye(2)
-    # The square root of a symmetric 2 by 2 matrix C is (C + sqrt(det C) I) / sqrt(tr C + 2 sqrt(det C)).
-    middle = (square + root) / np.sqrt(np.trace(square + root, axis1=1, axis2=2))[:, None, None]
-    return np.asarray(np.linalg.solve(middle, frames))

@@ -118,7 +118,9 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         pieces, notes, unread, taken = list[Piece](), list[str](), list[str](), set[tuple[str, str]]()
         words = dict[tuple[str, str], list[tuple[str, str, str]]]()
         # Other programs draw on layers of their own; a block that is not in the drawing, such as an arrow, is no piece then.
-        named = [block for block in blocks if block.drawn]
+        # What is drawn as a part of other blocks alone is none, too.
+        parts = {e.dxf.name for name, entities in layouts if name for e in entities if e.dxftype() == "INSERT"}
+        named = [block for block in blocks if block.drawn and block.name not in parts - inserted.keys()]
         for block in named or [block for block in blocks if block.name in inserted and block.all_lines]:
             pieces += _pieces(block, allowance, words, str(path), taken, notes, unread)
         if style.all_lines:

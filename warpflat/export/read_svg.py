@@ -41,6 +41,7 @@ _STACK, _CLOTHS = "fs-stack-", {"fabric", "lining", "interfacing", "canvas", "co
 _LABEL, _GROUPMODE = (f"{{http://www.inkscape.org/namespaces/inkscape}}{word}" for word in ("label", "groupmode"))
 _HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
 # What is drawn where it is used only, and what is drawn without a line.
+_SIDES = "width", "height"
 _DEFINED, _NO_LINES = ("defs", "symbol", "clipPath", "marker", "mask", "pattern"), ("image", "foreignObject")
 
 
@@ -264,9 +265,15 @@ class _Drawing:
                 next((element.get(key, "") for key in _HREFS if element.get(key)), "").removeprefix("#")
             )
             placed = _times(placed, np.array([[1.0, 0.0, _length(element, "x")], [0.0, 1.0, _length(element, "y")]]))
-            children = list(used) if used is not None and _tag(used) == "symbol" else [used] if used is not None else []
+            children = [] if used is None else [used]
             if used is None:
                 self.unread.append("use of what the file does not have")
+            elif _tag(used) == "symbol":
+                # A symbol is a drawing of its own, in the size in which it is used.
+                sized = ET.Element(
+                    "svg", {**used.attrib, **{key: element.attrib[key] for key in _SIDES if key in element.attrib}}
+                )
+                placed, children = _times(placed, _viewport(sized)), list(used)
         for child in children:
             yield from self._walk(child, placed, group, depth + 1)
 
@@ -332,7 +339,7 @@ def _length(element: ET.Element, key: str, otherwise: str = "0") -> float:
 def _page(root: ET.Element) -> tuple[FloatArray, tuple[float, float] | None]:
     """Return the matrix from units of the drawing to metres, y upwards, and the sides of the page [m], if the file has them."""
     pixel = _MILLIMETRES["px"]
-    given = [_LENGTH.fullmatch(root.get(key, "")) for key in ("width", "height")]
+    given = [_LENGTH.fullmatch(root.get(key, "")) for key in _SIDES]
     sides = [
         float(found[1]) * _MILLIMETRES[found[2]] if found and found[2] in _MILLIMETRES else None for found in given
     ]
@@ -343,9 +350,7 @@ def _page(root: ET.Element) -> tuple[FloatArray, tuple[float, float] | None]:
         both = [side for side in sides if side is not None]
         if sides[0] is not None or sides[1] is not None:
             if not all(0.0 < number < np.inf for number in (*both, *view)):
-                words = " and ".join(
-                    f"{key} {quote_value(root.get(key))}" for key in ("width", "height") if root.get(key)
-                )
+                words = " and ".join(f"{key} {quote_value(root.get(key))}" for key in _SIDES if root.get(key))
                 raise InputError(f"{words} and viewBox {quote_value(' '.join(box))} must be numbers above 0")
             ratios = [side / wide for side, wide in zip(sides, view, strict=True) if side is not None]
             stretched = root.get("preserveAspectRatio", "").strip() == "none" and len(ratios) == 2
@@ -357,12 +362,14 @@ def _page(root: ET.Element) -> tuple[FloatArray, tuple[float, float] | None]:
 
 
 def _viewport(element: ET.Element) -> FloatArray:
-    """Return the matrix of a drawing within another one: its place, and its units."""
+    """Return the matrix of a drawing within another one: its place, and its units; where it would be centred, its corner stays."""
     box = [float(word) for word in element.get("viewBox", "").replace(",", " ").split()]
     scale, corner = np.ones(2), np.zeros(2)
     if len(box) == 4 and min(box[2:]) > 0.0:
-        sides = [_length(element, key, str(wide)) for key, wide in zip(("width", "height"), box[2:], strict=True)]
-        scale, corner = np.full(2, min(sides[0] / box[2], sides[1] / box[3])), np.array(box[:2])
+        sides = [_length(element, key, str(wide)) for key, wide in zip(_SIDES, box[2:], strict=True)]
+        scale, corner = np.array(sides) / box[2:], np.array(box[:2])
+        if element.get("preserveAspectRatio", "").strip() != "none":
+            scale[:] = scale.min()
     place = np.array([_length(element, "x"), _length(element, "y")])
     return np.column_stack([np.diag(scale), place - scale * corner])
 

@@ -112,8 +112,7 @@ class Fabric:
         shear_limit: angle that warp and weft of a pattern may be off the right angle when worn [degrees], either way:
             where creases begin in the flat cloth. From there on it resists as if it locked. Where it is not given, it
             is an estimate: 15 for wovens; for knits and isotropic sheets, which have no straight threads to lock, the
-            angle that lengthens the bias by `strain_limit`. The strains of an isotropic sheet
-            count alone.
+            angle that lengthens the bias by `strain_limit`. An isotropic sheet is judged by its principal strains.
         compression_factor: stiffness under in-plane compression over that under tension. Cloth wrinkles instead of
             being pressed together, so less than 1 is real; 1 keeps springs that act alike both ways.
         bending: bending moment per width per curvature, warp and weft averaged [N m]; only a drape needs it. A medium

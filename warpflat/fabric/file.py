@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from warpflat.core.errors import InputError, nearest
@@ -44,8 +45,10 @@ _UNITS: dict[str, dict[str, float]] = {
     "bending": {"N m": 1.0, "uN m": 1e-6, "gf cm2/cm": KES_BENDING_UNIT},
 }
 
-# Points into which a stretch of linearly varying secant stiffness (a parabola) is cut.
-_POINTS_PER_STRETCH = 4
+# A stretch of linearly varying secant stiffness, a parabola of tension, is cut where its tangent has grown or fallen by this ratio.
+_PER_POINT = 1.2
+# A tangent counts as at least this share of the stiffest secant.
+_FLATTEST = 1e-3
 
 Grade = Literal["A", "B", "C", "D", "E"]
 _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -278,10 +281,13 @@ def fabric_from_table(
                 if curve.points is None:
                     # Of secants, which change evenly from strain to strain.
                     for (e0, k0), (e1, k1) in itertools.pairwise(curve.secants or []):
-                        for step in range(1, _POINTS_PER_STRETCH + 1):
-                            part = step / _POINTS_PER_STRETCH
-                            strain = e0 + part * (e1 - e0)
-                            points.append((strain, (k0 + part * (k1 - k0)) * factor * strain))
+                        slope = (k1 - k0) / (e1 - e0)
+                        first, last = np.maximum([k0 + slope * e0, k1 + slope * e1], _FLATTEST * max(k0, k1))
+                        count = max(math.ceil(abs(math.log(last / first)) / math.log(_PER_POINT)), 1)
+                        tangents = np.geomspace(first, last, count + 1)[1:]
+                        shares = (tangents - first) / (last - first) if count > 1 else np.ones(1)
+                        strains = (e0 + shares * (e1 - e0)).tolist()
+                        points += [(e, (k0 + slope * (e - e0)) * factor * e) for e in strains]
                 given[key] = tuple(points), _provenance(curve, curve.unit, sources or {})
         # A curve of the base would contradict a stiffness that is given here.
         for direction in ("warp", "weft"):

@@ -13,7 +13,7 @@ from warpflat.fabric.fabric import Fabric
 
 __all__ = ["Amount", "Demand", "Way"]
 
-Way = Literal["warp", "weft", "shear"]
+Way = Literal["warp", "weft", "shear", "principal"]
 
 # Cloth that is held at its limit, as by an intended stretch, is not beyond it by rounding.
 _AT_LIMIT = 1.0 + 1e-8
@@ -26,7 +26,7 @@ class Demand:
     Attributes:
         fabric: the cloth.
         ways: what the columns of `shares` are. Cloth is strained along warp and along weft and sheared between them. An
-            isotropic sheet has no threads that would lock: its strains along warp and weft count alone.
+            isotropic sheet has no threads: it is strained along its principal directions.
         shares: #C by #ways, what is asked over what the fabric allows, signed; beyond 1 or -1 it is more.
     """
 
@@ -43,9 +43,15 @@ class Demand:
             strain_warp, strain_weft: #C, length worn over length flat along the threads, minus 1.
             shear: #C, angle by which worn warp and weft are off the right angle [degrees].
         """
-        ways: tuple[Way, ...] = ("warp", "weft") if fabric.is_isotropic else ("warp", "weft", "shear")
-        used = [strain_warp / fabric.strain_limit, strain_weft / fabric.strain_limit, shear / fabric.shear_limit]
-        return cls(fabric=fabric, ways=ways, shares=np.column_stack(used[: len(ways)]))
+        if not fabric.is_isotropic:
+            used = [strain_warp / fabric.strain_limit, strain_weft / fabric.strain_limit, shear / fabric.shear_limit]
+            return cls(fabric=fabric, ways=("warp", "weft", "shear"), shares=np.column_stack(used))
+        # Squared principal stretches are the eigenvalues of F^T F.
+        warp, weft = 1.0 + strain_warp, 1.0 + strain_weft
+        middle, half = 0.5 * (warp**2 + weft**2), 0.5 * (warp**2 - weft**2)
+        radius = np.hypot(half, warp * weft * np.sin(np.radians(shear)))
+        stretches = np.sqrt(np.maximum(np.column_stack([middle + radius, middle - radius]), 0.0))
+        return cls(fabric=fabric, ways=("principal", "principal"), shares=(stretches - 1.0) / fabric.strain_limit)
 
     @property
     def beyond(self) -> BoolArray:
@@ -58,15 +64,14 @@ class Demand:
         return np.asarray(np.abs(self.shares) > _AT_LIMIT)
 
     @property
-    def stretched(self) -> BoolArray:
-        """#C, true where the cloth is stretched beyond its limit of strain."""
-        strains = [column for column, way in enumerate(self.ways) if way != "shear"]
-        return np.asarray((self.shares[:, strains] > _AT_LIMIT).any(axis=1))
+    def held_by_way(self) -> BoolArray:
+        """#C by #ways, true where that limit holds the cloth: stretched or sheared beyond it. Slack cloth folds instead."""
+        return np.asarray(self.held_shares > _AT_LIMIT)
 
-    @cached_property
+    @property
     def held(self) -> BoolArray:
-        """#C, true where the cloth is held beyond a limit: stretched or sheared. Slack cloth folds instead."""
-        return np.asarray((self.held_shares > _AT_LIMIT).any(axis=1))
+        """#C, true where the cloth is held beyond a limit."""
+        return np.asarray(self.held_by_way.any(axis=1))
 
     @property
     def slack(self) -> BoolArray:
@@ -100,7 +105,7 @@ class Amount:
     """What is asked of cloth at one place in one way.
 
     Attributes:
-        way: along warp or weft, or in shear.
+        way: along warp or weft, in shear, or along a principal direction.
         value: strain, or shear [degrees].
         limit: the fabric's, in the same unit.
     """
@@ -119,7 +124,7 @@ class Amount:
         """The amount, such as "6.1 % along warp" or "18.2 degrees"."""
         if self.way == "shear":
             return f"{abs(self.value):.1f} degrees"
-        return f"{100 * abs(self.value):.1f} % along {self.way}"
+        return f"{100 * abs(self.value):.1f} %" + ("" if self.way == "principal" else f" along {self.way}")
 
     @property
     def limit_words(self) -> str:

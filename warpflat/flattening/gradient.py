@@ -39,6 +39,8 @@ Scalar = Callable[[FloatArray], tuple[float, FloatArray]]
 _MOST_STEPS = 50
 # The largest move of a Newton step that ends them, over the mean length of the springs.
 _NEGLIGIBLE = 1e-9
+# Rounding of an energy, as a share.
+_ROUNDING = 1e-13
 # Displacement of central differences, over the mean length of the springs. A larger one steps over the onset of the guard in too many
 # cells.
 _DIFFERENCE = 1e-7
@@ -295,9 +297,10 @@ def _exact_minimum(pattern: Flattening, around: _Neighbours, chord: tuple[int, i
         step = _solve(_stiffness(network, point.positions, around), chord, -point.gradient)
         if abs(step).max() <= enough:
             return np.asarray(point.positions + step)
-        found, _, _ = line_search(energy.at, point, step)
         # Close to rest the energy falls by less than its rounding.
-        point = energy.at(point.positions + step) if found is None else found
+        whole = energy.at(point.positions + step)
+        found = None if whole.energy <= (1.0 + _ROUNDING) * point.energy else line_search(energy.at, point, step)[0]
+        point = found or whole
         if not np.isfinite(point.energy):
             break
     raise InputError(

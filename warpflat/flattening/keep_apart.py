@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.flattening.conformal_layout import conformal_layout
 from warpflat.flattening.harmonic_layout import harmonic_layout
@@ -11,8 +13,9 @@ from warpflat.solver.contact import open_cracks, relax_with_contact, swirl
 from warpflat.solver.grain import grain_alignments
 from warpflat.solver.steps import Relaxation
 from warpflat.surface.connectivity import components_of
-from warpflat.surface.injective import overlap_area
+from warpflat.surface.injective import is_injective, overlap_area
 from warpflat.surface.laplacian import factor_pays
+from warpflat.surface.mesh import Surface
 
 __all__ = ["keep_apart"]
 
@@ -24,6 +27,15 @@ _SWIRLS = (-3.0, -1.5, -0.1, 0.1, 1.5, 3.0)
 _MOST_SWIRLED = 10_000
 # Nor are pieces that contact strains by less than this: a part of a circle lies flat almost without energy.
 _IMPERCEPTIBLE = 1e-3
+
+
+def on_the_way(surface: Surface, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the layout (#V by 2 [m]) farthest on the straight way from one to another, by tenths, that is injective; else the start."""
+    for share in np.arange(9, 0, -1) / 10.0:
+        between = start + share * (end - start)
+        if is_injective(surface, between):
+            return np.asarray(between)
+    return start
 
 
 def keep_apart(
@@ -49,7 +61,7 @@ def keep_apart(
         return free, stages
     words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
     alignments = grain_alignments(surface, task.datum, free)
-    starts = [lambda: open_cracks(surface, start)]
+    starts = [lambda: on_the_way(surface, open_cracks(surface, start), free)]
     if not components_of(surface).any():
         starts.append(lambda: harmonic_layout(surface))
         if factor_pays(surface):
@@ -63,13 +75,15 @@ def keep_apart(
             costly = outcome.energies.potential > before + least
             if costly and len(surface.vertices) <= _MOST_SWIRLED:
                 # Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be
-                # wound up or unwound.
-                layout = state.positions()
-                for turn in _SWIRLS:
+                # wound up or unwound. So it begins once more where the piece began, and with what comes of that, swirled.
+                layout, settled = start, state.positions()
+                for turn in (0.0, *_SWIRLS):
                     other = Relaxation(
                         state.network, state.options, start=swirl(layout, turn), alignments=state.alignments
                     )
                     wound = relax_with_contact(other, 1e-3 * state.options.gap_mm)
+                    if layout is start:
+                        layout = settled if wound is None else other.positions()
                     if wound is not None and wound.converged and wound.energies.potential < outcome.energies.potential:
                         state, outcome = other, wound
             after = outcome.energies.potential

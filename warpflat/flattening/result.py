@@ -6,15 +6,13 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from warpflat._version import __version__
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.text import energy_words
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.applied_cut import AppliedCut, cut_sides, measure_cut
 from warpflat.flattening.develop import Development
@@ -31,12 +29,7 @@ from warpflat.surface.energy_map import energy_report
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.mesh import Surface
 
-if TYPE_CHECKING:
-    from warpflat.export.picture import PicturePiece
-    from warpflat.export.picture_drafted import DraftedOutline
-    from warpflat.export.picture_garment import Body
-
-__all__ = ["Flattening", "run_metrics", "write_files"]
+__all__ = ["Flattening", "run_metrics"]
 
 # What is measured of a layout, and does not change with the advice on it.
 _MEASURED = ("vertex_origin", "_errors", "overlap", "worn", "fit", "stretched_faces", "layout_measures")
@@ -95,20 +88,6 @@ class Flattening:
             f" strain energy {last.strain_energy_j:.4g} J after {' > '.join(stage.name for stage in self.stages)},\n"
             f" {'at rest' if self.converged else 'NOT at rest'}, {self.flipped_faces} flipped faces>"
         )
-
-    def plot(self) -> Any:
-        """Return a Matplotlib figure of the piece, on the body and in the plane, coloured by strain energy density."""
-        from warpflat.export.picture import draw_figure
-
-        return draw_figure([self.picture_piece()])
-
-    def _repr_png_(self) -> bytes:
-        """Return the picture that a notebook shows."""
-        from io import BytesIO
-
-        stream = BytesIO()
-        self.plot().savefig(stream, format="png")
-        return stream.getvalue()
 
     @property
     def faces(self) -> IntArray:
@@ -244,84 +223,6 @@ class Flattening:
         """Build all of `metrics.json`."""
         return run_metrics({self.surface.name: self.measures}, self.network.device)
 
-    def save(self, folder: str | Path, *, picture: bool = True, frames: bool = True) -> list[str]:
-        """Write `metrics.json`, `NAME.obj`, `picture.png` and `frames.usdc` (development and pattern), all of them or none.
-
-        Args:
-            folder: made if need be.
-            picture: whether to draw one.
-            frames: whether to write a USD file.
-
-        Returns:
-            The names of the files.
-
-        Raises:
-            InputError: the folder cannot be written, or the surface was read from a file there that would be replaced.
-        """
-        from warpflat.core.output import output_folder, require_own_metrics, write_report
-
-        others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
-        with output_folder(folder, others, sources=self.surface.sources, guard=True) as to:
-            require_own_metrics(to)
-            files = write_files([self], to, picture=picture, frames=frames)
-            write_report(to / "metrics.json", self.metrics(), name=self.surface.name, files=files)
-        return [*files, "metrics.json"]
-
-    def write_obj(self, folder: Path) -> str:
-        """Write `NAME.obj` and return its name."""
-        from warpflat.core.output import file_in
-        from warpflat.export.obj import write_obj
-
-        file = file_in(folder, self.surface.name, ".obj")
-        write_obj(file, self.surface, self.positions, faces=self.faces, pattern_to_surface=self.vertex_origin)
-        return file.name
-
-    def picture_piece(self) -> PicturePiece:
-        """Return the piece's row in a picture."""
-        from warpflat.export.picture import PicturePiece
-
-        there, grain = self.surface.lines, self.datum_name
-        datum = {} if grain in there else {grain: self.datum}
-        # In the pattern cuts show as cracks.
-        lines: dict[str, Any] = {
-            name: line
-            for name, line in self.network.surface.lines.items()
-            if not self.cuts or name in there or not (".left" in name or ".right" in name)
-        }
-        if grain in there and grain not in lines:
-            # A cut has parted the datum: its parts are drawn as one line.
-            parts = [name for name in lines if name.startswith(f"{grain}.")]
-            lines[grain] = [lines.pop(name) for name in parts] or self.datum
-        cut = {int(v) for made in self.cuts for path in made.paths for v in path}
-        uncut = {name: line for name, line in there.items() if not cut.issuperset(line.tolist())}
-        return PicturePiece(
-            name=self.surface.name,
-            surface=self.surface,
-            faces=self.faces,
-            positions=self.positions,
-            face_energy_density=self.face_energy_density,
-            lines={**lines, **datum},
-            surface_lines={**uncut, **{f"{made.name} (cut)": list(made.paths) for made in self.cuts}, **datum},
-            datum=grain,
-            grain_angle=self.grain_angle,
-            captions=self.captions(),
-        )
-
-    def captions(self) -> dict[str, str]:
-        """Return the key measures as short texts."""
-        m = self.layout_measures
-        captions = {
-            "fabric": self.fabric.name,
-            "strain energy": energy_words(m["strain_energy_j"]),
-            "length error": f"{100 * m['length_error']:.2f} %",
-            "area error": f"{100 * m['area_error']:.2f} %",
-        }
-        if m["flipped_faces"]:
-            captions["flipped faces"] = f"{m['flipped_faces']:,}"
-        if not self.converged:
-            captions["converged"] = "NO"
-        return captions
-
 
 def run_metrics(
     pieces: Mapping[str, Mapping[str, Any]], device: wp.Device, more: Mapping[str, Any] | None = None
@@ -345,58 +246,3 @@ def run_metrics(
         metrics["wear"] = {**garment_wear(pieces), **metrics.get("wear", {})}
     verdict = judge(metrics)
     return metrics if verdict is None else {**metrics, "verdict": verdict.as_dict()}
-
-
-def write_files(
-    results: Sequence[Flattening],
-    folder: Path,
-    *,
-    picture: bool,
-    frames: bool,
-    body: Body | None = None,
-    drafted: Sequence[DraftedOutline] = (),
-) -> list[str]:
-    """Write the files of several pieces, but not `metrics.json`, and return their names; a picture or film that fails is left out.
-
-    Args:
-        results: the pieces, of different names.
-        folder: an existing one, in a block of :func:`warpflat.core.output.output_folder`.
-        picture: whether to draw one.
-        frames: whether to write a USD file with the development and the pattern.
-        body: on which the picture shows them first; none if not given.
-        drafted: pieces without a surface that the picture shows, too.
-
-    Raises:
-        InputError: the folder cannot be written.
-    """
-    from warpflat.core.output import optional_file
-
-    files = [result.write_obj(folder) for result in results]
-    if frames:
-        with optional_file(folder / "frames.usdc", files) as path:
-            from warpflat.export.usd import FrameWriter, film_scale
-
-            scale = film_scale(
-                [result.surface for result in results], [result.face_energy_density for result in results]
-            )
-            with FrameWriter(path, scale=scale) as writer:
-                for result in results:
-                    name, surface = result.surface.name, result.surface
-                    writer.add_piece(name, surface)
-                    if not result.cuts:
-                        first = worn_strain(result.network, result.development.positions).energy_density
-                        writer.write(name, positions=result.development.positions, face_energy_density=first)
-                    writer.write(
-                        name,
-                        positions=result.positions,
-                        face_energy_density=result.face_energy_density,
-                        faces=result.faces,
-                        lines=result.network.surface.lines,
-                        cuts={cut.name: [side for s in cut.seams for side in (s.left, s.right)] for cut in result.cuts},
-                    )
-    if picture:
-        with optional_file(folder / "picture.png", files) as path:
-            from warpflat.export.picture import write_picture
-
-            write_picture(path, [result.picture_piece() for result in results], body=body, drafted=drafted)
-    return files

@@ -14,11 +14,12 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import expect, expect_callback, expect_each
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.cutting.separate_pieces import separate
+from warpflat.export.piece_files import write_pieces
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.as_cut import CutPattern
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.result import Flattening, run_metrics, write_files
+from warpflat.flattening.result import Flattening, run_metrics
 from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric, straight_hems
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
@@ -297,7 +298,9 @@ class Garment:
         body = None
         if self.mannequin is not None:
             body = Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
-        return write_files(list(self.parts.values()), folder, picture=picture, frames=False, body=body, drafted=drafted)
+        return write_pieces(
+            list(self.parts.values()), folder, picture=picture, frames=False, body=body, drafted=drafted
+        )
 
 
 def flatten_form(

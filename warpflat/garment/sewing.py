@@ -55,6 +55,8 @@ __all__ = ["sew"]
 
 # Stiffness of an equation over the median spring of the cloth: with a factor of all stiffnesses, and for plain steps.
 _RELATIVE_STIFFNESS, _STIFFNESS_FOR_STEPS = 100.0, 4.0
+# No seam makes a piece so many times as large as it is on its own.
+_BLOWN = 10.0
 
 
 class SewingNetwork:
@@ -98,6 +100,15 @@ class SewingNetwork:
             for rows in [slice(self.first[name], self.first[name] + len(piece.positions))]
         }
         return {name: area for name, area in areas.items() if area}
+
+    def blown_up(self, layout: FloatArray) -> list[str]:
+        """Return the names of pieces that are many times as large in a layout (#V by 2 [m]) as they are on their own."""
+        return [
+            name
+            for name, piece in self.pieces.items()
+            for rows in [slice(self.first[name], self.first[name] + len(piece.positions))]
+            if not np.ptp(layout[rows], axis=0).max() <= _BLOWN * np.ptp(piece.positions, axis=0).max()
+        ]
 
     def split(self, state: Relaxation, outcome: Outcome, *, stage_name: str = "sew") -> dict[str, Flattening]:
         """Return each piece with its part of the layout, and in its history the stages of a relaxation with this outcome."""
@@ -152,7 +163,7 @@ def sew(
 
     Raises:
         InputError: a constraint names what does not exist, or a piece cannot be laid with its fold straight.
-        StepError: pieces are crushed so far that they cannot be relaxed together.
+        StepError: pieces are crushed so far that they cannot be relaxed together, or their seams drive them apart without end.
     """
     start_time = time.perf_counter()
     options = given_options(options)
@@ -203,6 +214,10 @@ def sew(
             if not np.isfinite(stiffness_matrix(piece.network, piece.positions).data).all()
         ]
         raise StepError(f"{', '.join(stiff)}: {error}, before anything is sewn" if stiff else str(error)) from error
+    # Springs of seams that contradict each other may drive the pieces apart without end.
+    blown = joined.blown_up(state.positions())
+    if blown:
+        raise StepError(f"{', '.join(blown)}: the seams contradict each other, and drive the cloth apart without end")
     seconds = time.perf_counter() - start_time
     converged = ended.outcome.converged and ended.satisfied
     first = ended.outcome.first_steps

@@ -6,12 +6,15 @@ Everything that the files show is worked out here once; the writers of DXF, SVG,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.output import optional_step
 from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.allowance import cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve
@@ -31,7 +34,7 @@ from warpflat.pattern.drafted_darts import (
     fisheye_legs,
     smooth_fisheye,
 )
-from warpflat.pattern.fitting import TOLERANCES, as_in_layout, equal_sides, fit_edges, is_wavy, smooth_line
+from warpflat.pattern.fitting import TOLERANCES, as_in_layout, equal_sides, fit_edges, is_wavy, smooth_line, uncrossed
 from warpflat.pattern.label import Label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.piece_parts import Edge
@@ -70,8 +73,10 @@ def draft_garment(
         true: whether edges are made to run on smoothly across seams (see :func:`warpflat.pattern.truing.true_corners`).
 
     Raises:
-        InputError: an unknown size, or a half piece that reaches across its fold.
+        InputError: an unknown size, or no piece can be drawn; one of several that cannot is left out, with its seams and a note.
     """
+    import shapely
+
     with printed_in(garment.words):
         chosen = garment.sizes if sizes is None else tuple(sizes)
         for size in chosen:
@@ -82,9 +87,20 @@ def draft_garment(
         for size in chosen:
             edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance, true=true)
             corners += trued
-            pieces = {
-                piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
-            }
+            pieces = dict[str, DraftedPiece]()
+            for piece in garment.pieces[size]:
+                step = optional_step(f"{piece.name} was left out of the pattern")
+                with step if len(garment.pieces[size]) > 1 else nullcontext():
+                    try:
+                        pieces[piece.name] = _draft(piece, garment.name, edges[piece.name], tolerance)
+                    except shapely.errors.GEOSException as error:
+                        words = str(error).partition(". ")[0]
+                        raise InputError(
+                            f"its lines lie over each other as they are drawn: {words}; cut it apart"
+                        ) from error
+            failed = {piece.name for piece in garment.pieces[size]} - pieces.keys()
+            if failed:
+                return draft_garment(garment.without(failed), tolerance=tolerance, sizes=sizes, true=true)
             seams = [seam.of_size(size) for seam in garment.seams]
             notches = seam_notches([*seams, *cut_darts(pieces)], pieces)
             drafted[size] = tuple(
@@ -286,7 +302,7 @@ def _fitted_edges(
         # Turned ends change lengths a little, too.
         trued, corners = true_corners(pieces, seams, curves)
         trued = equal_sides(pieces, seams, trued)
-    trued = as_in_layout(lines, seams, trued)
+    trued = uncrossed(pieces, lines, as_in_layout(lines, seams, trued))
     edges = {}
     for piece in pieces:
         keys = [(piece.name, edge.name) for edge in piece.edges]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from warpflat.pattern.piece_parts import SAME_POINT
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 
+if TYPE_CHECKING:
+    from shapely import LineString
+
 __all__ = [
     "TOLERANCES",
     "EdgeKey",
@@ -24,6 +28,7 @@ __all__ = [
     "fit_edges",
     "is_wavy",
     "smooth_line",
+    "uncrossed",
 ]
 
 #: Names of a piece and of its edge.
@@ -75,8 +80,6 @@ def fit_edges(
         seams: between them; the legs of the pieces' darts count as seams too.
         tolerance: [m] for all edges; None takes the least of `TOLERANCES` that makes a clean curve of each.
     """
-    import shapely
-
     fitted = {}
     for piece in pieces:
         for edge in piece.edges:
@@ -124,21 +127,49 @@ def fit_edges(
                         break
                 fitted[first], fitted[second] = (found[0], used), (found[1].reversed() if against else found[1], used)
     _keep_near(pieces, lines, seams, fitted, tolerance)
+    clean = uncrossed(pieces, lines, {key: curve for key, (curve, _) in fitted.items()})
+    return {key: (clean[key], width) for key, (_, width) in fitted.items()}
+
+
+def uncrossed(
+    pieces: Sequence[Piece], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, Curve]
+) -> dict[EdgeKey, Curve]:
+    """Return the curves with chords for those that cross themselves or each other, or all fall into one line.
+
+    Where chords beside curves cross, too, all edges of the piece get theirs, as its layout has them.
+
+    Args:
+        pieces: of one size.
+        lines: #P by 2 [m], the points of every edge, in its piece's direction.
+        curves: of all edges.
+    """
+    import shapely
+
+    found = dict(curves)
     for piece in pieces:
-        # Curves that cross themselves or each other, or all fall into one line, are replaced by their chords.
         keys = [(piece.name, edge.name) for edge in piece.edges]
-        drawn = {key: shapely.LineString(fitted[key][0].sample()) for key in keys}
-        ring = np.concatenate([line.coords[:-1] for line in drawn.values()])
-        if len(ring) > 2 and shapely.Polygon(ring).is_valid:
+
+        drawn = {key: shapely.LineString(found[key].sample()) for key in keys}
+        if _encloses(list(drawn.values())):
             continue
         for key in keys:
             if (
-                len(ring) < 3
+                sum(len(line.coords) - 1 for line in drawn.values()) < 3
                 or not drawn[key].is_simple
                 or any(drawn[key].crosses(drawn[other]) for other in keys if other != key)
             ):
-                fitted[key] = chords(lines[key]), fitted[key][1]
-    return fitted
+                found[key] = chords(lines[key])
+        if not _encloses([shapely.LineString(found[key].sample()) for key in keys]):
+            found |= {key: chords(lines[key]) for key in keys}
+    return found
+
+
+def _encloses(outline: Sequence[LineString]) -> bool:
+    """Return whether lines that follow each other enclose an area, without crossing."""
+    import shapely
+
+    ring = np.concatenate([line.coords[:-1] for line in outline])
+    return len(ring) > 2 and bool(shapely.Polygon(ring).is_valid)
 
 
 def equal_sides(

@@ -17,6 +17,7 @@ from warpflat.pattern.piece_parts import LEFT_OUT, Dart, Edge, Hole
 from warpflat.pattern.pieces import Piece, check_hole
 from warpflat.pattern.placement import default_grain
 from warpflat.surface.connectivity import border_loops
+from warpflat.surface.overlap import parted
 
 __all__ = ["MeshFeatures", "inner_stretches", "line_labels", "piece_from_mesh"]
 
@@ -95,6 +96,9 @@ def piece_from_mesh(
     if areas[largest] < 0:  # it lies on its back
         flat = flat * [-1.0, 1.0]
     outer, inner = loops[largest], [loop for i, loop in enumerate(loops) if i != largest]
+    # A hole that meets the border at a point opens there.
+    flat = flat.copy()
+    flat[outer] = parted(flat[outer])
     labels = line_labels(outer, lines)
     corners = find_corners(flat[outer], CORNER)
     # The places in the loop of each dart's left mouth, tip and right mouth; cracks that are found are darts, too.

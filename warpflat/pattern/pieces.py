@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -340,6 +340,18 @@ class Pattern:
     def sizes(self) -> tuple[str, ...]:
         """Sizes in their order."""
         return tuple(self.pieces)
+
+    def without(self, names: Collection[str]) -> Pattern:
+        """Return the pattern without pieces of these names, and without their seams.
+
+        Raises:
+            InputError: none would be left of a size.
+        """
+        if any(all(piece.name in names for piece in row) for row in self.pieces.values()):
+            raise InputError("none of the pieces can be drawn")
+        pieces = {size: [piece for piece in row if piece.name not in names] for size, row in self.pieces.items()}
+        seams = [seam for seam in self.seams if not any(s.piece in names for s in (*seam.sides[0], *seam.sides[1]))]
+        return replace(self, pieces=pieces, seams=seams)
 
     def check_size(self, size: str) -> None:
         """Check that there is such a size.

@@ -39,6 +39,8 @@ STRETCHED = 0.02
 _PNG = b"\x89PNG\r\n\x1a\n"
 # The largest picture, which takes 3 bytes of memory for each pixel, and the largest file that the page holds.
 _MOST_PIXELS = 150_000_000
+# Larger ones, as of hundreds of pieces, stay as they are: decoded they would take hundreds of megabytes.
+_DECODED = 30_000_000
 _MOST_BYTES = 200_000_000
 
 
@@ -101,9 +103,9 @@ def pack_pictures(folder: Path, files: Sequence[str]) -> dict[str, str]:
         if not 0 < wide * high <= _MOST_PIXELS:
             raise InputError(f"{path}: is no PNG of at most {_MOST_PIXELS:,} pixels; run the scene again")
         with guarded(path, "picture"), Image.open(io.BytesIO(best), formats=["PNG"]) as picture:
-            if max(picture.size) < 65_000:
+            if max(picture.size) < 65_000 and wide * high <= _DECODED:
                 # As JPEG where that is smaller. WebP has half the bytes, and takes ten times as long.
-                picture.convert("RGB").save(small, "JPEG", quality=_QUALITY)
+                (picture if picture.mode == "RGB" else picture.convert("RGB")).save(small, "JPEG", quality=_QUALITY)
                 if len(small.getvalue()) < len(best):
                     best, kind = small.getvalue(), "jpeg"
         packed[file] = f"data:image/{kind};base64,{base64.b64encode(best).decode('ascii')}"

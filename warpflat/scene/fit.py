@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, is_number, nearest
-from warpflat.core.file_names import make_file_name
+from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.input_files import listening_to_reads
 from warpflat.core.text import quote_value
 from warpflat.garment.level_ease import EASE_LEVELS
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from warpflat.mannequin.common_body import CommonBody
     from warpflat.scene.run import SceneResult
     from warpflat.seams.layers import GarmentFile
+    from warpflat.surface.io.read import RawMesh
+    from warpflat.surface.io.sewn_panels import SewnPanel
 
 __all__ = [
     "Carried",
@@ -50,6 +52,8 @@ _WITHIN, _TOLD = 0.002, 0.01
 _WRINKLE = 0.05
 _LENGTH = re.compile(r"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>[-+0-9.eE]+)\s*(?P<unit>mm|cm|m|in)\s*")
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+# A texture that may be a normalised one is a pattern where so much of the worn cloth at most is stretched against it, in nine of ten cells.
+_AS_WORN = 0.1
 # Ease is from and to these [m].
 _RANGE = -0.3, 4.0
 #: Axes of a garment's front, and how it is turned to face +Z.
@@ -121,6 +125,7 @@ class FitJob:
         layers: of the garment, vertices (#V by 3 [m]) in the body's axes, and triangles (#T by 3), outward.
         body: on which it lies.
         turn, shift: points of the file [m] come to the body's axes as points @ turn + shift.
+        panels: of the sewn pattern that the file's texture is; none where it is no pattern.
         notes: one sentence each.
         sources: files that were read.
     """
@@ -131,6 +136,7 @@ class FitJob:
     body: CommonBody
     turn: FloatArray
     shift: FloatArray
+    panels: Sequence[SewnPanel]
     notes: tuple[str, ...]
     sources: tuple[Path, ...]
 
@@ -199,7 +205,8 @@ class FitJob:
                 "which it was made, in the same axes and place, its unit with --units, or leave --from out"
             )
         return cls(
-            path=path, read=read, layers=layers, body=worn, turn=turn, shift=shift, notes=tuple(notes), sources=tuple(sources)
+            path=path, read=read, layers=layers, body=worn, turn=turn, shift=shift, panels=_known_pattern(read, name or path.stem),
+            notes=tuple(notes), sources=tuple(sources),
         )  # fmt: skip
 
     def to(self, body: str, ease: Mapping[str, float], *, keep_pose: bool = False) -> Carried:
@@ -276,6 +283,11 @@ class FitJob:
             skin=(wearer.vertices - self.shift) @ back, before=before, after=after, wished=ease, notes=tuple(notes),
         )  # fmt: skip
 
+    def keeps_pattern(self, tables: Mapping[str, Any]) -> bool:
+        """Return whether the garment's own pattern is kept: it has one, and no table of a scene says how its pieces are to be cut."""
+        cut = tables.get("seams_cut") or "bands" in tables or "find" in tables.get("find_seams", {})
+        return bool(self.panels) and not cut
+
     def carry_cuts(self, carried: Carried, cuts: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         """Return seams that are drawn on the garment as its file has it, as tables of `[[seams_cut]]` on the carried garment.
 
@@ -339,6 +351,25 @@ class FitJob:
 _BACKWARDS = 1.15
 
 
+def _known_pattern(read: GarmentFile, name: str) -> list[SewnPanel]:
+    """Return the panels of a garment whose texture is its sewn pattern; none where it is a picture's, or may be one.
+
+    A texture in millimetres or centimetres has been measured. One that fits in another unit may be a normalised one by chance: it must lay
+    the cloth nearly as it is worn.
+    """
+    from warpflat.flattening.graded import stretches_worn
+    from warpflat.surface.io.sewn_panels import sewn_panels
+
+    try:
+        panels = sewn_panels(read.raw, read.scale, name=make_piece_name(name))
+    except InputError:
+        return []
+    if panels[0].unit in ("mm", "cm"):
+        return panels
+    stretched = np.concatenate([np.abs(stretches_worn(panel.surface, panel.cut) - 1.0) for panel in panels])
+    return panels if float(np.percentile(stretched, 90)) <= _AS_WORN else []
+
+
 def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
     """Return the ease by level [m] of texts such as "waist=40 mm".
 
@@ -395,17 +426,26 @@ def fit_to(
 ) -> SceneResult:
     """Flatten a carried garment as a scene of these tables, and write its files and the carried mesh, all of them or none.
 
+    A known pattern is kept: graded by the growth of the cloth, and taken as it is then. Tables that say how pieces are cut have it made
+    anew.
+
     Files: those of :func:`warpflat.scene.run.run_scene`, `NAME.fitted.obj`, the garment on the body [m], and `NAME.body.obj`, the body.
 
     Raises:
         InputError: the garment cannot be flattened, or `out` cannot be written.
     """
     from warpflat.core.output import atomic_path, output_folder, record_file
+    from warpflat.flattening.graded import graded_layout
     from warpflat.mannequin.body_model import finer_body
     from warpflat.scene.run import files_of_run, run_scene
+    from warpflat.surface.io.sewn_panels import with_cuts
 
+    known, raw = job.panels if job.keeps_pattern(tables) else [], job.read.raw
+    if known:
+        cuts = [graded_layout(panel.surface, carried.vertices[panel.of_file], panel.cut) for panel in known]
+        raw = with_cuts(raw, known, cuts)
     meshes = {
-        f"{name}.fitted.obj": _obj_lines(carried.vertices, job.read),
+        f"{name}.fitted.obj": _obj_lines(carried.vertices, raw),
         f"{name}.body.obj": "".join(
             [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in carried.skin.tolist()]
             + [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in finer_body()[1].tolist()]
@@ -416,6 +456,9 @@ def fit_to(
         copy = Path(folder) / f"{name}.obj"
         copy.write_text(meshes[f"{name}.fitted.obj"], encoding="utf-8")
         own = {**tables, "surface": {"file": str(copy), "units": "m"}}
+        if known:
+            own["surface"]["pattern"] = "uv"
+            own.pop("find_seams", None)
         if tables.get("seams_cut"):
             own["seams_cut"] = job.carry_cuts(carried, tables["seams_cut"])
         try:
@@ -575,9 +618,8 @@ def _joined(layers: Sequence[tuple[FloatArray, NDArray[np.int64]]]) -> tuple[Flo
     return np.concatenate([vertices for vertices, _ in layers]), np.concatenate(triangles)
 
 
-def _obj_lines(vertices: FloatArray, read: GarmentFile) -> str:
+def _obj_lines(vertices: FloatArray, raw: RawMesh) -> str:
     """Return an OBJ of a file's mesh at other places [m], with its texture, groups and materials, along which it may be cut."""
-    raw = read.raw
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices.tolist()]
     corner = None
     if raw.texture is not None:

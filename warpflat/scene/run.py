@@ -273,12 +273,12 @@ def _measure_fit(
         if garment.form is None:
             for name, part in advised.parts.items():
                 with optional_file(file_in(folder, name, ".wear.png"), files) as path:
-                    from warpflat.flattening.fit_picture import write_wear_picture
+                    from warpflat.export.fit_picture import write_wear_picture
 
                     write_wear_picture(path, part)
         else:
             with optional_file(folder / "wear.png", files) as path:
-                from warpflat.flattening.fit_picture import write_wear_sheet
+                from warpflat.export.fit_picture import write_wear_sheet
 
                 on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in advised.pieces]
                 write_wear_sheet(path, list(advised.pieces.values()), title=garment.name, on_body=on_body)

@@ -47,8 +47,6 @@ _WORTH, _WORTH_OF_PIECE = 0.002, 0.15
 # A garment of which more than the first share is beyond the limit is parted further before darts are looked for; one of which more than the
 # second is, after them.
 _PARTED_FIRST, _PARTED = 0.05, 0.015
-# One that is as tight as a skin has further panels where more than this share is beyond the limit with all its darts.
-_STILL_TIGHT = 0.03
 # A centimetre sewn counts as this much cloth beyond the limit [m2].
 _PRICE = 1e-5
 # One that brings back this share of what is beyond in its piece is taken without a look at others.
@@ -176,9 +174,8 @@ def cut_by_energy(
     most = options.most_pieces if options.most_pieces is not None else _usual_pieces(anatomy, len(pieces))
     if "hood" in cloth.seams and options.most_pieces is None:
         most += 2
-    tight = parting and options.most_pieces is None and anatomy.kind == "trousers"
-    if tight or (parting and options.most_pieces is None and anatomy.open_front):
-        # What is as tight as a skin has a panel more in each leg, a jacket two in each sleeve.
+    if parting and options.most_pieces is None and anatomy.open_front:
+        # A jacket has two panels more, one in each sleeve.
         most += 2
     while rounds < _MOST_ROUNDS:
         beyond = sum(piece.outside for piece in pieces)
@@ -195,11 +192,6 @@ def cut_by_energy(
         if worst is None and not parting and beyond > min(_PARTED, options.limit) * total:
             # Darts alone do not do.
             parting = True
-            exhausted.clear()
-            continue
-        if worst is None and tight and beyond > _STILL_TIGHT * total:
-            # And yet another one.
-            most, tight = most + 2, False
             exhausted.clear()
             continue
         if worst is None or tried >= _MOST_TRIALS:

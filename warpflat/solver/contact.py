@@ -165,6 +165,7 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     while not at_rest and descent.iterations < most and descent.step():
         left = estimate.add(descent.point.energy, descent.point.positions, descent.fraction)
         at_rest = left.is_small(state.options) or descent.is_at_rest(state.options)
+        problem.factor_stiffness(descent)
     # The largest force on a vertex, that of contact included, over the mean force of the springs.
     springs, force = state.network.spring_arrays, -descent.point.gradient
     a, b = (descent.point.positions[springs.ends[:, k]] for k in range(2))

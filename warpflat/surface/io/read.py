@@ -112,7 +112,7 @@ def read_surface(
         path: the file.
         units: "m", "dm", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
             overrides what the file says.
-        component: the connected part to take if there are several: "largest", or its number, largest first from 0.
+        component: the connected part to take if there are several: "largest", or its number, that of the largest area first, from 0.
         name: of the piece (see :func:`warpflat.make_surface`); by default the file's stem, or the USD prim's or
             GLB node's name, with "_" where no file can bear it.
         prim: the mesh of a USD stage (a prim path or name) or of a GLB scene (a node's name) to take.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import format_count
@@ -19,7 +20,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface, parts_of_faces
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["SewnPanel", "mesh_area", "read_sewn_panels", "sewn_panels"]
+__all__ = ["SewnPanel", "mesh_area", "read_sewn_panels", "sewn_panels", "with_cuts"]
 
 # How far the area of the texture may differ from the cloth's, in all and for a panel that is more than the second share of it.
 _TRUE_SIZE, _COUNTED = 0.25, 0.01
@@ -38,11 +39,17 @@ class SewnPanel:
         surface: as worn, #V vertices.
         cut: #V by 2, the same vertices in the pattern [m], the right side of the cloth towards the viewer.
         unit: of the texture.
+        polygons: #P, the faces of the file that it has.
+        corners: #P by k, its vertex at each of their corners; -1 where there is none, or repair has dropped it.
+        of_file: #V, the vertices of the file.
     """
 
     surface: Surface
     cut: FloatArray
     unit: str
+    polygons: IntArray
+    corners: IntArray
+    of_file: IntArray
 
     @property
     def area(self) -> float:
@@ -123,24 +130,34 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
         raise InputError(
             f"its texture reaches out to {farthest:.3g}; a sewn pattern keeps within {_FARTHEST:g}; {_RIGHT}"
         )
-    found = list[tuple[str, Surface, FloatArray]]()
+    found = list[SewnPanel]()
     for number, title in enumerate(_titles(raw, seams.island, name)):
-        polygons, texture = raw.polygons[seams.island == number], raw.texture[seams.island == number]
+        rows = np.flatnonzero(seams.island == number)
+        polygons, texture = raw.polygons[rows], raw.texture[rows]
         used = polygons >= 0
         places, corner = np.unique(texture[used], axis=0, return_inverse=True)
         corners = np.full(polygons.shape, -1, dtype=np.int64)
         corners[used] = corner.ravel()
-        worn = np.zeros((len(places), 3))
-        worn[corner.ravel()] = raw.vertices[polygons[used]] * scale
+        of_file = np.zeros(len(places), dtype=np.int64)
+        of_file[corner.ravel()] = polygons[used]
+        worn = raw.vertices[of_file] * scale
         if float(np.ptp(worn, axis=0).max()) < POSSIBLE[0]:
             continue
         surface = make_surface(worn, corners, name=title, weld=False, source=f"island {title!r}")
-        found.append((title, surface, places[surface.input_index]))
+        # The last entry is that of corners that a face does not have.
+        vertex = np.full(len(places) + 1, -1, dtype=np.int32)
+        vertex[surface.input_index] = np.arange(len(surface.vertices))
+        found.append(
+            SewnPanel(
+                surface=surface, cut=places[surface.input_index], unit="", polygons=rows.astype(np.int32),
+                corners=vertex[corners], of_file=of_file[surface.input_index].astype(np.int32),
+            )
+        )  # fmt: skip
     if not found:
         raise InputError(
             f"every island of its texture is a crumb of less than {1e3 * POSSIBLE[0]:g} mm; is the unit right?"
         )
-    areas = np.array([[mesh_area(cut, surface), mesh_area(surface.vertices, surface)] for _, surface, cut in found])
+    areas = np.array([[panel.area, panel.worn_area] for panel in found])
     flat, worn_area = areas.sum(axis=0)
     if not flat > 0.0:
         raise InputError(f"the islands of its texture have no area; {_RIGHT}")
@@ -156,11 +173,11 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
             f"right; {_RIGHT}"
         )
     panels = list[SewnPanel]()
-    for _, surface, places in found:
-        cut = metres * places
-        a, b, c = np.moveaxis(cut[triangulate(surface.faces)[0]], 1, 0)
+    for panel in found:
+        cut = metres * panel.cut
+        a, b, c = np.moveaxis(cut[triangulate(panel.surface.faces)[0]], 1, 0)
         turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-        panels.append(SewnPanel(surface=surface, cut=cut * [-1.0, 1.0] if turned.sum() < 0.0 else cut, unit=unit))
+        panels.append(replace(panel, cut=cut * [-1.0, 1.0] if turned.sum() < 0.0 else cut, unit=unit))
     for panel in panels:
         # Islands may lie over each other, as layers that are stacked in the plane do.
         own = overlap_area(panel.surface, panel.cut, np.empty(0, dtype=np.int32)) / panel.area
@@ -170,6 +187,28 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
                 f"that is no pattern; {_RIGHT}"
             )
     return panels
+
+
+def with_cuts(raw: RawMesh, panels: Sequence[SewnPanel], cuts: Sequence[FloatArray]) -> RawMesh:
+    """Return the mesh of a file with other cuts of its panels as its texture, in metres; what belongs to no panel has none.
+
+    Corners of faces that repair has dropped go with the nearest vertex of the old texture.
+
+    Args:
+        raw: the mesh of which they are the panels.
+        panels: of :func:`sewn_panels`.
+        cuts: for each of them #V by 2 [m].
+    """
+    from scipy.spatial import cKDTree
+
+    assert raw.texture is not None
+    texture = np.full_like(raw.texture, np.nan)
+    for panel, cut in zip(panels, cuts, strict=True):
+        places, corners = raw.texture[panel.polygons], panel.corners
+        known = corners >= 0
+        near = cKDTree(places[known]).query(np.nan_to_num(places.reshape(-1, 2)))[1].reshape(corners.shape)
+        texture[panel.polygons] = cut[corners[known][near]]
+    return replace(raw, texture=texture)
 
 
 def _titles(raw: RawMesh, island: np.ndarray, name: str) -> list[str]:

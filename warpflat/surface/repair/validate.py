@@ -121,7 +121,7 @@ def make_surface(
         polygons: #F by k vertex indices (counted from 0) filled up with -1 on the right, or a list of lists.
         name: of the piece in files and messages; it must be able to name a file on any system.
         lines: feature lines by name: vertex indices (of `vertices`) along edges.
-        component: the connected part to take if there are several: "largest", or its number, largest first from 0.
+        component: the connected part to take if there are several: "largest", or its number, that of the largest area first, from 0.
         weld: true to join vertices at the same place. By default they are joined if `split_corners` says that the format
             splits them (unless that would close a piece that is one sheet as it stands), if faces are connected in no
             other way, or if several parts become one sheet by it. A cut in one connected part thus stays open.
@@ -415,11 +415,12 @@ def _drop_double_layers(mesh: _Mesh) -> None:
 def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -> None:
     label = mesh.part
     sizes = np.bincount(label)
-    rank = np.argsort(-sizes, kind="stable")
-    valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, largest first'
+    # By area: a fine button, or a body, may have more faces than the cloth.
+    area = np.bincount(label, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1))
+    rank = np.argsort(-np.round(area, 9), kind="stable")
+    valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, by area, largest first'
     if component is None:
         if len(sizes) > 1 and mesh.crowded:
-            area = np.bincount(label, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1))
             small = area < _FIN * area.sum()
             if small.sum() < len(area) - 1:
                 raise InputError(
