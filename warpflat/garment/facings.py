@@ -122,9 +122,9 @@ def with_stand_facings(pattern: Pattern, stands: Sequence[Stand]) -> Pattern:
     seams, called = list(pattern.seams), {seam.name for seam in pattern.seams}
     for stand in stands:
         # "front_left_centre" and "centre front button stand" make "front_left_centre_facing".
-        words = stand.piece.split("_")
-        words += [word for word in stand.edge.removesuffix(f" {STAND}").split(" ") if word not in words]
-        title = "_".join([*words, "facing"])
+        known = stand.piece.split("_")
+        known += [word for word in stand.edge.removesuffix(f" {STAND}").split(" ") if word not in known]
+        title = "_".join([*known, "facing"])
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == stand.piece)
             strip = facing_edges(row[at], (stand.edge,), stand.width)
