@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.mannequin.forms import form_names, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form

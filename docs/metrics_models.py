@@ -509,6 +509,8 @@ class Drape(Entry):
     converged: bool
     residual: float
     steps: int
+    stalled: bool
+    """Given up, as its forces did not become smaller."""
     seconds: float
     vertices: int
     friction: float

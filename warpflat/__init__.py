@@ -54,7 +54,8 @@ if TYPE_CHECKING:
     from warpflat.garment.constraints import FixedLength, Straight
     from warpflat.garment.ease import SeamWish
     from warpflat.garment.edge_rules import EdgeRules
-    from warpflat.garment.garment import Garment, flatten_form
+    from warpflat.garment.form_garment import FormGarment, flatten_form
+    from warpflat.garment.garment import Garment
     from warpflat.garment.pattern_files import PatternOptions, garment_files, surface_files
     from warpflat.garment.sewing import sew
     from warpflat.garment.to_pattern import pattern_of_garment
@@ -117,6 +118,7 @@ _HOME = {
     "FixedLength": "garment.constraints",
     "Flattening": "flattening.result",
     "Form": "mannequin.forms",
+    "FormGarment": "garment.form_garment",
     "FrameWriter": "export.usd",
     "Garment": "garment.garment",
     "Gradient": "flattening.gradient",
@@ -153,7 +155,7 @@ _HOME = {
     "find_seams": "seams.find",
     "flatten": "flattening.flatten_piece",
     "flatten_all": "flattening.flatten_all",
-    "flatten_form": "garment.garment",
+    "flatten_form": "garment.form_garment",
     "form_from_mapping": "mannequin.forms",
     "form_names": "mannequin.forms",
     "garment_files": "garment.pattern_files",
@@ -208,6 +210,7 @@ __all__ = [
     "FixedLength",
     "Flattening",
     "Form",
+    "FormGarment",
     "FrameWriter",
     "Garment",
     "Gradient",

@@ -20,7 +20,7 @@ from warpflat.draping.openings import find_openings, limbs_of
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sew_around import sew_around, stretches
 from warpflat.draping.thin_body import ThinBody, draw_out_limbs
-from warpflat.draping.wrap_pieces import find_sleeves, wrap_pieces
+from warpflat.draping.wrap_pieces import find_roles, wrap_pieces
 from warpflat.pattern.piece_parts import Edge
 from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.surface.connectivity import border_loops
@@ -109,7 +109,7 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     openings = find_openings(meshes, welds)
     assert [each.length for each in openings] == pytest.approx([1.0, ARMHOLE, ARMHOLE, 0.36])
     assert [round(each.turn, 6) for each in openings[:3]] == [0.0, 0.0, 0.0]
-    assert find_sleeves(meshes, welds, {}, openings) == [{"l"}, {"r"}]
+    assert find_roles(meshes, welds, {}, openings) == ([{"l"}, {"r"}], set())
     placed = wrap_pieces(meshes, welds, body)
     for name, side in (("l", "left"), ("r", "right")):
         wrist, cap = (
@@ -143,6 +143,25 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     crumpled = worn.positions * [1.0, 1.0, 2.5]
     with pytest.raises(InputError, match=r"sewn into a tangle, most at '.': .* is stretched by over 50 %"):
         check_sewn(worn.cloth, crumpled, **check)
+
+
+def test_a_sleeve_goes_with_its_cuff_and_a_hood_with_the_face():
+    """The sleeve has no opening of its own then, and is as near to the neck; a hood of two tall halves takes the neck's opening."""
+    pattern = shirt()
+    cuff = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.06), (0.0, 0.06)]
+    half = [(0.0, 0.0), (0.18, 0.0), (0.18, 0.3), (0.0, 0.3)]
+    cuffs = [joined("l.e0", "m.e2"), joined("m.e1", "m.e3"), joined("r.e2", "n.e2"), joined("n.e1", "n.e3")]
+    hood = [joined("p.e4", "x.e0"), joined("q.e4", "y.e0"), joined("x.e2", "y.e2"), joined("x.e1", "y.e3")]
+    pieces = {each.name: each for each in [*pattern.pieces[""], piece("m", cuff), piece("n", cuff)]}
+    meshes, welds = mesh_pieces(pieces, [*pattern.seams, *cuffs], 0.04)
+    sleeves, found = find_roles(meshes, welds, {}, find_openings(meshes, welds))
+    assert sorted(map(sorted, sleeves)) == [["l", "m"], ["n", "r"]]
+    assert found == set()
+    pieces |= {"x": piece("x", half), "y": piece("y", half)}
+    meshes, welds = mesh_pieces(pieces, [*pattern.seams, *cuffs, *hood], 0.04)
+    sleeves, found = find_roles(meshes, welds, {}, find_openings(meshes, welds))
+    assert sorted(map(sorted, sleeves)) == [["l", "m"], ["n", "r"]]
+    assert found == {"x", "y"}
 
 
 def test_cloth_of_the_trunk_starts_inside_the_arms_and_legs_around_the_legs():

@@ -13,7 +13,8 @@ from warpflat.core.errors import InputError
 from warpflat.garment.button_stand import button_depths
 from warpflat.garment.constraints import Straight
 from warpflat.garment.finishing import Finishing
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.linings import add_interfacing
 from warpflat.garment.openings import Buttons, Opening, part_at_centres
 from warpflat.garment.to_pattern import pattern_of_garment

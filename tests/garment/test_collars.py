@@ -13,8 +13,9 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
 from warpflat.garment.collars import Collar
 from warpflat.garment.finishing import Finishing
+from warpflat.garment.form_garment import flatten_form
 from warpflat.garment.free_edges import free_chain, joined_line
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.openings import Buttons, Opening, part_at_centres
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form

@@ -5,7 +5,8 @@ import pytest
 from bodies import body_of_size
 
 from warpflat.core.polyline import turning_angles
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 
 
 @pytest.fixture(scope="module")

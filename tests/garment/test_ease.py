@@ -14,8 +14,9 @@ from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.form_garment import flatten_form
 from warpflat.garment.fullness import FullEdge, give_fullness, measure_fullness
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import FormResult, PieceRecipe, shipped_form
 from warpflat.mannequin.mannequin import Mannequin

@@ -9,7 +9,7 @@ from bodies import body_of_size
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.darts import closed_darts
-from warpflat.garment.garment import flatten_form
+from warpflat.garment.form_garment import flatten_form
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.darts import FormDart
 from warpflat.mannequin.ease import ease_from

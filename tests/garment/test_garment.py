@@ -22,7 +22,8 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import FixedLength
 from warpflat.garment.ease import SeamWish
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.wear import Wear

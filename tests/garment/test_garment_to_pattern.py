@@ -15,8 +15,9 @@ from warpflat.cutting.cut_plan import CutPlan
 from warpflat.cutting.separate_pieces import separate
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.form_garment import flatten_form
 from warpflat.garment.form_plan import plan_form
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.to_pattern import pattern_of_garment, pattern_of_surface
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin

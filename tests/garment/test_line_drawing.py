@@ -9,7 +9,8 @@ import pytest
 from bodies import body_of_size
 
 from warpflat.garment.finishing import Finishing
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.line_drawing import describe_worn
 from warpflat.garment.openings import Buttons, Opening, part_at_centres
 from warpflat.mannequin.forms import shipped_form

@@ -10,7 +10,8 @@ from bodies import body_of_size
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.openings import Opening, one_sided, part_at_centres
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form

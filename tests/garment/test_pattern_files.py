@@ -25,8 +25,8 @@ from warpflat.export.pdf import draw_sheet, sheet_names, write_pdf
 from warpflat.export.svg import write_svg
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.form_garment import flatten_form
 from warpflat.garment.garment import Garment as Flattened
-from warpflat.garment.garment import flatten_form
 from warpflat.garment.pattern_files import PatternOptions, export_patterns, surface_files
 from warpflat.garment.to_pattern import check_edge_names, pattern_of_surface
 from warpflat.mannequin.forms import FormResult

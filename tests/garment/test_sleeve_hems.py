@@ -11,7 +11,8 @@ from bodies import body_of_size
 from warpflat.core.polyline import polyline_length, segment_lengths
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.constraints import Straight, straight_hems
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form

@@ -11,7 +11,8 @@ from bodies import body_of_size
 
 from warpflat.core.toml_file import read_toml
 from warpflat.flattening.verdict import Verdict, judge
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.scene.load import make_scene

@@ -11,7 +11,7 @@ from bodies import stood
 from scans import needs_bodies, scan, scanned_body
 
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.garment import flatten_form
+from warpflat.garment.form_garment import flatten_form
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.outside import BodySurface, push_outside

@@ -113,15 +113,10 @@ def test_a_sliver_narrower_than_its_tolerance_keeps_the_points_of_its_border():
 
 def test_a_line_whose_curve_would_cross_itself_is_as_long_as_its_chords():
     """A back's neckline with corners: a curve that rounds them off turns a loop, so that chords are drawn."""
-    # fmt: off
-    neck = np.array([
-        (0.085138, 0.588926), (0.071108, 0.568379), (0.068319, 0.566933), (0.057702, 0.568961),
-        (0.047573, 0.569919), (0.034658, 0.570619), (0.021451, 0.571161), (0.009195, 0.571456),
-        (0.000022, 0.571527), (-0.009151, 0.571456), (-0.021407, 0.571161), (-0.034614, 0.570619),
-        (-0.047529, 0.569919), (-0.057659, 0.568961), (-0.068275, 0.566933), (-0.071064, 0.568379),
-        (-0.085094, 0.588926),
-    ])
-    # fmt: on
+    half = np.array([
+        (87.0, 589.0), (70.1, 566.8), (70.7, 566.6), (58.2, 570.3), (48.1, 570.7), (34.5, 571.7), (23.0, 571.0), (9.7, 571.0),
+    ])  # fmt: skip
+    neck = 1e-3 * np.concatenate([half, [(0.0, 571.5)], half[::-1] * [-1.0, 1.0]])
     assert drawn_length(neck) == pytest.approx(polyline_length(neck), abs=1e-9)
     drafted = draft_piece(
         Piece(
@@ -133,6 +128,32 @@ def test_a_line_whose_curve_would_cross_itself_is_as_long_as_its_chords():
         )
     )
     assert drafted.edge("neck").length == pytest.approx(drawn_length(neck), abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_borders_that_differ_by_rounding_get_the_same_curve(seed: int):
+    """A back's waist, its own mirror image, whose halves need knots alike, and an armhole, of which finer splines are equally good."""
+    # fmt: off
+    half = np.array([
+        (-180.142, -10.589), (-171.685, -9.179), (-163.378, -7.801), (-155.156, -6.453), (-146.97, -5.144), (-138.788, -3.894),
+        (-130.593, -2.717), (-122.372, -1.624), (-114.117, -0.623), (-105.822, 0.273), (-97.486, 1.065), (-89.111, 1.754),
+        (-80.695, 2.34), (-71.262, 2.878), (-61.783, 3.308), (-52.265, 3.641), (-42.713, 3.892), (-33.132, 4.072),
+        (-23.53, 4.191), (-13.913, 4.258),
+    ])
+    armhole = 1e-3 * np.array([
+        (-183.678, 397.038), (-180.272, 387.461), (-177.625, 377.559), (-175.269, 367.492), (-173.008, 357.324), (-170.581, 346.3),
+        (-168.119, 335.234), (-165.6, 324.143), (-163.025, 313.024), (-160.427, 301.853), (-157.931, 290.547), (-156.19, 278.833),
+        (-156.586, 266.434), (-159.806, 253.17), (-165.129, 239.551), (-171.159, 229.088), (-177.651, 218.5), (-185.149, 208.824),
+        (-194.418, 201.625), (-204.564, 197.459), (-214.488, 195.525),
+    ])
+    # fmt: on
+    waist = 1.3e-3 * np.concatenate([half, [(0.0, 4.279)], half[::-1] * [-1.0, 1.0]])
+    moved = np.random.default_rng(seed).normal(scale=3e-7, size=(41, 2))
+    for line in (waist, waist[::-1], armhole, armhole[::-1]):
+        curves = [fit_curve(each, near=True) for each in (line, line + moved[: len(line)])]
+        one, other = (curve.sample() for curve in curves)
+        assert len(curves[0].bezier) == len(curves[1].bezier)
+        assert shapely.hausdorff_distance(shapely.LineString(one), shapely.LineString(other)) < 5e-6
 
 
 @pytest.mark.parametrize(("as_laid", "longer"), [(False, 1.0), (True, 1.0), (True, 1.1)])

@@ -33,6 +33,8 @@ __all__ = [
 _WARNED_MISS = 0.2
 # Cloth that is so far from its designed surface has fallen off the body [m].
 _FALLEN = 0.3
+# No cloth is worn stretched by more than this share.
+_TORN = 0.5
 _UNITS = {
     "areal_density": "kg/m2",
     "stiffness_warp": "N/m",
@@ -176,8 +178,20 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
     if not drape["converged"]:
         left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
         fallen = drape["distance_m"]["mean"] > _FALLEN
-        remedy = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
+        still = (
+            "its forces no longer fall: a finer spacing_mm or another cloth may help"
+            if drape["stalled"]
+            else "raise max_steps"
+        )
+        remedy = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else still
         lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {remedy} in [drape]")
+    longest = max(
+        (drape[f"strain_{thread}"]["max"] for thread in ("warp", "weft") if f"strain_{thread}" in drape), default=0.0
+    )
+    if longest > _TORN:
+        lines.append(
+            f"the worn cloth is stretched by up to {100 * longest:.0f} %, which no cloth is: it is tangled, or far too small for this body"
+        )
     pattern = metrics.get("pattern", {})
     if differing := pattern.get("seams_that_differ"):
         names = ", ".join(differing[:3]) + (f" and {len(differing) - 3} more" if len(differing) > 3 else "")

@@ -19,6 +19,7 @@ from warpflat.draping.relax_drape import relax_drape
 from warpflat.draping.result import Drape
 from warpflat.draping.sewn_cloth import SewnCloth, sew_cloth
 from warpflat.flattening.result import Flattening
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.pattern.whole_pieces import MIRRORED
@@ -64,7 +65,7 @@ def drape(
     start_warp()
     where = wp.get_device(device)
     if body is None:
-        body = garment.mannequin if isinstance(garment, Garment) else None
+        body = garment.mannequin if isinstance(garment, FormGarment) else None
     surface = body.surface() if isinstance(body, Mannequin) else body
     gripped: list[str] = []
     if surface is None:
@@ -88,7 +89,7 @@ def drape(
         cuts[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
-        hangs_below=hip_level(garment.mannequin if isinstance(garment, Garment) else None), cuts=cuts, threaded=gripped,
+        hangs_below=hip_level(garment.mannequin if isinstance(garment, FormGarment) else None), cuts=cuts, threaded=gripped,
     )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from warpflat.draping.sew_around import sew_around
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.draping.wrap_pieces import UNITS, continue_pieces, find_sleeves, hood_beside_head, wrap_pieces
+from warpflat.draping.wrap_pieces import UNITS, continue_pieces, find_roles, hood_beside_head, wrap_pieces
 from warpflat.fabric.fabric import Fabric
 from warpflat.mannequin.head import head_of
 from warpflat.mannequin.mannequin import Mannequin
@@ -212,17 +212,23 @@ def _sew(
         meshes, welds = mesh_pieces(pieces, seams, spacing, closures(pieces))
     except InputError:
         meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
-    placed = place_pieces(pieces, meshes, welds, body, top=placement.top)
+    openings = find_openings(meshes, welds)
+    sleeves, hood = find_roles(meshes, welds, {name: piece.at for name, piece in pieces.items()}, openings)
+    # A hood hangs where its file says, or is worn up.
+    if any(piece.placement is None for piece in pieces.values()) and head_of(body) is not None:
+        pieces = {name: replace(piece, role="hood") if name in hood else piece for name, piece in pieces.items()}
+        laid = {name: mesh for name, mesh in meshes.items() if name not in hood}
+    else:
+        laid = meshes
+    placed = place_pieces(pieces, laid, welds, body, top=placement.top)
     placed = _continued(placed, pieces, meshes, welds, body)
     cloth, lines = _cloth(pieces, meshes, welds, placed, fabric, turned), limb_lines(body)
-    start, openings = cloth.designed, find_openings(meshes, welds)
+    start = cloth.designed
     high = max(float(points[:, 1].max()) for points in placed.values())
     hooded = high > body.line("collar")[:, 1].max() + _OVER_NECK or any(each.role == "hood" for each in pieces.values())
     solid = _worn_body(body, head=hooded, device=device)
     # The trunk starts inside the arms, and what begins below them passes through.
-    on_arms = set[str]().union(
-        *find_sleeves(meshes, welds, {name: piece.at for name, piece in pieces.items()}, openings)
-    )
+    on_arms = set[str]().union(*sleeves)
     armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
     sleeved, below = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
     for name, rows in cloth.piece_vertices.items():

@@ -111,10 +111,14 @@ def mesh_pieces(
 
 
 def welded_vertices(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> tuple[IntArray, dict[str, int]]:
-    """Return #P, the vertex of the sewn mesh of each vertex of the meshes one after the other, and where each begins."""
+    """Return #P, the vertex of the sewn mesh of each vertex of the meshes one after the other, and where each begins.
+
+    Seams of pieces that have no mesh here are left open.
+    """
     ends = np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist()
     begins = dict(zip(meshes, ends[:-1], strict=True))
-    joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    rows = [[begins[name] + vertex for name, vertex in joint if name in begins] for seam in welds for joint in seam]
+    joints = [(row[0], other) for row in rows for other in row[1:]]
     first, second = np.array(joints, dtype=np.int64).reshape(-1, 2).T
     return join_labels(ends[-1], first, second), begins
 

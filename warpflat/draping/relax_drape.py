@@ -56,6 +56,9 @@ _MEMORY = 20
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
 # It goes on while a hundred steps of it leave less than this share.
 _EASES = 0.8
+# A round, or a hundred steps, gains if it leaves less than this share of the least force so far. After so many rounds without gain the
+# rounds end, and after so many steps of dynamic relaxation beside them the cloth is given up.
+_GAINS, _ROUNDS_IN_VAIN, _STEPS_IN_VAIN = 0.95, 30, 3000
 _BLOCKS = 64
 
 
@@ -69,6 +72,7 @@ class DrapedCloth:
         residual: mean force that is left over a vertex's mean weight.
         converged: whether the cloth is at rest.
         fell_off: whether it was given up because nothing on the body holds it.
+        stalled: whether it was given up because its forces did not become smaller.
         steps: of dynamic relaxation.
         rounds: of minimisation between them.
         seconds: wall clock.
@@ -79,6 +83,7 @@ class DrapedCloth:
     residual: float
     converged: bool
     fell_off: bool
+    stalled: bool
     steps: int
     rounds: int
     seconds: float
@@ -170,7 +175,7 @@ def relax_drape(
         observer: called with the places (#V by 3 [m]) at the start and at every check.
 
     Returns:
-        the cloth; `converged` is False if it met the step limit before it was at rest, or fell off.
+        the cloth; `converged` is False if it met the step limit before it was at rest, was given up, or fell off.
     """
     began, options = time.perf_counter(), options or DrapeOptions()
     start = cloth.designed if start is None else start
@@ -181,8 +186,9 @@ def relax_drape(
     observe = observer or (lambda _: None)
     observe(start)
     lowest = -np.inf if energy.is_held else float(start[:, 1].max()) - _FALLEN
-    fell_off, before = False, np.inf
-    while not fell_off:
+    fell_off, before, stalled = False, np.inf, False
+    least, gained, least_left, gained_round = np.inf, 0, np.inf, 0
+    while not (fell_off or stalled):
         relaxation.run(_STEPS_PER_CHECK)
         steps += _STEPS_PER_CHECK
         residual, worst = relaxation.check()
@@ -192,23 +198,26 @@ def relax_drape(
             callback(steps, residual)
         if converged or steps >= options.max_steps:
             break
+        least, gained = (residual, steps) if residual < _GAINS * least else (least, gained)
+        stalled = steps - gained >= _STEPS_IN_VAIN
         # Dynamic relaxation goes on by itself as long as it serves.
         if residual < _EASES * before:
             before = residual
             continue
         before = np.inf
-        while steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS and not fell_off:
+        while steps >= _FIRST_STEPS and rounds < min(_MOST_ROUNDS, gained_round + _ROUNDS_IN_VAIN) and not fell_off:
             if rounds == 0:
                 energy.load_contact()
             rounds += 1
             left = _minimise(energy, options.tolerance, near=left <= _NEARLY_AT_REST * options.tolerance)
             observe(energy.motion.position.numpy())
             fell_off = float(energy.motion.position.numpy()[:, 1].max()) < lowest
+            least_left, gained_round = (left, rounds) if left < _GAINS * least_left else (least_left, gained_round)
             if left <= options.tolerance:
                 break
     return DrapedCloth(
         positions=energy.motion.position.numpy().copy(), pressing=relaxation.pressing.numpy().copy(),
-        residual=residual, converged=converged, fell_off=fell_off, steps=steps, rounds=rounds,
+        residual=residual, converged=converged, fell_off=fell_off, stalled=stalled, steps=steps, rounds=rounds,
         seconds=time.perf_counter() - began,
     )  # fmt: skip
 

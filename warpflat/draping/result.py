@@ -229,6 +229,7 @@ class Drape:
             "converged": self.worn.converged,
             "residual": self.worn.residual,
             "steps": self.worn.steps,
+            "stalled": self.worn.stalled,
             "seconds": self.worn.seconds,
             "vertices": len(self.positions),
             "friction": self.options.friction,

@@ -14,6 +14,7 @@ from warpflat.export.geometry import outline_edges
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.flattening.result import Flattening
 from warpflat.garment.darts import dart_pairs
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.garment import Garment
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.triangles import corner_triangles
@@ -118,7 +119,7 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
     """
     if isinstance(garment, Garment):
         pieces = dict(garment.pieces)
-        if garment.form is not None:
+        if isinstance(garment, FormGarment):
             folded = [name for name, piece in garment.form.pieces.items() if piece.fold]
             if folded:
                 raise InputError(

@@ -22,7 +22,7 @@ from warpflat.draping.mesh_pieces import FlatMesh, Weld, sewn_places, welded_ver
 from warpflat.draping.openings import Opening, find_openings, limbs_of
 from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["UNITS", "continue_pieces", "find_sleeves", "hood_beside_head", "wrap_pieces"]
+__all__ = ["UNITS", "continue_pieces", "find_roles", "hood_beside_head", "wrap_pieces"]
 
 #: Where a file's units stand.
 UNITS = (
@@ -35,6 +35,8 @@ _LEAST_GIRTH = 0.5
 _WIDTH_OVER_DEPTH = 1.4
 # Openings of both sleeves are equally long but for this share.
 _ALIKE = 0.05
+# A hood is taller than this [m].
+_HOOD = 0.2
 # Sides of a seam that are farther apart than this share of the pieces' width meet behind the body.
 _FAR = 0.25
 # Pieces that hang from the shoulders start this much higher [m].
@@ -90,7 +92,7 @@ def wrap_pieces(
     """
     at, hung, names = dict(at or {}), hung or {}, list(meshes)
     joins, openings = _joins(welds, names), find_openings(meshes, welds)
-    groups = find_sleeves(meshes, welds, at, openings)
+    groups, _ = find_roles(meshes, welds, at, openings)
     on_arms = set[str]().union(*groups)
     trunk = [name for name in names if name not in on_arms]
     if not trunk:
@@ -173,25 +175,24 @@ def wrap_pieces(
     return placed
 
 
-def find_sleeves(
+def find_roles(
     meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], at: Mapping[str, str], openings: Sequence[Opening]
-) -> list[set[str]]:
-    """Return the pieces of each sleeve: those that are told, else those that the seams tell, else those that are called so.
+) -> tuple[list[set[str]], set[str]]:
+    """Return the pieces of each sleeve, and those of a hood: those that are told, else what the seams tell, else by their names.
 
     By the seams a piece goes with the opening that is the fewest seams away. A sleeve goes with one opening, has a twin whose opening is
-    as long, and is not sewn to it, as the legs of trousers are.
+    as long, and is not sewn to it, as the legs of trousers are. A hood goes with one opening of four or more, is tall, is sewn on at its
+    lower side, and not to a sleeve.
 
     Args:
-        meshes: the pieces.
+        meshes: the pieces, upright.
         welds: for each seam the vertices that it joins.
         at: by piece "left arm" or "right arm", where that is told.
         openings: of the garment.
     """
-    told = [{name for name in meshes if at.get(name) == f"{side} arm"} for side in ("left", "right")]
-    if any(told):
-        return [each for each in told if each]
+    sewn = _both_ways(_joins(welds, list(meshes)))
     beside: dict[str, set[str]] = {name: set() for name in meshes}
-    for (a, b), _ in _both_ways(_joins(welds, list(meshes))):
+    for (a, b), _ in sewn:
         beside[a].add(b)
     of = {name: {number for number, each in enumerate(openings) if name in each.pieces} for name in meshes}
     while ring := {
@@ -207,9 +208,36 @@ def find_sleeves(
         if groups[i] and groups[j] and not any(beside[name] & groups[j] for name in groups[i])
     ]
     alike, i, j = min(twins, default=(1.0, 0, 0))
-    if alike < _ALIKE and len(openings) > 2:
-        return [groups[i], groups[j]]
-    return [{name} for name in meshes if "sleeve" in name.lower()]
+    sleeves = [{name for name in meshes if at.get(name) == f"{side} arm"} for side in ("left", "right")]
+    if not any(sleeves):
+        # What a cuff is sewn to is as near to the neck, but has no opening of its own.
+        on_border = set[str]().union(*(each.pieces for each in openings))
+        cuffed = {
+            k: {name for name in set(meshes) - on_border if k in of[name] and beside[name] & groups[k]} for k in (i, j)
+        }
+        twin = alike < _ALIKE and len(openings) > 2
+        sleeves = (
+            [groups[i] | cuffed[i] - cuffed[j], groups[j] | cuffed[j] - cuffed[i]]
+            if twin
+            else [{name} for name in meshes if "sleeve" in name.lower()]
+        )
+    on_arms, hood = set[str]().union(*sleeves), set[str]()
+    for group in groups if len(openings) > 3 else ():
+        ends = [
+            meshes[a].points[own, 1].mean() - meshes[a].points[:, 1].mean()
+            for (a, b), (own, _) in sewn
+            if a in group and b not in group
+        ]
+        tall = any(np.ptp(meshes[name].points[:, 1]) > _HOOD for name in group)
+        if (
+            tall
+            and not group & on_arms
+            and not any(beside[name] & on_arms for name in group)
+            and ends
+            and max(ends) < 0.0
+        ):
+            hood |= group
+    return sleeves, hood
 
 
 @dataclass(frozen=True)

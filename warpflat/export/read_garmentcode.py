@@ -412,7 +412,7 @@ def _chains(panels: Mapping[str, _Panel], partners: Partners) -> list[_Chain]:
 
 
 def _seams(chains: Sequence[_Chain], panels: Mapping[str, _Panel], named: Mapping[EdgeKey, str]) -> list[Seam]:
-    """Return the seams of chains, the longer side last; where stretches differ in ease, it lies between the first and the last eased."""
+    """Return the seams of chains, a longer side last; where stretches differ in ease, it lies between the first and the last eased."""
     seams = []
     for number, chain in enumerate(chains, start=1):
         lengths = [np.array([polyline_length(panels[key].lines[k]) for key, k in side]) for side in chain.sides]
@@ -420,7 +420,7 @@ def _seams(chains: Sequence[_Chain], panels: Mapping[str, _Panel], named: Mappin
         for side, against in zip(chain.sides, chain.against, strict=True):
             edges = {(key, named[key, k]): against[at] for at, (key, k) in enumerate(side)}
             sides.append(tuple(SeamSide(piece=key, edge=edge, reversed=back) for (key, edge), back in edges.items()))
-        if lengths[0].sum() > lengths[1].sum():
+        if lengths[0].sum() > lengths[1].sum() + SEAM_TOLERANCE:
             sides, lengths = sides[::-1], lengths[::-1]
         excess, whole = lengths[1] - lengths[0], float(lengths[0].sum())
         if abs(excess.sum()) <= SEAM_TOLERANCE:

@@ -21,7 +21,7 @@ from warpflat.surface.triangles import triangulate
 
 if TYPE_CHECKING:
     from warpflat.garment.finishing import Finishing
-    from warpflat.garment.garment import Garment
+    from warpflat.garment.form_garment import FormGarment
 
 __all__ = ["finishing_views"]
 
@@ -82,7 +82,7 @@ class _Sheet:
     outlined: bool = True
 
 
-def finishing_views(garment: Garment, sign: float) -> tuple[list[ViewedPiece], list[ViewedPiece]]:
+def finishing_views(garment: FormGarment, sign: float) -> tuple[list[ViewedPiece], list[ViewedPiece]]:
     """Return the finishing pieces of a form as they are seen: what lies behind all other pieces, and what lies before them.
 
     Args:
@@ -90,7 +90,7 @@ def finishing_views(garment: Garment, sign: float) -> tuple[list[ViewedPiece], l
         sign: 1 from the front, -1 from the back.
     """
     behind, before = list[ViewedPiece](), list[ViewedPiece]()
-    for wish in garment.finishing if garment.form is not None else ():
+    for wish in garment.finishing:
         if isinstance(wish.shorten, Mapping):
             # The slanted hem itself is drawn.
             continue
@@ -132,10 +132,9 @@ def _seen(sheet: _Sheet, shown: BoolArray, sign: float, *, lines: bool) -> list[
     return found
 
 
-def _chains(garment: Garment, called: str) -> Iterator[_Chain]:
+def _chains(garment: FormGarment, called: str) -> Iterator[_Chain]:
     """Yield the edges of a name, joined where they meet in space."""
     form = garment.form
-    assert form is not None
     rows = list[tuple[FloatArray, FloatArray, FloatArray]]()
     for piece in form.pieces.values():
         surface = piece.surface

@@ -17,6 +17,7 @@ from warpflat.core.text import other_side, without_side
 from warpflat.flattening.verdict import judge
 from warpflat.garment.button_stand import button_depths
 from warpflat.garment.drawn_finishing import finishing_views
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.girths import pattern_girths
 from warpflat.garment.openings import Buttons, place_opening
 from warpflat.pattern.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
@@ -61,23 +62,23 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         rises: of its slanted hems.
     """
     garment = garments[sample]
-    pieces, half = list(garment.pieces.values()), garment.form is not None and garment.form.half
+    pieces, on_form = list(garment.pieces.values()), garment if isinstance(garment, FormGarment) else None
     # What hangs nearer to the viewer hides what lies behind it: the inside of a back shows above the neck of a front.
     depth = np.array([flat.surface.vertices[:, 2].mean() for flat in pieces])
-    drawn = [_views(flat, half=half) for flat in pieces]
+    drawn = [_views(flat, half=on_form is not None and on_form.form.half) for flat in pieces]
     views = {}
     for index, (name, sign) in enumerate((("front", 1.0), ("back", -1.0))):
-        seen = [
-            _with_slanted_hems(garment, list(garment.pieces)[k], drawn[k][index], sign, rises)
-            for k in np.argsort(sign * depth, kind="stable")
-        ]
-        seen = _wrapped(garment, seen, [list(garment.pieces)[k] for k in np.argsort(sign * depth, kind="stable")], sign)
-        behind, before = finishing_views(garment, sign)
-        details = [] if garment.form is None else list(_openings(garment, sign))
-        views[name] = tuple(piece for piece in (*behind, *seen, *before, *details) if piece.outlines or piece.lines)
+        order = np.argsort(sign * depth, kind="stable").tolist()
+        seen = [drawn[k][index] for k in order]
+        if on_form is not None:
+            names = [list(garment.pieces)[k] for k in order]
+            seen = [_with_slanted_hems(on_form, *each, sign, rises) for each in zip(names, seen, strict=True)]
+            behind, before = finishing_views(on_form, sign)
+            seen = [*behind, *_wrapped(on_form, seen, names, sign), *before, *_openings(on_form, sign)]
+        views[name] = tuple(piece for piece in seen if piece.outlines or piece.lines)
     measures = {}
     for size, each in garments.items():
-        if each.form is not None and each.mannequin is not None:
+        if isinstance(each, FormGarment):
             girths = pattern_girths(each.mannequin, each.form, each.positions)
             measures[size] = tuple(
                 Measure(
@@ -100,7 +101,7 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
     knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
     verdict = judge(garment.metrics())
     failing = dict.fromkeys(finding.kind for finding in verdict.findings if finding.fails) if verdict else {}
-    mens = garment.mannequin is not None and re.search(r"\bmen\b", garment.mannequin.source) is not None
+    mens = on_form is not None and re.search(r"\bmen\b", on_form.mannequin.source) is not None
     fabrics = {flat.fabric.name: flat.fabric for flat in pieces}
     cloths = {
         name: ClothKind(
@@ -115,11 +116,11 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
     )  # fmt: skip
 
 
-def _with_slanted_hems(garment: Garment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:
+def _with_slanted_hems(garment: FormGarment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:
     """Return a piece as it is seen without the strips that slanted hems lose, which lie above their edges."""
     import shapely
 
-    for edge, ids in () if garment.form is None else garment.form.pieces[name].edges.items():
+    for edge, ids in garment.form.pieces[name].edges.items():
         # Of a pair the left piece is drawn, which runs the other way.
         turned = (name, edge) not in rises
         arc, wide = rises.get((other_side(name), other_side(edge)) if turned else (name, edge), ((), ()))
@@ -156,13 +157,13 @@ def _towards(garment: Garment, name: str, ids: IntArray, sign: float) -> FloatAr
     return np.asarray(sign * normals[ids, 2])
 
 
-def _wrapped(garment: Garment, seen: list[ViewedPiece], names: list[str], sign: float) -> list[ViewedPiece]:
+def _wrapped(garment: FormGarment, seen: list[ViewedPiece], names: list[str], sign: float) -> list[ViewedPiece]:
     """Return the pieces as they are seen with those of the right half of a wrap in front, out to their edges on the left half."""
     import shapely
 
     upper = dict[str, ViewedPiece]()
     for opening in garment.openings:
-        if opening.kind != "wrap" or garment.form is None:
+        if opening.kind != "wrap":
             continue
         for part in place_opening(garment.form, opening, garment.positions):
             if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
@@ -187,10 +188,8 @@ def _wrapped(garment: Garment, seen: list[ViewedPiece], names: list[str], sign: 
     return [*(view for name, view in zip(names, seen, strict=True) if name not in upper), *upper.values()]
 
 
-def _openings(garment: Garment, sign: float) -> Iterator[ViewedPiece]:
+def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
     """Yield zips, as teeth and a bar at the lower end, the upper end of slits and vents, as a bar, buttons, and edges of godets."""
-    assert garment.form is not None
-    assert garment.mannequin is not None
     bust = garment.mannequin.layout.lines["bust"]
     for opening in garment.openings:
         if opening.kind in ("keyhole", "wrap"):

@@ -15,6 +15,7 @@ from warpflat.core.file_kinds import foreign_words, other_kind_words
 from warpflat.core.file_names import make_file_name
 from warpflat.core.text import format_count, plain_letters
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.linings import add_interfacing, add_lining, add_pocketing
 from warpflat.garment.strips import CLOTH_WIDTH
 from warpflat.pattern.shrinkage import Shrinkage, enlarged
@@ -145,7 +146,7 @@ def garment_files(
     from warpflat.garment.to_pattern import pattern_of_garment
 
     options, first = options or PatternOptions(), next(iter(garments.values()))
-    if first.form is not None:
+    if isinstance(first, FormGarment):
         check_names(options.names, first.parts)
 
     def make() -> tuple[Pattern, tuple[str, ...]]:

@@ -294,8 +294,6 @@ def meeting_borders(
 
 def unsewn_notes(garment: Garment) -> list[str]:
     """Return a note on each stretch of border of meshes that runs along another and is not sewn, and on how many more there are."""
-    if garment.form is not None:
-        return []
     sewn = {
         (name, min(edge), max(edge))
         for pair in garment.stitching

@@ -30,6 +30,7 @@ from warpflat.garment.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges, hem_rises
 from warpflat.garment.fly import with_flies
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.line_drawing import describe_worn
 from warpflat.garment.mark_openings import mark_openings
@@ -114,7 +115,7 @@ def pattern_of_garment(
             crosses itself, or the sizes differ in their edges.
     """
     rules, sample = rules or EdgeRules(), next(iter(garments.values()))
-    if sample.form is None:
+    if not isinstance(sample, FormGarment):
         pattern, notes = pattern_of_surface(
             list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams
         )
@@ -159,7 +160,7 @@ def pattern_of_garment(
         pattern = _named_by_pieces(pattern)
         pattern = pattern if sample.as_cut is None else _through_vertices(pattern)
         return pattern, (*notes, *more, *equal)
-    forms = {size: garment.form for size, garment in garments.items() if garment.form is not None}
+    forms = {size: garment.form for size, garment in garments.items() if isinstance(garment, FormGarment)}
     form = sample.form
     if sample.wished is not None:
         ease, eased = measure_ease(form, sample.wished, sample.positions)
@@ -247,7 +248,7 @@ def pattern_of_garment(
     girths = {}
     if any(wish.elastic or wish.kind == "hood" for wish in sample.finishing):
         for size, garment in garments.items():
-            assert garment.mannequin is not None
+            assert isinstance(garment, FormGarment)
             girths[size] = {level: each.girth for level, each in garment.mannequin.levels().items()}
             head = garment.mannequin.extremity("head")
             girths[size] |= {} if head is None else {"head": head}

@@ -28,6 +28,11 @@ __all__ = [
 CORNER = np.radians(45.0)
 #: Along a border that is smoothed a corner shows over this many tolerances to either side, and by more than this [rad].
 CORNER_REACH, CORNER_SMOOTHED = 12.0, np.radians(50.0)
+#: An edge bends alike in both halves if its turning, times the shares of its length by which it lies beyond the middle, adds up to less
+#: than this [rad]: more than what rounding of layouts to 1 um makes of one that is its own mirror image.
+EVEN = 5e-4
+#: By how much more the last point of a border weighs than the first one where it is fitted.
+LATER = 1.05
 #: How far [m] a curve may lie from the points of a clean border.
 TOLERANCE = 1e-4
 #: The length of a fitted curve, up to any of its points, is off by at most this [m] wherever that can be had.
@@ -36,6 +41,8 @@ LENGTH = 6e-5
 LENGTH_WEIGHT = 8e-6
 #: A curve of another length than its points' chords may lie this many tolerances from them.
 OTHER_LENGTHS = 3.0
+#: A curve of more segments is taken where its error is less than this share of that of a simpler one.
+CLEARLY = 0.9
 #: A curve that must keep near its points gets the lengths of one that runs inside them by these shares of the
 #: tolerance, until it does keep near. The second number says by how much less its lengths then count.
 INSIDE, NEAR = (0.8, 0.5, 0.2, 0.0), 4.0
@@ -180,7 +187,8 @@ def fit_curve(
     clean[-1] = points[-1]
     wanted = None if lengths is None else lengths[keep]
     arc = arc_lengths(clean)
-    from_end = bool(np.abs(turning_angles(clean)) @ (arc[1:-1] / arc[-1] - 0.5) > 1e-9)
+    # Mirrored edges are fitted from mirrored ends: from the one farther from where they bend.
+    from_end = bool(np.abs(turning_angles(clean)) @ (arc[1:-1] / arc[-1] - 0.5) > EVEN)
     if from_end:
         clean, wanted = clean[::-1], None if wanted is None else wanted[-1] - wanted[::-1]
     # Corners; along a zigzag only those that are so over a longer stretch, too.
@@ -262,7 +270,7 @@ def _fit_run(
         length_error = max(length_error, abs(polyline_length(samples) - float(arc[-1])))
         # The larger of both errors, of place and length, over what is allowed.
         score = max(away / allowed, length_error / (LENGTH * leeway))
-        if len(bezier) < len(points) and score < least:
+        if len(bezier) < len(points) and score < CLEARLY * least:
             best, least = curve, score
         if least <= 1.0:
             break
@@ -280,7 +288,8 @@ def _smoothing_spline(points: FloatArray, at: FloatArray, smoothing: float) -> t
     from scipy.interpolate import splprep
 
     degree = min(3, len(points) - 1)
-    weights = np.ones(len(points))
+    # Of two places that need a knot alike, as on a border that is its own mirror image, one gets it first, whatever the rounding.
+    weights = np.linspace(1.0, LATER, len(points))
     # The ends must stay: they weigh a thousandfold, and the last micrometres are corrected below.
     weights[[0, -1]] = 1e3
     try:

@@ -12,8 +12,8 @@ from typing import Any
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.core.toml_file import tables_as_toml
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.form_plan import plan_form
-from warpflat.garment.garment import Garment
 from warpflat.mannequin.darts import FormDart
 from warpflat.scene.cuts import cut_of_dart, cuts_beside, place_of, scene_with
 from warpflat.scene.form import scene_form, scene_recipe
@@ -38,8 +38,8 @@ class DartEdit:
         scene: that gives the second one.
     """
 
-    before: Garment
-    after: Garment
+    before: FormGarment
+    after: FormGarment
     scene: Scene
 
     def as_dict(self) -> dict[str, Any]:
@@ -55,7 +55,7 @@ class DartEdit:
         })  # fmt: skip
 
 
-def _measures(garment: Garment) -> dict[str, Any]:
+def _measures(garment: FormGarment) -> dict[str, Any]:
     metrics = garment.metrics()
     pieces = metrics["pieces"]
     return {
@@ -133,7 +133,7 @@ def split_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> 
     return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), first, second])
 
 
-def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
+def turn_dart(scene: Scene, dart: str, into: str, garment: FormGarment) -> Scene:
     """Return a scene in which something else takes in what a dart took.
 
     A seam runs along the whole line of the dart, and takes over other darts that point to it. A pleat has the dart's place
@@ -161,7 +161,6 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
         seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0]}
         return scene_with(scene, cuts=[*cuts_beside(*scene_recipe(scene), kept, seam), seam])
     form = garment.form
-    assert form is not None
     fisheyes = {f"{name}.{own}" for name, piece in form.pieces.items() for own in piece.fisheyes}
     if any(f"{old.piece}.{old.name}{side}" in fisheyes for side in ("", " left", " right")):
         raise InputError(
@@ -203,10 +202,9 @@ def _cuts_without(scene: Scene, dart: FormDart, *, keep: bool = False) -> list[d
     return cuts
 
 
-def _shares(dart: FormDart, garment: Garment) -> Mapping[str, tuple[str, float]]:
+def _shares(dart: FormDart, garment: FormGarment) -> Mapping[str, tuple[str, float]]:
     """Return by seam at the mouths of a dart and its mirror image the edge, and the share of it that they take in."""
     form = garment.form
-    assert form is not None
     seams = plan_form(form).seams
     taken: dict[tuple[str, str], float] = {}
     for placed in form.darts:

@@ -9,6 +9,7 @@ import numpy as np
 from warpflat.cutting.ledger import AutoCut, LedgerEntry, RankedBy
 from warpflat.flattening.result import Flattening
 from warpflat.garment.darts import NEAR_ARMHOLE, closed_darts, crowded_darts
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import FormDart, place_darts, usual_darts
@@ -127,7 +128,7 @@ class ClosedDarts(Exception):
         self.without, self.notes = without, notes
 
 
-def without_closed_darts(scene: Scene, garments: Iterable[Garment]) -> tuple[Scene, tuple[str, ...]]:
+def without_closed_darts(scene: Scene, garments: Iterable[FormGarment]) -> tuple[Scene, tuple[str, ...]]:
     """Return a scene without the darts of its shape that cannot be sewn in some size, and one sentence for each.
 
     A body may want no dart where a pattern book has one, such as in the skirt of one whose belly stands out: a dart that does
@@ -144,8 +145,6 @@ def without_closed_darts(scene: Scene, garments: Iterable[Garment]) -> tuple[Sce
     crowded: list[FormDart] = []
     movable: set[str] = set()
     for garment in garments:
-        if garment.form is None or garment.mannequin is None:
-            continue
         closed += [d for d in closed_darts(garment.form, garment.positions) if d.place not in own and d not in closed]
         crowded += [
             d for d in crowded_darts(garment.form, garment.positions) if d.place not in own and d not in crowded
@@ -188,6 +187,7 @@ def require_open_darts(scene: Scene, garments: Iterable[Garment]) -> None:
     Raises:
         ClosedDarts: some of them cannot.
     """
-    without, notes = without_closed_darts(scene, garments)
+    on_form = (garment for garment in garments if isinstance(garment, FormGarment))
+    without, notes = without_closed_darts(scene, on_form)
     if notes:
         raise ClosedDarts(without, notes)

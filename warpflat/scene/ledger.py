@@ -11,7 +11,8 @@ from warpflat.core.errors import InputError
 from warpflat.cutting.candidates import Peaks, find_candidates, find_peaks
 from warpflat.cutting.cut_plan import CutPlan
 from warpflat.cutting.ledger import Ledger, LedgerEntry, RankedBy, coarse_options, make_ledger, try_all
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.form_garment import flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import dart_along, usual_darts
 from warpflat.mannequin.forms import Form

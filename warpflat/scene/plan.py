@@ -23,8 +23,9 @@ from warpflat.garment.as_cut import garment_as_cut
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.drawn_curves import CURVES_MM
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
+from warpflat.garment.form_garment import FormGarment, flatten_form
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
-from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.garment import Garment
 from warpflat.garment.openings import Opening, sized_opening
 from warpflat.garment.pattern_files import PatternOptions, check_names
 from warpflat.garment.sew_pieces import name_seams, sew_pieces
@@ -215,7 +216,7 @@ class GarmentPlan:
         callback: Callable[[str, Progress], bool | None] | None = None,
         recorders: Mapping[str, FrameRecorder] | None = None,
         known: Mapping[str, Flattening] | None = None,
-    ) -> Garment:
+    ) -> FormGarment:
         """Flatten and sew the garment; as :meth:`MeshPlan.flatten`, `known` as :func:`warpflat.flatten_form` takes it.
 
         Raises:

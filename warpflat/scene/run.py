@@ -29,6 +29,7 @@ from warpflat.export.letters import note_on_names
 from warpflat.flattening.fit_report import Remedy
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.verdict import judge
+from warpflat.garment.form_garment import FormGarment
 from warpflat.garment.garment import Garment
 from warpflat.garment.pattern_files import WrittenPattern, garment_files, pattern_names
 from warpflat.garment.sew_pieces import unsewn_notes
@@ -164,7 +165,7 @@ def _run(
             require_open_darts(scene, [garment])
             film.worn = garment.pieces
             # What lies beside a seam that was found, such as a hem, is not a border that was forgotten.
-            notes = unsewn_notes(garment) if getattr(plan, "found", None) is None else []
+            notes = unsewn_notes(garment) if isinstance(plan, MeshPlan) and plan.found is None else []
             fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))
             pictures = Beside(partial(_write_pictures, plan, garment, folder), "drawing the pictures")
             if vertices < _MANY:
@@ -268,9 +269,9 @@ def _measure_fit(
     advised, files = garment, list[str]()
     with optional_step("no cuts that would help were looked for", is_needed=False):
         advised = garment.advised(plan.advise)
-    settings, wearer = plan.scene.settings, advised.wearer
+    settings, wearer = plan.scene.settings, advised.wearer if isinstance(advised, FormGarment) else None
     if settings.output.picture and (settings.wear is not None or (wearer is not None and wearer.is_stretched)):
-        if garment.form is None:
+        if not isinstance(garment, FormGarment):
             for name, part in advised.parts.items():
                 with optional_file(file_in(folder, name, ".wear.png"), files) as path:
                     from warpflat.export.fit_picture import write_wear_picture

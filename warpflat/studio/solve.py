@@ -15,7 +15,7 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.flattening.verdict import Verdict, judge
 from warpflat.garment.darts import measure_darts
-from warpflat.garment.garment import Garment
+from warpflat.garment.form_garment import FormGarment
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.cuts import CutSequence
@@ -52,7 +52,7 @@ class Solution:
     pieces: Mapping[str, Flattening]
     bare: Surface | None = None
     plan: GarmentPlan | None = None
-    garment: Garment | None = None
+    garment: FormGarment | None = None
     notes: tuple[str, ...] = field(default=())
 
     @property
