@@ -145,6 +145,25 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
         check_sewn(worn.cloth, crumpled, **check)
 
 
+def test_a_sleeve_goes_with_its_cuff_and_a_hood_with_the_face():
+    """The sleeve has no opening of its own then, and is as near to the neck; a hood of two tall halves takes the neck's opening."""
+    pattern = shirt()
+    cuff = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.06), (0.0, 0.06)]
+    half = [(0.0, 0.0), (0.18, 0.0), (0.18, 0.3), (0.0, 0.3)]
+    cuffs = [joined("l.e0", "m.e2"), joined("m.e1", "m.e3"), joined("r.e2", "n.e2"), joined("n.e1", "n.e3")]
+    hood = [joined("p.e4", "x.e0"), joined("q.e4", "y.e0"), joined("x.e2", "y.e2"), joined("x.e1", "y.e3")]
+    pieces = {each.name: each for each in [*pattern.pieces[""], piece("m", cuff), piece("n", cuff)]}
+    meshes, welds = mesh_pieces(pieces, [*pattern.seams, *cuffs], 0.04)
+    sleeves, found = find_roles(meshes, welds, {}, find_openings(meshes, welds))
+    assert sorted(map(sorted, sleeves)) == [["l", "m"], ["n", "r"]]
+    assert found == set()
+    pieces |= {"x": piece("x", half), "y": piece("y", half)}
+    meshes, welds = mesh_pieces(pieces, [*pattern.seams, *cuffs, *hood], 0.04)
+    sleeves, found = find_roles(meshes, welds, {}, find_openings(meshes, welds))
+    assert sorted(map(sorted, sleeves)) == [["l", "m"], ["n", "r"]]
+    assert found == {"x", "y"}
+
+
 def test_cloth_of_the_trunk_starts_inside_the_arms_and_legs_around_the_legs():
     body = body_of_size(30.0)
     lines = limb_lines(body)

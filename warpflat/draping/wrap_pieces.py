@@ -210,8 +210,17 @@ def find_roles(
     alike, i, j = min(twins, default=(1.0, 0, 0))
     sleeves = [{name for name in meshes if at.get(name) == f"{side} arm"} for side in ("left", "right")]
     if not any(sleeves):
+        # What a cuff is sewn to is as near to the neck, but has no opening of its own.
+        on_border = set[str]().union(*(each.pieces for each in openings))
+        cuffed = {
+            k: {name for name in set(meshes) - on_border if k in of[name] and beside[name] & groups[k]} for k in (i, j)
+        }
         twin = alike < _ALIKE and len(openings) > 2
-        sleeves = [groups[i], groups[j]] if twin else [{name} for name in meshes if "sleeve" in name.lower()]
+        sleeves = (
+            [groups[i] | cuffed[i] - cuffed[j], groups[j] | cuffed[j] - cuffed[i]]
+            if twin
+            else [{name} for name in meshes if "sleeve" in name.lower()]
+        )
     on_arms, hood = set[str]().union(*sleeves), set[str]()
     for group in groups if len(openings) > 3 else ():
         ends = [
