@@ -262,17 +262,17 @@ def test_a_scene_with_a_drape_reports_it(tmp_path: Path):
 
 
 def test_a_corrected_pattern_halves_the_misfit_and_keeps_its_seams(bodice: warpflat.Garment, worn: warpflat.Drape):
-    found = warpflat.correct_pattern(worn, rounds=4)
+    found = warpflat.correct_pattern(worn, rounds=2)
     assert found.after.converged
     assert found.rounds[-1].misfit < 0.5 * found.rounds[0].misfit
     assert found.rounds[0].misfit == pytest.approx(worn.measures()["misfit_m"]["mean"])
     assert found.seam_difference() < 5e-5
     new = found.apply(bodice)
     assert isinstance(new, warpflat.Garment)
-    # Without darts the armhole gapes: it must become shorter, the less the sooner the cloth locks in shear.
+    # Without darts the armhole gapes: it must become shorter.
     edges = found.edges(bodice)
     for side in ("left", "right"):
-        assert -0.02 < edges[f"front.armhole {side}"]["longer_m"] < -0.001
+        assert -0.02 < edges[f"front.armhole {side}"]["longer_m"] < -0.002
     for name, piece in new.pieces.items():
         moved = np.linalg.norm(piece.positions - bodice.pieces[name].positions, axis=1)
         assert 1e-3 < moved.max() < 0.03

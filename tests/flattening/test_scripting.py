@@ -84,6 +84,7 @@ def test_a_result_shows_itself_in_a_few_lines_and_as_a_picture() -> None:
     assert len(repr(result).splitlines()) <= 3
     assert "81 vertices" in repr(result)
     assert len(repr(result.surface)) < 200
+    assert len(repr(result.network)) < 400
     stream = BytesIO()
     warpflat.plot(result).savefig(stream, format="png")
     assert stream.getvalue().startswith(b"\x89PNG")

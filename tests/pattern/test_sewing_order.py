@@ -131,7 +131,7 @@ def test_a_zip_in_one_side_alone_is_one_zip():
 @pytest.mark.parametrize(
     ("opening", "expected"),
     [
-        (SeamOpening(kind="vent", length=0.1), "Fold the vent of 10 cm below C to one side"),
+        (SeamOpening(kind="vent", length=0.1), "Turn in the long edges of the vent of 10 cm below C"),
         (SeamOpening(kind="slit", length=0.1), "Turn in the edges of the slit of 10 cm below C"),
         (SeamOpening(kind="buttons", length=0.2), "Close A (centre back: back right to back left) below the buttons"),
         (
@@ -149,7 +149,7 @@ def test_every_opening_has_a_step(opening: SeamOpening, expected: str):
 def test_a_zip_above_a_vent_is_closed_down_to_the_vent():
     steps = [step.words for step in sewing_steps(draft_garment(top(ZIP, SeamOpening(kind="vent", length=0.1))), "")]
     assert "Then close the seam below it, down to the vent." in steps[0]
-    assert steps[1].startswith("Fold the vent of 10 cm")
+    assert steps[1].startswith("Turn in the long edges of the vent of 10 cm")
     with pytest.raises(InputError, match=r"unknown kind of opening 'zipp'; did you mean 'zip'\?"):
         SeamOpening(kind="zipp", length=0.1)
 

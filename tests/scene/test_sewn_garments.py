@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from warpflat.core.text import other_side
+from warpflat.fabric.library import load_library
 from warpflat.garment.linings import add_interfacing, add_lining
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.pattern.draft import draft_garment
@@ -40,6 +41,7 @@ SEWN: tuple[tuple[str, dict[str, str]], ...] = (
     ("sweatshirt", {"armhole": "raglan"}),
     ("shift_dress", {"hem": "ruffle", "collar": "flat"}),
     ("gored_skirt", {"hem": "slanted"}),
+    ("jacket", {"lining": "full"}),
 )
 
 
@@ -163,6 +165,12 @@ def test_every_printed_word_is_german(drafted: DraftedGarment):
             draw_piece(piece)
             cutting_words(piece.piece)
     assert words.missed - {""} == set()
+
+
+def test_the_cloths_of_a_shop_have_german_words():
+    german = language_words("de")
+    examples = {each for fabric in load_library().values() for each in fabric.examples}
+    assert {each for each in examples if each not in german} == set()
 
 
 def test_every_technique_has_a_drawing_and_german_words():

@@ -13,19 +13,22 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from warpflat.core.text import other_side, without_side
 from warpflat.flattening.fit_report import no_cut_words, remedy_words
 from warpflat.model.fit import TOLERATED
 
-__all__ = ["MAIN_GIRTHS", "Finding", "Verdict", "judge"]
+__all__ = ["Finding", "Verdict", "judge"]
 
 # Cloth that presses harder is felt as too tight [Pa]: discomfort begins at 60 gf/cm2 (Denton 1972, Fit, stretch and comfort).
 _COMFORT = 5.9e3
 # A garment is too large if its girth exceeds the drafted one by this share: two thirds of the step between sizes, 4 cm on 88.
 _TOO_LARGE = 0.03
-#: Girths that every garment is judged by; others where ease was asked for.
-MAIN_GIRTHS = ("bust", "waist", "hip")
+# Girths that every garment is judged by; others where ease was asked for.
+_MAIN_GIRTHS = ("bust", "waist", "hip")
 # Ease that is missed by more is told [m].
 _EASE_MISSED = 5e-3
+# Left and right are one where their ease is equal within this [m].
+_ALIKE = 5e-4
 _MOST_PLACES = 5
 
 Kind = Literal["held", "pressing", "too large", "misfit", "not at rest", "folds", "ease", "opening"]
@@ -176,22 +179,24 @@ def _girths(girths: Mapping[str, Mapping[str, float]]) -> list[Finding]:
     """Return levels at which the garment is larger than it was drafted, and those whose ease is not the one asked for."""
     found = []
     for level, girth in girths.items():
-        asked = "ease_wanted_m" in girth
-        if not asked and level not in MAIN_GIRTHS:
+        other = girths.get(other_side(level), girth)
+        alike = other is not girth and abs(other["ease_m"] - girth["ease_m"]) < _ALIKE
+        if alike and level != without_side(level) + " left":
             continue
-        drafted = girth["ease_wanted_m"] if asked else girth["form_m"] - girth["body_m"]
-        excess, ease = girth["ease_m"] - drafted, f"{level} {100 * girth['ease_m']:+.1f} cm"
-        if excess > _TOO_LARGE * (girth["body_m"] + drafted):
+        name, asked = without_side(level) if alike else level, girth.get("ease_wanted_m")
+        ease, drafted = girth["ease_m"], girth["form_m"] - girth["body_m"]
+        if (asked is not None or level in _MAIN_GIRTHS) and ease - drafted > _TOO_LARGE * girth["form_m"]:
             found.append(
                 Finding(
                     kind="too large",
                     fails=True,
-                    words=f"too large: {ease}, {100 * drafted:+.1f} were drafted",
-                    remedy=f"take it in at the {level}",
+                    words=f"too large: {name} {100 * ease:+.1f} cm, {100 * drafted:+.1f} were drafted",
+                    remedy=f"take it in at the {name}",
                 )
             )
-        elif asked and abs(excess) > _EASE_MISSED:
-            found.append(Finding(kind="ease", fails=False, words=f"ease: {ease}, {100 * drafted:+.1f} asked for"))
+        elif asked is not None and abs(ease - asked) > _EASE_MISSED:
+            words = f"ease: {name} {100 * ease:+.1f} cm, {100 * asked:+.1f} asked for"
+            found.append(Finding(kind="ease", fails=False, words=words))
     return found
 
 

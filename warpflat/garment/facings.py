@@ -121,7 +121,10 @@ def with_stand_facings(pattern: Pattern, stands: Sequence[Stand]) -> Pattern:
     pieces = {size: list(row) for size, row in pattern.pieces.items()}
     seams, called = list(pattern.seams), {seam.name for seam in pattern.seams}
     for stand in stands:
-        title = f"{stand.piece}_{stand.edge}_facing".replace(" ", "_")
+        # "front_left_centre" and "centre front button stand" make "front_left_centre_facing".
+        known = stand.piece.split("_")
+        known += [word for word in stand.edge.removesuffix(f" {STAND}").split(" ") if word not in known]
+        title = "_".join([*known, "facing"])
         for row in pieces.values():
             at = next(k for k, piece in enumerate(row) if piece.name == stand.piece)
             strip = facing_edges(row[at], (stand.edge,), stand.width)

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.text import without_side
 from warpflat.garment.constraints import KeptGirth
-from warpflat.garment.tapes import PieceEdges
-from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.garment.tapes import PieceEdges, stretch_tape
+from warpflat.garment.wearer import body_rows
+from warpflat.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
 from warpflat.mannequin.profiles import convex_girth
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
     """
     found, piece_edges = [], PieceEdges(mannequin.layout, form)
     for level, girth in pattern_girths(mannequin, form, positions).items():
-        if "ease_wanted_m" not in girth:
+        if "ease_wanted_m" not in girth or level not in RING_LEVELS:
             continue
         factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
         edges = piece_edges.along(_row(mannequin.layout, level))
@@ -55,7 +57,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
 def pattern_girths(
     mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
 ) -> dict[str, dict[str, float]]:
-    """Return the entry `girths` of `metrics.json` for every closed level of the trunk that the pieces go around.
+    """Return the entry `girths` of `metrics.json` for every closed level of trunk, arms and legs that the pieces go around.
 
     The pattern's girth is the length of the level's line in the pieces: a dart on the way adds nothing, nor does a seam. Where
     two pieces meet along the level it is the mean of both. A half piece counts twice. Where the line slopes on the form, as at
@@ -84,6 +86,20 @@ def pattern_girths(
         }
         if level in form.ease:
             found[level]["ease_wanted_m"] = 0.01 * form.ease[level]
+    # Of limbs what the recipe asks for, but between ruled levels, where cloth hangs.
+    limbs, asked = [*ARM_LEVELS, *LEG_LEVELS], form.recipe.ease
+    spans = [sorted(map(limbs.index, pair)) for pair in form.recipe.ruled if set(pair) <= set(limbs)]
+    for (name, _), row, _, axis in body_rows(mannequin):
+        limb = without_side(name)
+        edges = piece_edges.along(row, axis) if limb != name else None
+        if edges is None:
+            continue
+        pattern = float(edges.lengths(positions, len(row)).sum())
+        body, designed = (stretch_tape(points[row], axis).girth for points in (mannequin.vertices, form.vertices))
+        found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
+        level = limb if limb in ARM_LEVELS else f"leg_{limb}"
+        if level in asked and not any(low < limbs.index(level) < high for low, high in spans):
+            found[name]["ease_wanted_m"] = 0.01 * asked[level]
     return found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
-from warpflat.core.text import other_side
+from warpflat.core.text import other_side, without_side
 from warpflat.flattening.verdict import judge
 from warpflat.garment.button_stand import button_depths
 from warpflat.garment.drawn_finishing import finishing_views
@@ -81,8 +81,15 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         if isinstance(each, FormGarment):
             girths = pattern_girths(each.mannequin, each.form, each.positions)
             measures[size] = tuple(
-                Measure(name=level, body=girth["body_m"], finished=girth["pattern_m"], asked=girth.get("ease_wanted_m"))
+                Measure(
+                    name=without_side(level),
+                    body=girth["body_m"],
+                    finished=girth["pattern_m"],
+                    asked=girth.get("ease_wanted_m"),
+                )
                 for level, girth in girths.items()
+                # Arms and legs are told once.
+                if not (level.endswith(" right") and other_side(level) in girths)
             )
     needed = tuple(
         NeededOpening(

@@ -39,24 +39,27 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
 
     names = [edge.name for edge in strip]
     at = names.index(INNER)
-    covered, after, before = names[: at - 1], strip[at - 1], strip[at + 1]
-    edges = []
-    for edge in piece.edges:
-        if edge.name == covered[0]:
-            edges.append(Edge(name=inner, points=strip[at].points[::-1]))
-        elif edge.name in (after.name, before.name):
-            part = after if edge.name == after.name else before
-            if edge.length - part.length < 0.005:
-                raise InputError(
-                    f"{piece.name}: strips meet at {edge.name!r}; make them narrower, or bind one of the edges"
-                )
-            # What the strip leaves of it: the strip lies at the start of the edge after it, at the end of the one before.
-            turn = 1 if edge.name == after.name else -1
-            points = edge.points[::turn]
-            left = points[arc_lengths(points) > part.length + 1e-9]
-            edges.append(replace(edge, points=np.vstack([part.points[::turn][-1:], left])[::turn], vertices=None))
-        elif edge.name not in covered:
-            edges.append(edge)
+    covered, ends = names[: at - 1], {1: strip[at - 1].length, -1: strip[at + 1].length}
+    whole = [edge.name for edge in piece.edges]
+    after = whole.index(covered[0]) + len(covered)
+    # What the strip leaves of the others: it lies along those that follow it, and along those before.
+    rest = [piece.edges[(after + k) % len(whole)] for k in range(len(whole) - len(covered))]
+    for turn, end in ends.items():
+        beside = rest[::turn]
+        while len(beside) > 1 and beside[0].length <= end + 1e-9:
+            end -= beside.pop(0).length
+        edge, points = beside[0], beside[0].points[::turn]
+        if edge.length - end < 0.005:
+            raise InputError(
+                f"{piece.name}: strips meet at {edge.name!r}; make them narrower, or bind one of the edges"
+            )
+        corner = strip[at].points[0 if turn == 1 else -1]
+        left = points[arc_lengths(points) > end + 1e-9]
+        beside[0] = replace(edge, points=np.vstack([corner, left])[::turn], vertices=None)
+        rest = beside[::turn]
+    edges = [Edge(name=inner, points=strip[at].points[::-1]), *rest]
+    start = next(k for name in whole for k, edge in enumerate(edges) if edge.name == name)
+    edges = [*edges[start:], *edges[:start]]
     lines = lines_inside(piece.internal_lines, np.concatenate([edge.points[:-1] for edge in edges]))
     try:
         return replace(piece, edges=edges, internal_lines=lines)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
     from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["BodyFit", "WearerFit", "assess_wearer", "tension_around"]
+__all__ = ["BodyFit", "WearerFit", "assess_wearer", "body_rows", "tension_around"]
 
 #: A row that lies nearer to a level than this [m] is called by its name alone.
 _AT_LEVEL = 2e-3
@@ -143,7 +143,7 @@ def assess_wearer(
     """
     edges = PieceEdges(mannequin.layout, form)
     rows = []
-    for name, vertices, sides, axis in _rows(mannequin):
+    for name, vertices, sides, axis in body_rows(mannequin):
         cloth = edges.along(vertices, axis)
         if cloth is None:
             continue
@@ -200,7 +200,7 @@ def tension_around(fabric: Fabric, grain_angle: float, strain: float) -> float:
     return float(strain / compliance)
 
 
-def _rows(mannequin: Mannequin) -> Iterator[tuple[tuple[str, str], IntArray, dict[str, slice], FloatArray]]:
+def body_rows(mannequin: Mannequin) -> Iterator[tuple[tuple[str, str], IntArray, dict[str, slice], FloatArray]]:
     """Yield the closed rows: (level, place in words), vertices, the columns of each side, and the axis that it is level to."""
     layout = mannequin.layout
     quarter = layout.quarter

@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
+from warpflat.core.short_repr import short_repr
 from warpflat.core.sorting import counting_sort
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells
@@ -80,7 +81,7 @@ class CellModel:
     parameters: ThreadGuard | Cloth
 
 
-@dataclass(kw_only=True, repr=False)
+@dataclass(kw_only=True)
 class SpringNetwork:
     """The mass-spring model of one piece on a device.
 
@@ -94,6 +95,8 @@ class SpringNetwork:
         parts: of pieces beside each other the model and the number of faces of each; of one piece its own.
         springs, cells, guard, cloth, seams, bonds: the structs that the kernels take.
     """
+
+    __repr__ = short_repr
 
     surface: Surface
     fabric: Fabric

@@ -296,7 +296,7 @@ class _Workshop(SewingTasks):
 
         def shape(task: Task) -> tuple[int, bool, bool, bool, bool]:
             """Return the turn of a task; of a seam whether it is eased, closes a ring, joins left and right, and front and back."""
-            if task.technique or not task.seams:
+            if task.technique not in ("", "lining_join"):
                 return task.turn, False, False, False, False
             seam = task.seams[0]
             first, second = ((row[0].piece, row[0].mirrored, row[0].copy) for row in seam.sides)

@@ -44,7 +44,7 @@ _BY_ROLES: tuple[tuple[set[str], str], ...] = (
 #: Techniques that sew a strip, a band or a collar to the garment, and use up its other edges.
 _ON = (
     *("rib", "binding", "ruffle", "waistband_ends", "waistband_ring", "waistband_layers", "cuff", "hood"),
-    *("collar_on", "collar_stand_on", "collar_between", "facing", "stand_and_fall", "collar"),
+    *("collar_on", "collar_stand_on", "collar_between", "collar_under_facing", "facing", "stand_and_fall", "collar"),
 )
 #: Those of them that lengthen an edge.
 BANDS = ("rib", "waistband_ends")
@@ -140,6 +140,9 @@ class SewingTasks:
         """Return whether a seam of halves on the fold, or of pairs, is sewn on both sides of the body."""
         seam, other = group[0], other_side(group[0].name)
         joined = [self.pieces[side.piece] for row in seam.sides for side in row]
+        within = not any(side.mirrored or side.copy for row in seam.sides for side in row)
+        if within and all(piece.quantity == 2 and not piece.on_fold for piece in joined):
+            return len(group) == 1
         both = all(piece.on_fold or piece.is_pair for piece in joined)
         return both and len(group) == 1 and other != seam.name and other not in {each.name for each in self.seams}
 
@@ -192,6 +195,8 @@ class SewingTasks:
             faced = {side.piece for row in seam.sides for side in row if self._grown_on(side.piece)}
             if faced and all(self._free_beside_fold(piece) for piece in faced):
                 return "collar_between"
+            if self._turned_over(seam):
+                return "collar_under_facing"
             return "collar_stand_on" if any("stand" in piece.name for piece in joined) else "collar_on"
         if technique == "pocket_rim" and any(
             edge.kind == "cut" and edge.name == "opening" for piece in joined for edge in piece.edges
@@ -229,6 +234,30 @@ class SewingTasks:
             edge
             for edge in dict.fromkeys(beside)
             if edge not in grown and (piece, edge) not in taken and self.pieces[piece].edge(edge).kind == "seam"
+        ]
+
+    def _turned_over(self, seam: Seam) -> list[Place]:
+        """Return what no seam takes beside a collar: ends of facings, which are turned over its ends, and of button stands."""
+
+        def stem(edge: str) -> str:
+            return without_side(edge).rstrip(" 0123456789")
+
+        taken = {(side.piece, side.edge) for each in self.seams for row in each.sides for side in row}
+        shell = [side for row in seam.sides for side in row if self.pieces[side.piece].role == "shell"]
+        facings = {
+            side.piece
+            for each in self.seams
+            if {other.piece for row in each.sides for other in row} & {other.piece for other in shell}
+            for row in each.sides
+            for side in row
+            if self.pieces[side.piece].role == "facing"
+        }
+        along = {stem(side.edge) for side in shell}
+        return [
+            (piece, edge)
+            for piece in [*sorted(facings), *(pieces_of((side.piece, "") for side in shell) if facings else ())]
+            for edge in self.order[piece]
+            if (piece, edge) not in taken and stem(edge) in along
         ]
 
     def _finish(self, garment: DraftedGarment) -> None:
@@ -311,6 +340,9 @@ class SewingTasks:
                 between[0].pieces.append(name)
             else:
                 add("grown_facing", [name], places)
+        for task in self.tasks:
+            if task.technique == "collar_under_facing":
+                task.uses += take(self._turned_over(task.seams[0]))
         # Linings and facings end at a zip, or are caught in a band or binding, where the shell's edge of the same name is.
         zipped, bound = set[str](), set[str]()
         for task in self.tasks:

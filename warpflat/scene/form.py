@@ -40,7 +40,7 @@ def scene_form(
                 mannequin,
                 built,
                 strain_limit=scene_fabric(scene).strain_limit,
-                openings=scene_openings(scene.settings.openings),
+                openings=scene_openings(scene.settings),
                 finishing=scene_finishing(scene.settings.finishing),
             )
     return mannequin, built
@@ -68,7 +68,7 @@ def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mann
         form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
     with errors_named(f"{scene.where}: form"):
         if not settings.half:
-            form = part_at_centres(mannequin.layout, form, scene_openings(settings.openings))
+            form = part_at_centres(mannequin.layout, form, scene_openings(settings))
         shape = "darts" if settings.shape == "auto" else settings.shape
         woven = not scene_fabric(scene).is_knit
         form = shaped_form(mannequin.layout, form, shape, mannequin.vertices, woven=woven)

@@ -12,7 +12,7 @@ from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.finishing import FINISHES, Finishing
 from warpflat.garment.openings import CENTRES, Buttons, Opening
 from warpflat.garment.pockets import Pocket
-from warpflat.scene.schema import FinishingTable, OpeningTable, PocketTable
+from warpflat.scene.schema import FinishingTable, PocketTable, SceneTable
 
 if TYPE_CHECKING:
     from warpflat.garment.constraints import Constraint
@@ -24,8 +24,9 @@ __all__ = ["scene_finishing", "scene_openings", "scene_pockets", "sewn_centres",
 _WIDTH_MM = {"zip": 0.0, "slit": 15.0, "vent": 40.0, "buttons": 20.0, "keyhole": 12.0, "wrap": 120.0, "godet": 250.0}
 
 
-def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
+def scene_openings(settings: SceneTable) -> list[Opening]:
     """Return the openings that a scene wants."""
+    lined = settings.cloth is not None and settings.cloth.lining != ""
     return [
         Opening(
             kind=table.kind,
@@ -39,14 +40,14 @@ def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
                 diameter=1e-3 * table.button_mm,
                 spacing=1e-3 * table.spacing_mm,
                 count=table.count,
-                facing=table.facing,
+                facing=table.facing or ("separate" if lined else "grown-on"),
                 facing_width=1e-3 * table.facing_mm,
             )
             if table.kind == "buttons"
             else None,
             tie=1e-3 * table.tie_mm if table.kind == "wrap" else 0.0,
         )
-        for table in tables
+        for table in settings.openings
     ]
 
 

@@ -15,7 +15,6 @@ from warpflat.core.file_names import make_file_name
 from warpflat.core.input_files import read_json
 from warpflat.core.text import format_count
 from warpflat.core.toml_file import Table, check_table, read_toml
-from warpflat.flattening.verdict import MAIN_GIRTHS
 from warpflat.mannequin.table import MannequinTable, mannequin_from_table
 from warpflat.scene.load import errors_named, expand_variables
 from warpflat.scene.run import SceneResult
@@ -174,16 +173,18 @@ class OutsideJob:
         )  # fmt: skip
 
     def girths_on_body(self) -> dict[str, dict[str, float]]:
-        """Return the garment's girths at the levels that it is judged by, against the body that it is put on."""
+        """Return the garment's girths against the body that it is put on, where it was drafted with the same ease."""
         levels, found = {} if self.body is None else self.body.levels(), dict[str, dict[str, float]]()
         for level, girth in self.girths.items():
-            drafted = girth.ease_wanted_m
-            if level in MAIN_GIRTHS and drafted is None:
-                drafted = girth.form_m - girth.body_m
-            if level in levels and drafted is not None:
+            if level in levels:
                 body = levels[level].girth
-                ease = {"ease_m": girth.pattern_m - body, "ease_wanted_m": drafted}
-                found[level] = {"body_m": body, "form_m": girth.form_m, "pattern_m": girth.pattern_m, **ease}
+                found[level] = {
+                    "body_m": body,
+                    "form_m": body + girth.form_m - girth.body_m,
+                    "pattern_m": girth.pattern_m,
+                    "ease_m": girth.pattern_m - body,
+                    **({} if girth.ease_wanted_m is None else {"ease_wanted_m": girth.ease_wanted_m}),
+                }
         return found
 
 

@@ -440,7 +440,7 @@ def plan_garment(
     mannequin, form = built or scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
-        openings = scene_openings(settings.openings)
+        openings = scene_openings(settings)
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
         plan = plan_form(form, drawing.rules)

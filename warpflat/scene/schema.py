@@ -505,8 +505,8 @@ class OpeningTable(Table):
     """About how far buttons are apart; one lies on the bust line."""
     count: Annotated[int, Field(ge=2, le=60)] | None = None
     """How many buttons; as many as the spacing gives, if not given."""
-    facing: Literal["grown-on", "separate"] = "grown-on"
-    """Of a button stand."""
+    facing: Literal["grown-on", "separate"] | None = None
+    """Of a button stand; grown on if not given, and separate where the garment is lined, as a lining is sewn to its inner edge."""
     facing_mm: Annotated[float, Field(ge=20, le=200)] = 60.0
     tie_mm: Annotated[float, Field(ge=0, le=2000)] = 900.0
     """Length of the ties of a wrap; 0 for none."""

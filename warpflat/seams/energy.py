@@ -69,8 +69,8 @@ _OTHER_WAY = 0.6
 _SHORTEST, _LONGEST, _BEHIND = 0.03, 0.32, 0.01
 # What hangs by a neck of so many times what can be sewn hangs by less once it is sewn.
 _HARDLY = 1.5
-# Seams and darts at most, mirrored ones counted once; and how many are tried.
-_MOST_ROUNDS, _MOST_TRIALS = 6, 48
+# So many lines are tried at most, mirrored ones counted once.
+_MOST_TRIALS = 96
 # Pieces of as many faces are the same if the sums of their coordinates agree within this [m].
 _SAME = 1e-6
 # A seam costs nothing if closing it brings no more than this share of the garment's cloth beyond the limit, and no more strain energy than
@@ -167,7 +167,7 @@ def cut_by_energy(
     total = sum(piece.area for piece in pieces) or 1.0
     cloth, pieces, trials = _priced(cloth, pieces, anatomy, fabric, options, prepare)
     exhausted = set[int]()
-    tried = rounds = 0
+    tried = 0
     # Who asks for less beyond the limit than is usual takes what brings less.
     wished = min(options.limit / SeamOptions.limit, 1.0)
     parting = _PARTED_FIRST * total < sum(piece.outside for piece in pieces)
@@ -177,10 +177,7 @@ def cut_by_energy(
     if parting and options.most_pieces is None and anatomy.open_front:
         # A jacket has two panels more, one in each sleeve.
         most += 2
-    while rounds < _MOST_ROUNDS:
-        beyond = sum(piece.outside for piece in pieces)
-        if beyond <= options.limit * total:
-            break
+    while (beyond := sum(piece.outside for piece in pieces)) > options.limit * total:
         worst = next(
             (
                 piece
@@ -262,7 +259,6 @@ def cut_by_energy(
                 exhausted.add(_key(twin.mesh))
             continue
         _, candidate, made, new = best
-        rounds += 1
         both = anatomy.mirror is not None and (twin is not None or _is_lopsided(candidate, anatomy))
         side = 0 if not both else _side_of(worst.mesh, anatomy) if twin is not None else _beside(candidate, anatomy)
         names = [_free_name(cloth, candidate, side)]

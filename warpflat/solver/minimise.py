@@ -50,6 +50,8 @@ _WORK, _TRIAL_WORK = 3.0, 0.5
 # After so many iterations over the Laplacian the cloth's own stiffness is factored, where cells are the cloth; and again after each so many
 # times as many.
 _FACTORED, _LATER = 15, 2
+# if the energy has fallen by this share since.
+_CHANGED = 0.03
 # Directions are measured no more often than after so many iterations.
 _RENEWAL = 6
 # A rise of the energy from one measurement of directions to the next, as a share, that makes them follow the layout by less.
@@ -78,13 +80,20 @@ class Cloth:
     energy: Energy
     metric: Metric
     _due: int = _FACTORED
+    _energy_factored: float = np.inf
 
     def factor_stiffness(self, descent: Descent[Point]) -> None:
-        """Take the cloth's own stiffness as the metric, if cells are the cloth, after 15 iterations of a descent, 30, 60 and so on."""
-        state, positions = self.energy.state, descent.point.positions
-        if descent.iterations == self._due and state.network.model == "membrane" and len(positions) <= CHEAP:
-            self._due *= _LATER
-            own = StiffnessFactor(state.network, positions, state.alignments, dtype=np.float32)
+        """Take the cloth's own stiffness as the metric, if cells are the cloth, after 15 iterations of a descent, 30, 60 and so on.
+
+        Cloth that has hardly changed since keeps its factor.
+        """
+        state, point = self.energy.state, descent.point
+        if descent.iterations != self._due or state.network.model != "membrane" or len(point.positions) > CHEAP:
+            return
+        self._due *= _LATER
+        if point.energy < (1.0 - _CHANGED) * self._energy_factored:
+            self._energy_factored = point.energy
+            own = StiffnessFactor(state.network, point.positions, state.alignments, dtype=np.float32)
             self.metric = Metric(own, state.alignments)
             descent.renew(forget=True)
 
