@@ -15,9 +15,9 @@ from dataclasses import replace
 import warp as wp
 
 import warpflat
-from warpflat.flattening.result import Flattening
-from warpflat.surface.mesh import Surface
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.shapes import make_shape
 
 
 def sizes_of(shape: str, vertices: int, triangles: bool) -> list[Surface]:

@@ -28,10 +28,10 @@ from typing import Any
 
 import psutil
 
-from warpflat.batch.plan import Task, load_batch
-from warpflat.batch.run import run_batch
-from warpflat.batch.task import Row, read_row
-from warpflat.cli.run import start_warp_silently
+from warpflat.app.batch.plan import Task, load_batch
+from warpflat.app.batch.run import run_batch
+from warpflat.app.batch.task import Row, read_row
+from warpflat.app.cli.run import start_warp_silently
 
 _FABRICS = (
     "woven", "denim", "trousers", "tablecloth", "jacket", "interlock", "rib", "swim", "ponte", "paper",

@@ -27,11 +27,11 @@ from typing import Any
 
 import numpy as np
 
+from warpflat.app.scene.load import load_scene, make_scene
+from warpflat.app.scene.plan import plan_garment
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.garment import Garment
-from warpflat.model.fit import TOLERATED
-from warpflat.scene.load import load_scene, make_scene
-from warpflat.scene.plan import plan_garment
+from warpflat.flat.model.fit import TOLERATED
+from warpflat.garment.construction.garment import Garment
 
 SCENE = Path(__file__).parents[1] / "scenes" / "basic_block.toml"
 SIZES = ("EU 36", "EU 38", "EU 40", "EU 42", "EU 44")

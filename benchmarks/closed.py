@@ -20,8 +20,8 @@ from real import default_files
 
 import warpflat
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.io.read import read_scan
-from warpflat.surface.mesh import Surface
+from warpflat.flat.surface.io.read import read_scan
+from warpflat.flat.surface.mesh import Surface
 
 # Directions of head, tail and legs, how far each is drawn out over the radius, and how sharply.
 _LIMBS = (

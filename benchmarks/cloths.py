@@ -26,16 +26,16 @@ from scipy.spatial import Delaunay
 
 import warpflat
 from warpflat.core.arrays import FloatArray
-from warpflat.fabric.fabric import Fabric, grain_axes
-from warpflat.fabric.library import find_fabric, load_library
-from warpflat.flattening.progress import Progress
-from warpflat.mannequin.forms import form_names
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.model.membrane import plane_stress
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation
-from warpflat.surface.mesh import Surface
+from warpflat.flat.fabric.fabric import Fabric, grain_axes
+from warpflat.flat.fabric.library import find_fabric, load_library
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.model.membrane import plane_stress
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation
+from warpflat.flat.surface.mesh import Surface
+from warpflat.garment.mannequin.forms import form_names
+from warpflat.garment.mannequin.mannequin import Mannequin
 
 STRAIN = 1e-5
 

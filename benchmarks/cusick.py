@@ -15,8 +15,8 @@ import warp as wp
 from scipy.spatial import Delaunay
 
 import warpflat
-from warpflat.draping.relax_drape import relax_drape
-from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.sewn_cloth import SewnCloth
 
 RADIUS, SUPPORT = 0.15, 0.09
 

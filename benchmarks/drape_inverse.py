@@ -19,11 +19,11 @@ import warp as wp
 from drape_referee import newton_drape
 from scipy.interpolate import RegularGridInterpolator
 
-from warpflat.draping.options import DrapeOptions
-from warpflat.draping.recover_pattern import recover_cloth
-from warpflat.draping.relax_drape import relax_drape
-from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.fabric.library import find_fabric
+from warpflat.flat.fabric.library import find_fabric
+from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.recover_pattern import recover_cloth
+from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.sewn_cloth import SewnCloth
 
 OPTIONS = DrapeOptions(tolerance=2e-3, max_steps=8000)
 Place = Callable[[np.ndarray, np.ndarray], np.ndarray]

@@ -18,9 +18,9 @@ import numpy as np
 import warp as wp
 
 import warpflat
-from warpflat.draping.body import Body
-from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.surface.triangles import triangulate
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.sewn_cloth import SewnCloth
 
 
 def newton_drape(

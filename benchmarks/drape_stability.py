@@ -21,12 +21,12 @@ from drape import dart_both_sides
 
 import warpflat
 from warpflat.core.sums import weighted_percentiles
-from warpflat.draping.body import Body
-from warpflat.draping.drape_pattern import Placement, drape_pattern
-from warpflat.draping.lift import read_lift
-from warpflat.draping.relax_drape import relax_drape
-from warpflat.draping.sewn_cloth import sew_cloth
-from warpflat.garment.to_pattern import pattern_of_garment
+from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
+from warpflat.garment.draping.lift import read_lift
+from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.sewn_cloth import sew_cloth
 
 
 def bodice(size: str, resolution: float, fabric: str, *, darts: bool) -> warpflat.Garment:

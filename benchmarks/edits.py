@@ -21,12 +21,12 @@ from meshes import KINDS, Mesh
 from speed import ALLOWANCE, CLOTH
 
 import warpflat
-from warpflat.cutting.cut_piece import cut
-from warpflat.cutting.cut_plan import CutPlan
-from warpflat.fabric.fabric import Fabric
-from warpflat.flattening.progress import Progress
-from warpflat.flattening.result import Flattening
-from warpflat.surface.mesh import Surface
+from warpflat.flat.cutting.cut_piece import cut
+from warpflat.flat.cutting.cut_plan import CutPlan
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.surface.mesh import Surface
 
 Look = Callable[[Progress], None]
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation
 
 FloatArray = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ import numpy as np
 
 import warpflat
 from warpflat.core.errors import InputError
-from warpflat.export.usd_prims import part_path
+from warpflat.pattern.export.usd_prims import part_path
 
 SCENES = Path(__file__).parents[1] / "scenes"
 
@@ -88,9 +88,9 @@ def seconds(scene: Path, folder: Path, repeats: int, *, compact: bool) -> tuple[
 
 def child(scene: str, folder: str, compact: str) -> None:
     """Run a scene in this process as the program does; print the processor seconds of film and page, imports among them."""
-    from warpflat.cli.run import start_warp_silently
+    from warpflat.app.cli.run import start_warp_silently
+    from warpflat.app.scene.cuts import scene_with
     from warpflat.core.beside import work_beside
-    from warpflat.scene.cuts import scene_with
 
     spent, inside = {"film": 0.0, "page": 0.0}, []
 
@@ -115,8 +115,8 @@ def child(scene: str, folder: str, compact: str) -> None:
         loaded = scene_with(
             loaded, output={**loaded.settings.output.model_dump(exclude_unset=True), "compact_film": True}
         )
-    frames = importlib.import_module("warpflat.scene.frames")
-    page = importlib.import_module("warpflat.review.page")
+    frames = importlib.import_module("warpflat.app.scene.frames")
+    page = importlib.import_module("warpflat.app.review.page")
     for owner, names, part in (
         (frames.Film, ("__enter__", "__exit__"), "film"),
         (frames.FrameRecorder, ("__call__", "record_result", "record_cut_line"), "film"),

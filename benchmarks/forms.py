@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.form_garment import flatten_form
-from warpflat.garment.garment import Garment
-from warpflat.mannequin.forms import form_names, shipped_form
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.shapes import shaped_form
-from warpflat.surface.io.read import read_scan
+from warpflat.flat.surface.io.read import read_scan
+from warpflat.garment.construction.form_garment import flatten_form
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.mannequin.forms import form_names, shipped_form
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.shapes import shaped_form
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mannequin"))
 from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_turn

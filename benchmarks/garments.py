@@ -27,16 +27,16 @@ import numpy as np
 
 import warpflat
 from warpflat.core.sums import weighted_percentiles
-from warpflat.draping.body import Body
-from warpflat.draping.options import DrapeOptions
-from warpflat.draping.relax_drape import relax_drape
-from warpflat.draping.sewn_cloth import sew_cloth
-from warpflat.garment.garment import Garment
-from warpflat.garment.sew_pieces import meeting_borders
-from warpflat.seams.find import FoundSeams
-from warpflat.surface.io.read import SUFFIXES
-from warpflat.surface.mesh import Surface
-from warpflat.surface.tubes import tube_borders
+from warpflat.flat.surface.io.read import SUFFIXES
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.tubes import tube_borders
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.sew_pieces import meeting_borders
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.sewn_cloth import sew_cloth
+from warpflat.garment.seams.find import FoundSeams
 
 # Seconds for a garment in one piece.
 _BEFORE = 60

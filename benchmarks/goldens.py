@@ -51,8 +51,8 @@ import shapely
 from scipy.optimize import least_squares
 
 import warpflat
-from warpflat.export.pattern_json import read_pattern_json
-from warpflat.pattern.sewing_order import sewing_steps
+from warpflat.pattern.drafting.sewing_order import sewing_steps
+from warpflat.pattern.export.pattern_json import read_pattern_json
 
 ROUNDING = Path(__file__).parents[1] / "tests" / "rounding.py"
 sys.path.insert(0, str(ROUNDING.parent))

@@ -37,15 +37,15 @@ from meshes import KINDS, Mesh
 
 import warpflat
 from warpflat.core.compile import start_warp
-from warpflat.draping.body import Body
-from warpflat.draping.drape_energy import DrapeEnergy
-from warpflat.draping.options import DrapeOptions
-from warpflat.draping.sewn_cloth import sew_cloth
-from warpflat.fabric.library import find_fabric
-from warpflat.flattening.develop import develop
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation
+from warpflat.flat.fabric.library import find_fabric
+from warpflat.flat.flattening.develop import develop
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.drape_energy import DrapeEnergy
+from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.sewn_cloth import sew_cloth
 
 TOLERANCE, DRAPE_TOLERANCE = 1e-4, 1e-2
 SMALL = 2_000
@@ -240,7 +240,7 @@ def main() -> int:
     failed = 0
     if not chosen.skip_tests:
         environment = os.environ | {"WARPFLAT_TEST_DEVICE": chosen.device}
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "tests/kernels", "tests/solver"]
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "tests/kernels", "tests/flat/solver"]
         failed = subprocess.run(command, cwd=root, env=environment).returncode
     rows = []
     for device in ("cpu", chosen.device):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from warpflat.model.network import SpringNetwork
+from warpflat.flat.model.network import SpringNetwork
 
 if TYPE_CHECKING:
     from meshes import Mesh

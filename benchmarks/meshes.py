@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, KDTree
 
-from warpflat.surface.connectivity import border_loops
-from warpflat.surface.cut.cut_mesh import cut_along
-from warpflat.surface.io.read import read_surface
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import bodice, dome
+from warpflat.flat.surface.connectivity import border_loops
+from warpflat.flat.surface.cut.cut_mesh import cut_along
+from warpflat.flat.surface.io.read import read_surface
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.flat.surface.shapes import bodice, dome
 
 FloatArray = NDArray[np.float64]
 
@@ -138,7 +138,7 @@ def _line_at(surface: Surface, points: FloatArray) -> NDArray[np.int32]:
 
 
 def _lift(shape: str) -> Callable[[FloatArray, FloatArray], FloatArray]:
-    """Formulas of `warpflat.surface.shapes`, at any parameters."""
+    """Formulas of `warpflat.flat.surface.shapes`, at any parameters."""
 
     def on_dome(u: FloatArray, w: FloatArray) -> FloatArray:
         x, y = 0.5 * (u - 0.5), 0.5 * (w - 0.5)

@@ -27,18 +27,18 @@ from real import default_files
 import warpflat
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.flattening.develop import develop
-from warpflat.flattening.harmonic_layout import harmonic_layout
-from warpflat.flattening.result import Flattening
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.surface.cells import make_cells
-from warpflat.surface.connectivity import components, non_manifold_vertices
-from warpflat.surface.io.read import read_scan, read_surface
-from warpflat.surface.laplacian import laplacian_of
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import make_shape
-from warpflat.surface.triangles import triangulate
+from warpflat.flat.flattening.develop import develop
+from warpflat.flat.flattening.harmonic_layout import harmonic_layout
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.surface.cells import make_cells
+from warpflat.flat.surface.connectivity import components, non_manifold_vertices
+from warpflat.flat.surface.io.read import read_scan, read_surface
+from warpflat.flat.surface.laplacian import laplacian_of
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.mannequin.mannequin import Mannequin
 
 _LOWER = 0.005
 _BODIES = ("body_child", "body_female", "body_male", "body_male_heavy")

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
 
 __all__ = ["FAMILY", "curled_strip", "horseshoe", "slit_disk", "spiral", "two_legs"]
 

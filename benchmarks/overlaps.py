@@ -22,13 +22,13 @@ from real import default_files
 import warpflat
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.flattening.progress import CONTACT
-from warpflat.flattening.result import Flattening
-from warpflat.garment.to_pattern import pattern_of_surface
-from warpflat.solver.options import RelaxOptions
-from warpflat.surface.injective import border_edges_of, crack_edges_of
-from warpflat.surface.io.read import read_surface
-from warpflat.surface.mesh import Surface
+from warpflat.flat.flattening.progress import CONTACT
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.surface.injective import border_edges_of, crack_edges_of
+from warpflat.flat.surface.io.read import read_surface
+from warpflat.flat.surface.mesh import Surface
+from warpflat.garment.construction.to_pattern import pattern_of_surface
 
 _FAR = 0.025
 

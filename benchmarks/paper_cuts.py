@@ -23,10 +23,10 @@ import numpy as np
 
 import warpflat
 from warpflat.core.polyline import polyline_length
-from warpflat.cutting.cut_piece import cut
-from warpflat.cutting.cut_plan import CutPlan
-from warpflat.flattening.result import Flattening
-from warpflat.mannequin.mannequin import Mannequin
+from warpflat.flat.cutting.cut_piece import cut
+from warpflat.flat.cutting.cut_plan import CutPlan
+from warpflat.flat.flattening.result import Flattening
+from warpflat.garment.mannequin.mannequin import Mannequin
 
 #: The paper's strain energies [J].
 PAPER = {"uncut": 1.66, "A": 1.32, "B": 1.16}

@@ -20,9 +20,9 @@ import numpy as np
 import shapely
 from shapely.affinity import affine_transform
 
-from warpflat.export.pattern_json import read_pattern_json
-from warpflat.export.svg import STYLE
-from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.export.pattern_json import read_pattern_json
+from warpflat.pattern.export.svg import STYLE
 
 MM = 25.4 / 72
 #: Half the width [mm] with which printed lines are joined, and how far a printed line may lie from its edge.
@@ -313,7 +313,7 @@ def sew(garment: DraftedGarment, size: str, cuts: list[Cut]) -> list[tuple[str, 
 
 def try_pattern(pattern: Path, pdf: Path | None = None, paper: str = "A4") -> tuple[list, int, int]:
     """Print a `pattern.json` (or take its PDF), cut and sew it; return the seams, pieces found and sheets."""
-    from warpflat.export.pdf import write_pdf
+    from warpflat.pattern.export.pdf import write_pdf
 
     garment = read_pattern_json(pattern)
     size = garment.garment.sample
@@ -332,8 +332,8 @@ def main() -> None:
         source = Path(argument)
         with tempfile.TemporaryDirectory() as folder:
             if source.suffix == ".toml":
-                from warpflat.scene.load import load_scene
-                from warpflat.scene.run import run_scene
+                from warpflat.app.scene.load import load_scene
+                from warpflat.app.scene.run import run_scene
 
                 run_scene(load_scene(source), Path(folder))
                 source = Path(folder)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.sparse.linalg import splu
 
-from warpflat.surface.untangle import signed_cell_areas
+from warpflat.flat.surface.untangle import signed_cell_areas
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]

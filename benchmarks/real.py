@@ -35,20 +35,20 @@ from peers import Clock, Problem, Solver, arap, bff, blender, choose_clock, lscm
 
 import warpflat
 from warpflat.core.arrays import FloatArray
-from warpflat.flattening.progress import Progress
-from warpflat.flattening.result import Flattening
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.model.strain import layout_errors, strain_energy
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation
-from warpflat.surface.half_edges import half_edges_of
-from warpflat.surface.injective import overlap_area
-from warpflat.surface.io.read import read_surface
-from warpflat.surface.io.sewn_panels import read_sewn_panels
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import bodice
-from warpflat.surface.triangles import triangulate
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.model.strain import layout_errors, strain_energy
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation
+from warpflat.flat.surface.half_edges import half_edges_of
+from warpflat.flat.surface.injective import overlap_area
+from warpflat.flat.surface.io.read import read_surface
+from warpflat.flat.surface.io.sewn_panels import read_sewn_panels
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.flat.surface.shapes import bodice
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.mannequin.mannequin import Mannequin
 
 _NEAR_ENERGY, _NEAR_OUTLINE = 1e-3, 1e-4
 _SIZES = ("EU 36", "EU 44")

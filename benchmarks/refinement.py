@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat import Fabric, flatten
-from warpflat.flattening.result import Flattening
-from warpflat.scene.compare import laid_upon
-from warpflat.solver.options import RelaxOptions
-from warpflat.surface.shapes import make_shape
+from warpflat.app.scene.compare import laid_upon
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
 

@@ -22,12 +22,12 @@ import numpy as np
 
 import warpflat
 from warpflat.core.polyline import polyline_length
-from warpflat.flattening.graded import graded_layout
-from warpflat.garment.carry import carry
-from warpflat.garment.level_ease import level_ease, widened
-from warpflat.mannequin.common_body import common_body_of_mannequin, skin_triangles
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.surface.triangles import triangulate
+from warpflat.flat.flattening.graded import graded_layout
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.construction.carry import carry
+from warpflat.garment.construction.level_ease import level_ease, widened
+from warpflat.garment.mannequin.common_body import common_body_of_mannequin, skin_triangles
+from warpflat.garment.mannequin.mannequin import Mannequin
 
 FORMS = ("basic_block", "tshirt", "a_line_skirt", "trousers")
 PAIRS = ("EU 36,EU 42", "EU 42,EU 36", "EU 38,JIS 9AR", "men 46,men 54")

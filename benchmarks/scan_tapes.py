@@ -18,8 +18,8 @@ import numpy as np
 import trimesh
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.surface.io.read import read_scan
+from warpflat.flat.surface.io.read import read_scan
+from warpflat.garment.mannequin.mannequin import Mannequin
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mannequin"))
 from body_copies import COPIES, as_given, copy_of_body

@@ -41,10 +41,10 @@ from peers import (
 )
 
 import warpflat
-from warpflat.flattening.progress import Progress
-from warpflat.flattening.result import Flattening
-from warpflat.model.strain import layout_errors
-from warpflat.surface.triangles import triangulate
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.model.strain import layout_errors
+from warpflat.flat.surface.triangles import triangulate
 
 FloatArray = NDArray[np.float64]
 

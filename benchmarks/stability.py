@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.fabric.fabric import Fabric
-from warpflat.flattening.develop import develop
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation, relax_by_steps
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.flattening.develop import develop
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation, relax_by_steps
+from warpflat.flat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ Energies = Iterator[tuple[float, float]]
 
 
 def approximate_implicit(case: Case, time_step: float, *, damped: bool) -> Energies:
-    """`warpflat.solver.steps`, step by step."""
+    """`warpflat.flat.solver.steps`, step by step."""
     state = Relaxation(case.network, RelaxOptions(time_step=time_step, kinetic_damping=damped), start=case.start)
     while True:
         state.step()

@@ -28,16 +28,16 @@ from real import default_files
 
 import warpflat
 from warpflat.core.arrays import FloatArray
-from warpflat.flattening.progress import Progress
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation
-from warpflat.surface.connectivity import border_of, components
-from warpflat.surface.io.read import read_scan, read_surface
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import make_shape
-from warpflat.surface.triangles import triangulate
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation
+from warpflat.flat.surface.connectivity import border_of, components
+from warpflat.flat.surface.io.read import read_scan, read_surface
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.mannequin.mannequin import Mannequin
 
 _FABRICS = ("isotropic", "cotton", "ponte", "satin", "wool-suiting", "silk")
 _LONGER = 10

@@ -21,9 +21,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 import warpflat
-from warpflat.cli.run import start_warp_silently
-from warpflat.studio.cut_tables import cut_along
-from warpflat.studio.page import Page
+from warpflat.app.cli.run import start_warp_silently
+from warpflat.app.studio.cut_tables import cut_along
+from warpflat.app.studio.page import Page
 
 SCENES = Path(__file__).parents[1] / "scenes"
 # A message with a piece's mesh is larger than this [bytes].

@@ -24,7 +24,7 @@ import numpy as np
 import trimesh
 
 from warpflat.core.arrays import FloatArray
-from warpflat.seams.solid import parts_within
+from warpflat.garment.seams.solid import parts_within
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from seam_solids import skin

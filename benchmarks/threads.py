@@ -20,12 +20,12 @@ import warp as wp
 from machine import step_bytes
 from numpy.typing import NDArray
 
-from warpflat.fabric.fabric import Fabric
-from warpflat.flattening.develop import develop
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.flattening.develop import develop
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation
+from warpflat.flat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
 

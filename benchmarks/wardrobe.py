@@ -22,15 +22,15 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from warpflat.app.scene.load import load_scene
+from warpflat.app.scene.run import run_scene
+from warpflat.app.scene.wardrobe import GarmentOffer, garment_offer, offers, scene_text
 from warpflat.core.errors import InputError
 from warpflat.core.text import other_side
-from warpflat.export.pattern_json import read_pattern_json
-from warpflat.pattern.drafted import DraftedGarment
-from warpflat.pattern.pieces import SeamSide
-from warpflat.pattern.sewing_order import SewingStep, sewing_steps
-from warpflat.scene.load import load_scene
-from warpflat.scene.run import run_scene
-from warpflat.scene.wardrobe import GarmentOffer, garment_offer, offers, scene_text
+from warpflat.pattern.drafting.drafted import DraftedGarment
+from warpflat.pattern.drafting.pieces import SeamSide
+from warpflat.pattern.drafting.sewing_order import SewingStep, sewing_steps
+from warpflat.pattern.export.pattern_json import read_pattern_json
 
 WEARERS: Mapping[str, Mapping[str, Any]] = {
     "EU 36": {"size": "EU 36"},

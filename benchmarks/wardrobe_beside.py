@@ -27,14 +27,14 @@ from typing import Any
 
 import numpy as np
 
+from warpflat.app.scene.load import make_scene
+from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.wardrobe import garment_offer, scene_text
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.garment import Garment
-from warpflat.garment.to_pattern import pattern_of_garment
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.pattern.draft import draft_garment
-from warpflat.scene.load import make_scene
-from warpflat.scene.plan import plan_garment
-from warpflat.scene.wardrobe import garment_offer, scene_text
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.pattern.drafting.draft import draft_garment
 
 if sys.version_info >= (3, 11):
     import tomllib

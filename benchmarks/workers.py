@@ -59,9 +59,9 @@ def slower_beside(count: int) -> float:
 
 def child(begun: float, tasks: int, workers: int, film: bool) -> dict[str, Any]:
     """Run a batch in this process; return when its tasks began and ended, in seconds since `begun`."""
-    from warpflat.batch.plan import load_batch
-    from warpflat.batch.run import run_batch
-    from warpflat.cli.run import start_warp_silently
+    from warpflat.app.batch.plan import load_batch
+    from warpflat.app.batch.run import run_batch
+    from warpflat.app.cli.run import start_warp_silently
 
     fabrics = _FABRICS[: -(-tasks // len(_SIZES))]
     with tempfile.TemporaryDirectory() as name:

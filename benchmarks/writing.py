@@ -25,8 +25,8 @@ from meshes import KINDS, Mesh
 from speed import CLOTH
 
 import warpflat
-from warpflat.flattening.result import Flattening
-from warpflat.garment.pattern_files import surface_files
+from warpflat.flat.flattening.result import Flattening
+from warpflat.garment.construction.pattern_files import surface_files
 
 SCENE = Path(__file__).parents[1] / "scenes" / "dome.toml"
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
-from warpflat.export.picture import PicturePiece, write_picture
-from warpflat.export.piece_files import picture_piece
-from warpflat.flattening.result import Flattening
+from warpflat.flat.flattening.result import Flattening
+from warpflat.pattern.export.picture import PicturePiece, write_picture
+from warpflat.pattern.export.piece_files import picture_piece
 
 RESOLUTION = 65
 

@@ -13,10 +13,10 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 
 import warpflat
-from warpflat.export.figure import new_figure, write_figure
-from warpflat.mannequin.body_model import finer_body
-from warpflat.scene.fit import FitJob
-from warpflat.surface.triangles import triangulate
+from warpflat.app.scene.fit import FitJob
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.mannequin.body_model import finer_body
+from warpflat.pattern.export.figure import new_figure, write_figure
 
 BODIES = ("EU 38", "EU 44", "men 54")
 SKIN, CLOTH, LIGHT = (0.86, 0.78, 0.71), (0.36, 0.52, 0.68), np.array([0.3, 0.4, 0.87])

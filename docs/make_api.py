@@ -10,14 +10,14 @@ from pathlib import Path
 import warpflat
 
 GROUPS = {
-    "Surfaces": ("surface",),
-    "Fabrics and wear": ("fabric", "model"),
-    "Flattening": ("flattening", "solver"),
-    "Cutting": ("cutting", "seams"),
-    "Bodies and forms": ("mannequin",),
-    "Garments and patterns": ("garment", "pattern", "export"),
-    "Drape": ("draping",),
-    "Scenes": ("scene",),
+    "Surfaces": ("flat.surface",),
+    "Fabrics and wear": ("flat.fabric", "flat.model"),
+    "Flattening": ("flat.flattening", "flat.solver"),
+    "Cutting": ("flat.cutting", "garment.seams"),
+    "Bodies and forms": ("garment.mannequin",),
+    "Garments and patterns": ("garment.construction", "pattern.drafting", "pattern.export"),
+    "Drape": ("garment.draping",),
+    "Scenes": ("app.scene",),
     "Errors": ("core",),
 }
 
@@ -29,8 +29,8 @@ def api_page() -> str:
         ValueError: a public name lies in a room that no group lists.
     """
     homes = {name: home for name, home in warpflat._HOME.items() if not name.startswith("_")}
-    known = {room for rooms in GROUPS.values() for room in rooms}
-    if lost := sorted(name for name, home in homes.items() if home.split(".")[0] not in known):
+    known = tuple(f"{room}." for rooms in GROUPS.values() for room in rooms)
+    if lost := sorted(name for name, home in homes.items() if not home.startswith(known)):
         raise ValueError(f"no group for {', '.join(lost)}")
     blocks = [
         "# Python reference",
@@ -39,7 +39,7 @@ def api_page() -> str:
     for title, rooms in GROUPS.items():
         blocks.append(f"## {title}")
         for name, home in sorted(homes.items(), key=lambda each: each[0].lower()):
-            if home.split(".")[0] not in rooms:
+            if not home.startswith(tuple(f"{room}." for room in rooms)):
                 continue
             kind = "autoclass" if isinstance(getattr(warpflat, name), type) else "autofunction"
             members = "\n   :members:" if kind == "autoclass" else ""

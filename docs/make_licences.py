@@ -62,7 +62,7 @@ def licences_page() -> str:
     """Return the page."""
     lines = [
         "# Third-party licences", "",
-        "warpflat is under Apache 2.0. It contains no code of others. Its data `mannequin/data/body_model.npz`",
+        "warpflat is under Apache 2.0. It contains no code of others. Its data `garment/mannequin/data/body_model.npz`",
         "are made from MakeHuman's base mesh, targets and skin weights, which are CC0 1.0 (`make_body_model.py` beside them).",
         "An installation, with the extras `batch` and `studio`, brings these packages",
         "(`python docs/make_licences.py` reads them from the packages themselves):", "",

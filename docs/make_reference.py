@@ -22,14 +22,14 @@ from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 
 import warpflat
+from warpflat.app.scene.schema import SceneTable
 from warpflat.core.toml_file import Table, read_toml
-from warpflat.export.pattern_json import PatternEntry
-from warpflat.mannequin.blend import Adjustment
-from warpflat.mannequin.ease import EASE_PRESETS
-from warpflat.scene.schema import SceneTable
-from warpflat.solver.options import RelaxOptions
-from warpflat.surface.first_shapes import PIECES
-from warpflat.surface.shapes import SHAPES
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.surface.first_shapes import PIECES
+from warpflat.flat.surface.shapes import SHAPES
+from warpflat.garment.mannequin.blend import Adjustment
+from warpflat.garment.mannequin.ease import EASE_PRESETS
+from warpflat.pattern.export.pattern_json import PatternEntry
 
 DOCS = Path(__file__).resolve().parent
 SCHEMAS = DOCS.parent / "schemas"

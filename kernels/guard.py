@@ -42,7 +42,7 @@ MIRRORED = wp.constant(2)
 
 @wp.struct
 class ThreadGuard:
-    """The energy that keeps threads straight and faces unfolded (see `warpflat.model.network`).
+    """The energy that keeps threads straight and faces unfolded (see `warpflat.flat.model.network`).
 
     warp, weft: unit vectors in the plane.
     stiffness_warp, stiffness_weft: [N/m].

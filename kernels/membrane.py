@@ -167,7 +167,7 @@ def bound_membrane(
 ):
     """Compute each cell's share of the k_ij along its sides, which bound the membrane's stiffness at these positions.
 
-    It is what `warpflat.model.membrane.step_matrix` gives for a cell at rest: cotangents in the metric of the bounds
+    It is what `warpflat.flat.model.membrane.step_matrix` gives for a cell at rest: cotangents in the metric of the bounds
     along warp and weft, of which negative ones may be left out.
 
     position: #V [m]. weight: 3 #C, along the sides 0-1, 1-2, 2-0 [N/m]; a mirrored cell's is left as it was.

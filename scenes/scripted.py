@@ -6,8 +6,8 @@ python scenes/scripted.py
 from __future__ import annotations
 
 import warpflat
-from warpflat.flattening.progress import Progress
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.surface.shapes import make_shape
 
 
 class Watch:

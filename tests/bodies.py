@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.mannequin.common_body import CommonBody, common_body_of_mannequin
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.stand_body import StandingBody, stand_body
+from warpflat.garment.mannequin.common_body import CommonBody, common_body_of_mannequin
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
 
 __all__ = ["body_of_size", "built_once", "laid_once", "stood"]
 

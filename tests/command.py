@@ -35,7 +35,7 @@ Command = Callable[..., Ended]
 
 def command_in(folder: Path, capfd: pytest.CaptureFixture[str]) -> Command:
     """Return what runs the command line, given its words, and tells how it ended and what it changed below a folder."""
-    from warpflat.cli.main import main
+    from warpflat.app.cli.main import main
 
     def run(*arguments: str) -> Ended:
         before = snapshot(folder)

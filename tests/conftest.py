@@ -52,22 +52,22 @@ def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
     """
     from bodies import built_once, laid_once, stood
 
-    from warpflat.pattern.tile_nesting import orders
+    from warpflat.pattern.drafting.tile_nesting import orders
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("warpflat.mannequin.read_body.stand_body", stood)
+        patch.setattr("warpflat.garment.mannequin.read_body.stand_body", stood)
         if request.path.parent.name != "mannequin":
-            patch.setattr("warpflat.mannequin.mannequin.Mannequin.from_size", built_once)
-            patch.setattr("warpflat.mannequin.common_body.common_body_of_mannequin", laid_once)
+            patch.setattr("warpflat.garment.mannequin.mannequin.Mannequin.from_size", built_once)
+            patch.setattr("warpflat.garment.mannequin.common_body.common_body_of_mannequin", laid_once)
         if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
-            patch.setattr("warpflat.pattern.tile_nesting.orders", lambda masks: orders(masks)[:1])
+            patch.setattr("warpflat.pattern.drafting.tile_nesting.orders", lambda masks: orders(masks)[:1])
         # What has crashed OpenUSD once is not read in this process.
         if (
             request.path.parent.name in ("surface", "export", "review")
             and request.path.name != "test_regression_meshes.py"
         ):
-            patch.setattr("warpflat.surface.io.read.read_apart", _read_here)
-            patch.setattr("warpflat.review.film.read_apart", _read_here)
+            patch.setattr("warpflat.flat.surface.io.read.read_apart", _read_here)
+            patch.setattr("warpflat.app.review.film.read_apart", _read_here)
         yield
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.surface.mesh import Surface
+from warpflat.flat.surface.mesh import Surface
 
 
 def grid(n: int, m: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

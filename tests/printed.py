@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import shapely
 
-from warpflat.export.pdf import draw_sheet
-from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
-from warpflat.pattern.half_pieces import halved
-from warpflat.pattern.words import printed_in
+from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.half_pieces import halved
+from warpflat.pattern.drafting.words import printed_in
+from warpflat.pattern.export.pdf import draw_sheet
 
 # What is drawn on a border may lie beyond it by this much [m].
 ON_BORDER = 2e-4

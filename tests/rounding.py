@@ -1,6 +1,6 @@
 """Rounding noise: what linear solves and reductions return, as if another processor had rounded it.
 
-    python -m pytest -q tests/solver --rounding 1         the tests under the noise of a seed
+    python -m pytest -q tests/flat/solver --rounding 1         the tests under the noise of a seed
     python tests/rounding.py 1 run scenes/dome.toml       a command under it
     python benchmarks/goldens.py --rounding 1 2 3         goldens under three
 
@@ -108,6 +108,6 @@ def disturb(seed: int) -> None:
 
 if __name__ == "__main__":
     disturb(int(sys.argv[1]))
-    from warpflat.cli.main import main
+    from warpflat.app.cli.main import main
 
     sys.exit(main(sys.argv[2:]))

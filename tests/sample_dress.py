@@ -12,8 +12,8 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.pattern.piece_parts import Dart, Edge
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.piece_parts import Dart, Edge
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["sample_dress"]
 

@@ -8,9 +8,9 @@ from itertools import permutations
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.seams.cloth import Cloth
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.garment.seams.cloth import Cloth
 
 # An opening reaches so far around its point [m]; the first, a hem, further.
 _REACH = 0.1

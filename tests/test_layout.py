@@ -1,4 +1,4 @@
-"""The rooms of the package: imports between them run one way, and none runs in a circle.
+"""The layers of the package and their rooms: imports between them run one way, and none runs in a circle.
 
 Every import counts: at the top of a module, inside a function, for types alone, and by a dotted name in a table of lazy names.
 """
@@ -22,6 +22,14 @@ PACKAGE = Path(warpflat.__file__).parent
 ROOT = PACKAGE.parent
 KERNELS = ROOT / "kernels" if (ROOT / "kernels").is_dir() else PACKAGE / "kernels"
 
+#: The layers, from the paper up, and their rooms. `core` and `kernels` lie beneath.
+LAYERS = {
+    "flat": "surface fabric model solver flattening cutting",
+    "pattern": "drafting export",
+    "garment": "mannequin construction draping seams",
+    "app": "scene cli studio batch review",
+}
+
 #: Each room, and the rooms from which it may import. Kernels of the warpflat.kernels package import each other alone.
 ROOMS = {
     "core": "kernels",
@@ -29,19 +37,19 @@ ROOMS = {
     "fabric": "core",
     "model": "core surface fabric kernels",
     "solver": "core surface fabric model kernels",
-    "pattern": "core surface",
-    "export": "core surface fabric model flattening cutting pattern kernels",
+    "drafting": "core surface",
+    "export": "core surface fabric model flattening cutting drafting kernels",
     "flattening": "core surface fabric model solver kernels",
     "cutting": "core surface model solver flattening",
-    "mannequin": "core surface pattern export kernels",
-    "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
-    "draping": "core surface fabric model solver pattern export flattening mannequin garment kernels",
-    "seams": "core surface fabric model solver pattern flattening cutting garment",
+    "mannequin": "core surface drafting export kernels",
+    "construction": "core surface fabric model solver drafting export flattening cutting mannequin",
+    "draping": "core surface fabric model solver drafting export flattening mannequin construction kernels",
+    "seams": "core surface fabric model solver drafting flattening cutting construction",
     "review": "core surface export",
-    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review",
-    "batch": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review scene",
-    "studio": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review scene",
-    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping seams review scene batch studio",
+    "scene": "core surface fabric model solver drafting export flattening cutting mannequin construction draping seams review",
+    "batch": "core surface fabric model solver drafting export flattening cutting mannequin construction draping seams review scene",
+    "studio": "core surface fabric model solver drafting export flattening cutting mannequin construction draping seams review scene",
+    "cli": " ".join([*LAYERS.values(), "core"]),
     "kernels": "",
 }
 
@@ -81,14 +89,29 @@ def _imports(module: str) -> set[str]:
 
 
 def _room(module: str) -> str:
-    parts = module.split(".")
-    return parts[1] if len(parts) > 1 else ""
+    """The room of a module; of the door of a layer the layer."""
+    parts = [part for part in module.split(".")[1:3] if part]
+    return "" if not parts else parts[-1] if parts[0] in LAYERS else parts[0]
 
 
 def test_every_module_lies_in_a_room() -> None:
     loose = {module for module in MODULES if len(module.split(".")) == 2 and MODULES[module].stem != "__init__"}
     assert loose == {"warpflat.__main__", "warpflat._version"}
-    assert {_room(module) for module in MODULES} == {*ROOMS, "", "__main__", "_version"}
+    assert {_room(module) for module in MODULES} == {*ROOMS, *LAYERS, "", "__main__", "_version"}
+    rooms = {layer: {path.parent.name for path in (PACKAGE / layer).glob("*/__init__.py")} for layer in LAYERS}
+    assert rooms == {layer: set(names.split()) for layer, names in LAYERS.items()}
+    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - {"kernels"} == {"core", *LAYERS}
+
+
+def test_a_layer_imports_from_layers_below_it() -> None:
+    order = {room: number for number, rooms in enumerate(LAYERS.values()) for room in rooms.split()}
+    wrong = {
+        f"{module} imports {name}"
+        for module in MODULES
+        for name in _imports(module)
+        if order.get(_room(name), -1) > order.get(_room(module), len(LAYERS))
+    }
+    assert wrong == set()
 
 
 @pytest.mark.parametrize("room", list(ROOMS))
@@ -155,8 +178,13 @@ def test_contributing_draws_the_house_as_it_is() -> None:
 
 def test_tests_lie_in_the_room_of_what_they_test() -> None:
     here = Path(__file__).parent
-    folders = {path.parent.relative_to(here).parts[0] for path in here.rglob("test_*.py") if path.parent != here}
-    assert folders <= {*ROOMS, "fuzz"}
+    folders = {str(path.parent.relative_to(here)) for path in here.rglob("test_*.py") if path.parent != here}
+    assert folders <= {
+        "core",
+        "kernels",
+        "fuzz",
+        *(f"{layer}/{room}" for layer in LAYERS for room in LAYERS[layer].split()),
+    }
     assert {path.name for path in here.glob("test_*.py")} == {Path(__file__).name}
 
 

@@ -6,8 +6,8 @@ import gc
 import os
 import sys
 
-from warpflat.cli.internal_error import report_internal_error
-from warpflat.cli.signals import end_at_once, ignore_at_exit
+from warpflat.app.cli.internal_error import report_internal_error
+from warpflat.app.cli.signals import end_at_once, ignore_at_exit
 
 __all__ = ["program"]
 
@@ -29,7 +29,7 @@ def program() -> int:
     _silence_libraries()
     code: int | None = None
     try:
-        from warpflat.cli.main import main
+        from warpflat.app.cli.main import main
 
         code = main()
     except Exception as error:

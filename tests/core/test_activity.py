@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from warpflat.cli.main import main
-from warpflat.cli.progress_bar import ProgressBar
+from warpflat.app.cli.main import main
+from warpflat.app.cli.progress_bar import ProgressBar
 from warpflat.core.activity import activity_listener, report_activity
 
 
@@ -63,8 +63,8 @@ def test_the_bar_shows_what_is_being_done_and_then_steps_again(monkeypatch: pyte
     stream = Terminal()
     look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy_j=0.0021, residual=0.5)
     monkeypatch.setattr("sys.stderr", stream)
-    monkeypatch.setattr("warpflat.cli.progress_bar._REFRESH", 0.0)
-    monkeypatch.setattr("warpflat.cli.progress_bar._TICK", 0.05)
+    monkeypatch.setattr("warpflat.app.cli.progress_bar._REFRESH", 0.0)
+    monkeypatch.setattr("warpflat.app.cli.progress_bar._TICK", 0.05)
     with ProgressBar("cap") as bar:
         report_activity("compiling kernels")
         assert re.search(r"\rcap: compiling kernels \[00:\d\d\]", stream.getvalue())

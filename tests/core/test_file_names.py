@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 
 import warpflat
-from warpflat.cli.main import main
+from warpflat.app.cli.main import main
+from warpflat.app.scene.load import make_scene
+from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_file_name, make_file_name
-from warpflat.garment.pattern_files import export_patterns
-from warpflat.mannequin.forms import form_from_mapping
-from warpflat.scene.load import make_scene
-from warpflat.scene.run import run_scene
-from warpflat.surface.io.read import read_surface
-from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.surface.io.read import read_surface
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.construction.pattern_files import export_patterns
+from warpflat.garment.mannequin.forms import form_from_mapping
 
 BAD = {
     "": "it is empty",

@@ -16,12 +16,12 @@ from warpflat.core import launch as launching
 from warpflat.core.errors import InputError
 from warpflat.core.launch import Launch, Sequence, launch_each, record, split_range
 from warpflat.core.threads import thread_count
-from warpflat.fabric.library import find_fabric
-from warpflat.flattening.develop import develop
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.options import RelaxOptions
-from warpflat.solver.steps import Relaxation
-from warpflat.surface.shapes import bodice
+from warpflat.flat.fabric.library import find_fabric
+from warpflat.flat.flattening.develop import develop
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.steps import Relaxation
+from warpflat.flat.surface.shapes import bodice
 
 
 @pytest.mark.parametrize("size", [0, 1, 63, 512, 1000, 1024, 5000, 100_003])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from warpflat.cli.main import main
+from warpflat.app.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FORMATS, file_digest, read_json, read_result, reading
 
@@ -91,7 +91,7 @@ def test_no_command_waits_for_a_pipe_or_reads_gigabytes(tmp_path, monkeypatch, c
 
 def test_an_internal_error_has_a_line_and_an_exit_code_of_its_own(monkeypatch, capsys):
     monkeypatch.delenv("WARPFLAT_TRACEBACK", raising=False)
-    monkeypatch.setattr("warpflat.cli.main.cli.main", lambda **_: {}["gone"])
+    monkeypatch.setattr("warpflat.app.cli.main.cli.main", lambda **_: {}["gone"])
     assert main(["fabrics"]) == 70
     told = capsys.readouterr().err
     assert told.startswith("warpflat: internal error")

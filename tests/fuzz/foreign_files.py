@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.cli.main import main
-from warpflat.export.pattern_json import pattern_json
-from warpflat.pattern.draft import draft_garment
-from warpflat.pattern.piece_parts import Edge, Hole
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.app.cli.main import main
+from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.piece_parts import Edge, Hole
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.export.pattern_json import pattern_json
 
 from .promise import Case
 

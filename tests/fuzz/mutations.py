@@ -248,7 +248,7 @@ def damaged_json(random: Random, value: Any) -> bytes:
 
 def _options() -> dict[str, list[tuple[str, bool]]]:
     """The options of every command, each with whether it is a flag."""
-    from warpflat.cli.main import cli
+    from warpflat.app.cli.main import cli
 
     return {
         name: [(p.opts[-1], p.is_flag) for p in command.params if isinstance(p, click.Option)]

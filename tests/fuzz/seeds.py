@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from warpflat.cli.main import main
+from warpflat.app.cli.main import main
 from warpflat.core.output import seal_of
 
 from .promise import Case

@@ -158,9 +158,9 @@ class Studio:
     """
 
     def __init__(self, folder: Path, host: str = "127.0.0.1") -> None:
-        from warpflat.scene.load import make_scene
-        from warpflat.studio.page import Page
-        from warpflat.studio.session import Session
+        from warpflat.app.scene.load import make_scene
+        from warpflat.app.studio.page import Page
+        from warpflat.app.studio.session import Session
 
         self.told: list[str] = []
         tell = Session.tell

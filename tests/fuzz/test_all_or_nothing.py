@@ -16,16 +16,16 @@ import numpy as np
 import pytest
 
 import warpflat
-from warpflat.cli.main import main
+from warpflat.app.cli.main import main
 from warpflat.core import output
 from warpflat.core.errors import InputError
 from warpflat.core.output import atomic_path, output_folder, prepare_folder, remove_file, write_json
-from warpflat.export.piece_files import save_piece
-from warpflat.export.usd import FrameWriter
-from warpflat.flattening.flatten_piece import flatten
-from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.output import write_mannequin
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.flattening.flatten_piece import flatten
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.output import write_mannequin
+from warpflat.pattern.export.piece_files import save_piece
+from warpflat.pattern.export.usd import FrameWriter
 
 # A bodice has four cuts to compare, a dome thirty-one.
 SCENE = "[surface]\nshape = 'bodice'\nresolution = 9\n[output]\nframes = 4\n"
@@ -415,6 +415,6 @@ def test_a_temporary_file_that_cannot_be_written_is_not_blamed_on_standard_outpu
 
     monkeypatch.chdir(tmp_path)
     Path("cap.toml").write_text(SCENE)
-    monkeypatch.setattr("warpflat.cli.run.start_warp_silently", full)
+    monkeypatch.setattr("warpflat.app.cli.run.start_warp_silently", full)
     assert main(["run", "cap.toml"]) == 2
     assert capfd.readouterr().err == "warpflat: cannot read or write a temporary file: no space left on device\n"

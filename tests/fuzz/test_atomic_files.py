@@ -15,9 +15,9 @@ from export_meshes import dome
 import warpflat
 from warpflat.core.errors import InputError
 from warpflat.core.output import atomic_path, output_folder, prepare_folder, write_json
-from warpflat.export.obj import write_obj
-from warpflat.export.picture import PicturePiece, write_picture
-from warpflat.export.usd import FrameWriter
+from warpflat.pattern.export.obj import write_obj
+from warpflat.pattern.export.picture import PicturePiece, write_picture
+from warpflat.pattern.export.usd import FrameWriter
 
 
 def test_file_appears_whole_and_nothing_else(tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_read_only_folder_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
 
 
-@pytest.mark.parametrize("place", ["pathlib.Path.touch", "warpflat.export.usd.begin_stage"])
+@pytest.mark.parametrize("place", ["pathlib.Path.touch", "warpflat.pattern.export.usd.begin_stage"])
 def test_a_signal_while_a_film_is_opened_leaves_no_file(
     place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,7 +204,7 @@ def test_json_names_the_place_of_what_it_cannot_write(tmp_path: Path) -> None:
 
 def test_import_is_lazy() -> None:
     heavy = ("pxr", "matplotlib", "scipy", "trimesh")
-    code = f"import sys, warpflat.export; print([m for m in {heavy!r} if m in sys.modules])"
+    code = f"import sys, warpflat.pattern.export; print([m for m in {heavy!r} if m in sys.modules])"
     found = {**os.environ, "PYTHONPATH": str(Path(warpflat.__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=found, check=True)
     assert done.stdout.strip() == "[]"

@@ -17,7 +17,7 @@ import pytest
 from command import Command, Ended
 
 from warpflat.core.file_kinds import FOREIGN
-from warpflat.surface.io.read import read_surface
+from warpflat.flat.surface.io.read import read_surface
 
 _DATA = os.environ.get("WARPFLAT_DATA")
 _FAULTS = Path(_DATA or "") / "faults"

@@ -20,15 +20,15 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label, plain_label
 from warpflat.core.text import one_line, quote_value
 from warpflat.core.toml_file import read_toml
-from warpflat.export.dxf import write_dxf
-from warpflat.export.pattern_json import pattern_json
-from warpflat.export.svg import SvgPage
-from warpflat.pattern.draft import draft_garment, draft_piece
-from warpflat.pattern.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.pieces import Pattern, Piece, Seam, SeamSide
-from warpflat.surface.paths.lines import with_lines
-from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.surface.paths.lines import with_lines
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.pattern.drafting.draft import draft_garment, draft_piece
+from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.export.dxf import write_dxf
+from warpflat.pattern.export.pattern_json import pattern_json
+from warpflat.pattern.export.svg import SvgPage
 
 DIGITS = "9" * 5000
 CONTROLS = ("\x01", "\x1b", "\x7f", "\x85", "\u2028", "\u202e", "\u2066", "\ufffe", "\udc80")
@@ -320,7 +320,7 @@ def test_odd_words_on_the_command_line_are_told_in_one_line(arguments: list[str]
 
 
 def test_the_help_names_every_format_that_is_read(command: Command):
-    from warpflat.surface.io.read import SUFFIXES
+    from warpflat.flat.surface.io.read import SUFFIXES
 
     told = command("flatten", "--help").out.lower()
     usd = {".usd", ".usda", ".usdc", ".usdz"}

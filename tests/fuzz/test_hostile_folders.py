@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from command import Command
 
-from warpflat.batch.plan import load_batch
-from warpflat.cli.main import main
+from warpflat.app.batch.plan import load_batch
+from warpflat.app.cli.main import main
 from warpflat.core.output import seal_of
 
 SCENE = "[surface]\nshape = 'dome'\nresolution = 9\n[output]\nframes = 4\n[pattern]\nformats = ['svg', 'json']\n"

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import pytest
 
-from warpflat.export.piece_files import save_piece
-from warpflat.flattening.flatten_piece import flatten
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.flattening.flatten_piece import flatten
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.pattern.export.piece_files import save_piece
 
 KILLS = int(os.environ.get("WARPFLAT_KILLS", "3"))
 

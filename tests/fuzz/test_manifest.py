@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from warpflat.cli.main import main
+from warpflat.app.cli.main import main
+from warpflat.app.scene.load import make_scene
+from warpflat.app.scene.run import SceneResult, run_scene
 from warpflat.core.errors import CannotWriteError, InputError
 from warpflat.core.output import remove_stale
-from warpflat.export.piece_files import save_piece
-from warpflat.flattening.flatten_piece import flatten
-from warpflat.garment.pattern_files import export_patterns
-from warpflat.scene.load import make_scene
-from warpflat.scene.run import SceneResult, run_scene
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.flattening.flatten_piece import flatten
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.construction.pattern_files import export_patterns
+from warpflat.pattern.export.piece_files import save_piece
 
 PATTERN = {"cap.dxf", "cap.svg", "pattern.pdf", "pattern.json"}
 
@@ -124,7 +124,7 @@ def test_nothing_is_removed_by_a_run_that_fails(tmp_path: Path, monkeypatch: pyt
     def full(*_: object, **__: object) -> None:
         raise CannotWriteError("cannot write: no space left on device")
 
-    monkeypatch.setattr("warpflat.garment.pattern_files._write", full)
+    monkeypatch.setattr("warpflat.garment.construction.pattern_files._write", full)
     with pytest.raises(InputError, match="no space"):
         run(tmp_path, shape="bodice", formats=("pdf",))
     assert files(tmp_path) == before
@@ -194,7 +194,7 @@ def test_metrics_of_another_program_are_not_replaced(
     def too_late(*_: object, **__: object) -> None:
         raise AssertionError("it was flattened first")
 
-    monkeypatch.setattr("warpflat.flattening.flatten_piece.flatten", too_late)
+    monkeypatch.setattr("warpflat.flat.flattening.flatten_piece.flatten", too_late)
     own = tmp_path / "out" / "metrics.json"
     own.parent.mkdir()
     own.write_text(text, errors="surrogateescape")

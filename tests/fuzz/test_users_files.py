@@ -14,18 +14,18 @@ import trimesh
 from command import Command
 from trimesh.exchange.gltf import export_gltf
 
-from warpflat.cli.main import main
+from warpflat.app.cli.main import main
+from warpflat.app.scene.load import make_scene
+from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import listening_to_reads
 from warpflat.core.toml_file import read_toml
-from warpflat.export.obj import write_obj
-from warpflat.export.piece_files import save_piece, write_pieces
-from warpflat.flattening.flatten_piece import flatten
-from warpflat.mannequin.table import MannequinTable, mannequin_from_table
-from warpflat.scene.load import make_scene
-from warpflat.scene.run import run_scene
-from warpflat.surface.io.read import read_surface
-from warpflat.surface.shapes import make_shape
+from warpflat.flat.flattening.flatten_piece import flatten
+from warpflat.flat.surface.io.read import read_surface
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.mannequin.table import MannequinTable, mannequin_from_table
+from warpflat.pattern.export.obj import write_obj
+from warpflat.pattern.export.piece_files import save_piece, write_pieces
 
 # A bodice has four cuts to compare, a dome thirty-one.
 SCENE = (
@@ -273,8 +273,8 @@ def test_what_a_run_reads_it_neither_replaces_nor_computes_with(
 
     Path("front.obj").write_text(SQUARE)
     commands = arranged()
-    monkeypatch.setattr("warpflat.flattening.flatten_piece.flatten", fail)
-    monkeypatch.setattr("warpflat.mannequin.mannequin.Mannequin.from_scan", fail)
+    monkeypatch.setattr("warpflat.flat.flattening.flatten_piece.flatten", fail)
+    monkeypatch.setattr("warpflat.garment.mannequin.mannequin.Mannequin.from_scan", fail)
     for arguments in commands:
         assert "is read by this run" in command(*arguments).refusal
 

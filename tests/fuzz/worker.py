@@ -47,7 +47,7 @@ def attack(arguments: list[str]) -> int:
 
 def run_case(case: dict[str, Any]) -> dict[str, Any]:
     """Run the command line in the case's folder, with standard output and error in files; return code, seconds and bytes."""
-    from warpflat.cli.main import main
+    from warpflat.app.cli.main import main
 
     os.chdir(case["folder"])
     for number, name in ((1, "stdout"), (2, "stderr")):

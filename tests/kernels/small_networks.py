@@ -22,10 +22,10 @@ from warpflat.kernels.implicit import (
 )
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 
-from warpflat.fabric.fabric import Fabric
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.steps import IMPLICIT_STEP
-from warpflat.surface.repair.validate import make_surface
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.steps import IMPLICIT_STEP
+from warpflat.flat.surface.repair.validate import make_surface
 
 CLOTH = Fabric(
     name="cloth",

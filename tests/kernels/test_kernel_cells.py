@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, Launched, corner_vertices, shaken, small_network
 
-from warpflat.fabric.fabric import grain_axes
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.steps import IMPLICIT_STEP, IMPLICIT_STEP_AT_REST
-from warpflat.surface.repair.validate import make_surface
+from warpflat.flat.fabric.fabric import grain_axes
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.steps import IMPLICIT_STEP, IMPLICIT_STEP_AT_REST
+from warpflat.flat.surface.repair.validate import make_surface
 
 # How the patch, seen from the front, is made larger or smaller along weft and warp.
 SQUEEZES = {"none": (1.15, 1.2), "warp": (1.15, 0.8), "weft": (0.8, 1.2), "both": (0.75, 0.7)}

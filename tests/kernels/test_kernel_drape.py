@@ -17,8 +17,8 @@ from warpflat.kernels.drape_contact import anchor_friction
 from warpflat.kernels.drape_steps import advance_drape, watch_power
 
 from warpflat.core.launch import launch_each
-from warpflat.fabric.fabric import Fabric
-from warpflat.model.membrane import make_cloth
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.model.membrane import make_cloth
 
 CURVE = ((0.02, 20.0), (0.05, 100.0))
 CLOTH = Fabric(

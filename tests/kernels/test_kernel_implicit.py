@@ -49,7 +49,7 @@ def test_a_step_is_equations_4_to_10(scale: float, time_step: float):
     np.add.at(stiffness, corner, at["face_stiffness"][slots, None])
     np.add.at(stiffness, ends.ravel(), np.repeat(k_ij, 2)[:, None])
     viscosity += h * (spring_sums(network, velocities) - velocities * spring_sums(network, np.ones_like(positions)))
-    # a half of the stiffest spring is added to the sum around a vertex (warpflat.model.network)
+    # a half of the stiffest spring is added to the sum around a vertex (warpflat.flat.model.network)
     stiffest = np.zeros((len(m), 1))
     np.maximum.at(stiffest, ends.ravel(), np.repeat(k_ij, 2)[:, None])
     stiffness += 0.5 * stiffest

@@ -19,13 +19,13 @@ from warpflat.kernels.membrane import (
 )
 from warpflat.kernels.strain import compute_worn_strain
 
-from warpflat.fabric.fabric import Fabric, grain_axes
-from warpflat.model.membrane import make_cloth
-from warpflat.model.network import SpringNetwork
-from warpflat.solver.steps import IMPLICIT_STEP, TangentMatrix
-from warpflat.surface.half_edges import border_edges
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
+from warpflat.flat.fabric.fabric import Fabric, grain_axes
+from warpflat.flat.model.membrane import make_cloth
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.steps import IMPLICIT_STEP, TangentMatrix
+from warpflat.flat.surface.half_edges import border_edges
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
 
 CLOTH = Fabric(
     name="cloth",

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from small_networks import CLOTH
 from test_kernel_unfold import SURFACES, norm
 
-from warpflat.fabric.fabric import Fabric, grain_axes
-from warpflat.model.network import SpringNetwork
-from warpflat.model.springs import spring_geometry, springs_along_cells, springs_of
-from warpflat.surface.cells import make_cells
-from warpflat.surface.half_edges import half_edges
-from warpflat.surface.mesh import Surface
+from warpflat.flat.fabric.fabric import Fabric, grain_axes
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.model.springs import spring_geometry, springs_along_cells, springs_of
+from warpflat.flat.surface.cells import make_cells
+from warpflat.flat.surface.half_edges import half_edges
+from warpflat.flat.surface.mesh import Surface
 
 FloatArray = NDArray[np.float64]
 QUADS = [name for name, make in SURFACES.items() if make().is_quad.all()]

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, shaken, small_network, vec2
 from warpflat.kernels.strain import compute_worn_strain
 
-from warpflat.fabric.fabric import Fabric, grain_axes
-from warpflat.model.membrane import make_cloth
-from warpflat.model.network import SpringNetwork
+from warpflat.flat.fabric.fabric import Fabric, grain_axes
+from warpflat.flat.model.membrane import make_cloth
+from warpflat.flat.model.network import SpringNetwork
 
 
 def worn(network: SpringNetwork, positions: NDArray[np.float64], *, pieces: int = 1) -> list[NDArray[np.float64]]:

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from warpflat.kernels.unfold import measure_triangles
 
 from warpflat.core.launch import launch_each
-from warpflat.surface.cells import make_cells
-from warpflat.surface.connectivity import coincident_vertices
-from warpflat.surface.mesh import Surface
-from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import make_shape
-from warpflat.surface.triangles import corner_triangles, unfold_quad_diagonals
-from warpflat.surface.unfold import quad_creases
+from warpflat.flat.surface.cells import make_cells
+from warpflat.flat.surface.connectivity import coincident_vertices
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.flat.surface.shapes import make_shape
+from warpflat.flat.surface.triangles import corner_triangles, unfold_quad_diagonals
+from warpflat.flat.surface.unfold import quad_creases
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]

@@ -1,1 +1,1 @@
-"""A form becomes pieces that sew up: sewing, ease, fullness, constraints, pattern."""
+"""Garments: bodies and forms, sewing, finishing, seams that are found, draping."""

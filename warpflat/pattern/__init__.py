@@ -1,1 +1,1 @@
-"""A flat piece becomes a pattern here: sewing lines, allowances, notches, labels, marker."""
+"""Flat pieces on paper: drafting, drawings and files of patterns."""

@@ -1,0 +1,406 @@
+from __future__ import annotations
+
+import json
+import os
+import re
+import runpy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from printed import faults
+from pypdf import PdfReader
+from usd_validation import validate_usd
+
+from warpflat.app.scene.frames import FrameSchedule
+from warpflat.app.scene.load import Scene, load_scene, scene_fabric
+from warpflat.app.scene.run import run_scene
+from warpflat.app.scene.schema import OutputTable
+from warpflat.app.scene.surface import scene_surface
+from warpflat.core.errors import InputError
+from warpflat.core.toml_file import read_toml
+from warpflat.flat.fabric.fabric import DEFAULT_FABRIC
+from warpflat.flat.fabric.library import find_fabric
+from warpflat.garment.construction.pattern_files import export_patterns
+from warpflat.pattern.export.pattern_json import read_pattern_json
+
+SCENES = Path(__file__).parents[3] / "scenes"
+DATA = os.environ.get("WARPFLAT_DATA")
+needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")
+
+PLANE_OBJ = "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\nv 20 0 0\nv 20 10 0\nf 1 2 3 4\nf 2 5 6 3\n"
+
+
+def write_scene(folder: Path, text: str, name: str = "trial.toml") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+# --- reading
+
+
+def test_a_scene_says_everything_about_a_run(tmp_path: Path):
+    path = write_scene(
+        tmp_path,
+        """
+        name = "cap"
+        fabric = "denim"
+        datum = "middle"
+        grain_angle = 45
+        [surface]
+        shape = "dome"
+        resolution = 9
+        [lines.middle]
+        from = 4
+        to = [0.0, 0.25, 0.37]
+        [relax]
+        max_steps = 77
+        [output]
+        frames = 0
+        picture = false
+        """,
+    )
+    scene = load_scene(path)
+    assert scene.name == "cap"
+    assert scene.settings.grain_angle == 45.0
+    assert scene.settings.relax.max_steps == 77
+    assert scene_fabric(scene) == find_fabric("denim")
+    surface = scene_surface(scene)
+    assert surface.name == "cap"
+    assert {"middle", "centre", "left"} <= set(surface.lines)
+    np.testing.assert_array_equal(surface.lines["middle"], surface.lines["centre"])
+
+
+def test_a_fabric_table_and_fabric_files(tmp_path: Path):
+    write_scene(tmp_path, "[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
+    start = "fabric_files = ['cloth.toml']\n"
+    surface = "[surface]\nshape = 'dome'\n"
+    by_name = load_scene(write_scene(tmp_path, f"fabric = 'mine'\n{start}{surface}"))
+    assert scene_fabric(by_name).shear_stiffness == 40.0
+    table = "[fabric]\nbase = 'mine'\n[fabric.fast]\ne100_warp = 3\ne100_weft = 4\n"
+    own = scene_fabric(load_scene(write_scene(tmp_path, start + surface + table)))
+    assert own.name == "trial"
+    assert own.shear_stiffness == 40.0
+    assert own.stiffness_warp == pytest.approx(98.07 / 0.03, rel=1e-3)
+
+
+def test_the_only_fabric_of_the_files_is_meant_and_of_several_one_must_be_named(tmp_path: Path):
+    write_scene(tmp_path, "[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
+    start, surface = "fabric_files = ['cloth.toml']\n", "[surface]\nshape = 'dome'\n"
+    assert scene_fabric(load_scene(write_scene(tmp_path, start + surface))).shear_stiffness == 40.0
+    write_scene(tmp_path, "[mine]\nbase = 'denim'\n[yours]\nbase = 'mine'\n", "cloth.toml")
+    with pytest.raises(InputError, match=r"fabric is not given.*mine, yours"):
+        load_scene(write_scene(tmp_path, start + surface))
+
+
+def test_scenes_and_fabrics_may_begin_with_a_byte_order_mark(tmp_path: Path):
+    write_scene(tmp_path, "\ufeff[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
+    text = "\ufefffabric = 'mine'\nfabric_files = ['cloth.toml']\n[surface]\nshape = 'dome'\n"
+    assert scene_fabric(load_scene(write_scene(tmp_path, text))).shear_stiffness == 40.0
+
+
+def test_mesh_files_are_found_from_the_scene_and_by_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "plane.obj").write_text(PLANE_OBJ)
+    beside = write_scene(tmp_path, "[surface]\nfile = 'meshes/plane.obj'\nunits = 'cm'\n")
+    assert np.ptp(scene_surface(load_scene(beside)).vertices[:, 0]) == pytest.approx(0.2)
+    monkeypatch.setenv("WARPFLAT_TRIAL", str(tmp_path / "meshes"))
+    for form in ("${WARPFLAT_TRIAL}/plane.obj", "$WARPFLAT_TRIAL/plane.obj"):
+        by_variable = write_scene(tmp_path, f"[surface]\nfile = '{form}'\nunits = 'mm'\n")
+        assert np.ptp(scene_surface(load_scene(by_variable)).vertices[:, 0]) == pytest.approx(0.02)
+    monkeypatch.delenv("WARPFLAT_TRIAL")
+    with pytest.raises(InputError, match=r"surface.file: environment variable WARPFLAT_TRIAL is not set; .*plane.obj"):
+        scene_surface(load_scene(by_variable))
+
+
+DOME = "[surface]\nshape = 'dome'\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"is empty; a scene needs at least a \[surface\] table"),
+        ("name = 'x'\nname = 'y'\n", r"is not valid TOML: Cannot overwrite a value \(at line 2"),
+        ("fabric = 'woven'\n", r"a scene needs either a \[surface\] table or a \[mannequin\] table with a form"),
+        ("[mannequin]\nsize = 'EU 38'\n", r"a mannequin and a form go together"),
+        ("form = 'bodice'\n[mannequin]\nsymmetric = false\n", r"give the body in one way: size"),
+        (
+            "form = 'bodice'\n[mannequin]\nsize = 'EU 38'\nsymmetric = false\nlandmarks = { bust = 1.3 }\n",
+            r"mannequin: given with size, but of a scan only: landmarks, symmetric; leave it out, or give a scan",
+        ),
+        ("half = true\n" + DOME, r"half belongs to a form's pieces; on a \[surface\] give the half's mesh"),
+        ("fabrik = 'woven'\n" + DOME, r"fabrik: unknown key 'fabrik'; did you mean 'fabric'\? valid: "),
+        ("[surface]\nshpe = 'dome'\n", r"surface.shpe: unknown key 'shpe'; did you mean 'shape'"),
+        ("[surface]\nflie = 'x.obj'\n", r"surface.flie: unknown key 'flie'; did you mean 'file'"),
+        (
+            "[surface]\nshape = 'dome'\nfile = 'x.obj'\n",
+            r"surface: give the surface by its file or by a shape, not both",
+        ),
+        (
+            "[surface]\nfile = 'x.obj'\ncomponent = 'big'\n",
+            r"surface.component: should be \"largest\", \"all\" or a number from 0, .* got 'big'$",
+        ),
+        (
+            "[surface]\nfile = 'x.obj'\ncomponent = -1\n",
+            r"surface.component: should be \"largest\", \"all\" or .* got -1$",
+        ),
+        (
+            DOME + "[lines.a]\nfrom = 1\nto = 2\nvia = 3\n",
+            r"lines.a.via: .* valid: border, curve, from, plane, to, vertices",
+        ),
+        (DOME + "[lines.a]\nfrom_ = 1\nto = 2\n", r"lines.a.from_: unknown key 'from_'; did you mean 'from'\?"),
+        ("[surface]\nfile = 3\n", r"surface.file: should be a valid string, got 3"),
+        ("surface = 'dome'\n", r"surface: "),
+        (DOME + "[relax]\nmax_step = 3\n", r"relax.max_step: unknown key 'max_step'; did you mean 'max_steps'"),
+        (DOME + "[relax]\nmax_steps = '3'\n", r"relax.max_steps: should be a valid integer, got '3'"),
+        (DOME + "[output]\nframes = -1\n", r"output.frames: should be greater than or equal to 0, got -1"),
+        (DOME + "[output]\npicture = 1\n", r"output.picture: should be a valid boolean, got 1"),
+        (DOME + "[lines.a]\n", r"lines.a: give the line in one way: vertices, from and to"),
+        (DOME + "[lines.a]\nfrom = 1\n", r"lines.a: a shortest path needs both from and to"),
+        (DOME + "[lines.a]\nfrom = 1\nto = [1, 2]\n", r"lines.a.to: .*at least 3 items"),
+        (DOME + "[lines.a]\nfrom = 'x'\nto = 3\n", r"lines.a.from: should be a valid integer, got 'x'"),
+        (
+            DOME + "[lines.a]\nplane = { point = [0, 0, nan], normal = [1, 0, 0] }\n",
+            r"lines.a.plane.point\[2\]: .*finite",
+        ),
+        (DOME + "[lines.a]\nplane = { pont = [0, 0, 0], normal = [1, 0, 0] }\n", r"lines.a.plane.pont: .*'point'"),
+        ("name = '../x'\n" + DOME, r"name: '\.\./x' cannot name files"),
+        ("[fabric]\nstifness_warp = 1\n" + DOME, r"fabric.stifness_warp: unknown key .*'stiffness_warp'"),
+        ("grain_angle = 400\n" + DOME, r"grain_angle: should be less than or equal to 360, got 400"),
+    ],
+)
+def test_mistakes_in_a_scene_are_told_in_one_line(tmp_path: Path, text: str, message: str):
+    path = write_scene(tmp_path, text)
+    with pytest.raises(InputError, match=message) as caught:
+        load_scene(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[surface]\nshape = 'dmoe'\n", r"surface: unknown shape 'dmoe'; did you mean 'dome'"),
+        ("[surface]\nshape = 'dome'\nradios = 1.0\n", r"surface: radios: unknown key .*did you mean 'radius'"),
+        ("[surface]\nshape = 'dome'\nradius = 0.1\n", r"surface: dome: radius = 0.1; must lie between|radius = 0.1 m"),
+        ("[surface]\nshape = 'dome'\nresolution = 1e3\n", r"surface: resolution: should be a whole number"),
+        ("fabric = 'wovn'\n" + DOME, r"fabric: unknown fabric 'wovn': did you mean 'woven'"),
+        ("[fabric]\nbase = 'woven'\nstiffness_warp = -3.0\n" + DOME, r"stiffness_warp = -3 N/m is out of range"),
+        ("[fabric]\nbase = 'woven'\nstiffness_warp = 0\n" + DOME, r"stiffness_warp = 0 N/m is out of range"),
+        ("datum = 'centr'\n" + DOME, r"datum.*'centr'.*did you mean 'centre'"),
+        (DOME + "[relax]\nmax_steps = 0\n", r"relax: .*max_steps"),
+        (DOME + "[relax]\ntime_step = -1.0\n", r"relax: .*time_step"),
+        (DOME + "[lines.a]\nvertices = [0, 1, 9999]\n", r"lines\.a: .*9999"),
+        (DOME + "[lines.a]\nplane = { point = [9, 9, 9], normal = [1, 0, 0] }\n", r"lines\.a: "),
+        (DOME + "[lines.a]\nborder = 'botom'\n", r"lines\.a: .*'bottom'"),
+    ],
+)
+def test_mistakes_that_show_when_a_scene_runs(tmp_path: Path, text: str, message: str):
+    scene = load_scene(write_scene(tmp_path, text))
+    with pytest.raises(InputError, match=message) as caught:
+        run_scene(scene, tmp_path / "out")
+    assert str(caught.value).startswith(scene.where)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+# --- frames
+
+
+def test_frames_thin_out_or_come_at_equal_steps():
+    even = FrameSchedule(OutputTable(frame_every=25))
+    assert [step for step in range(101) if even.is_due(step, 100)] == [0, 25, 50, 75, 100]
+    sparse = FrameSchedule(OutputTable(frame_every=25))
+    assert [step for step in range(0, 101, 10) if sparse.is_due(step, 100)] == [0, 30, 50, 80, 100]
+    thin = FrameSchedule(OutputTable(frames=40))
+    due = [step for step in range(10_001) if thin.is_due(step, 10_000)]
+    assert due[:4] == [0, 1, 2, 3]
+    assert 25 <= len(due) <= 41
+    assert np.all(np.diff(due, n=2) >= -1)
+    seldom = FrameSchedule(OutputTable(frames=40))
+    assert [step for step in range(0, 101, 10) if seldom.is_due(step, 10_000)] == [0, 10, 20, 30, 40, 60, 80]
+    assert not FrameSchedule(OutputTable(frames=0)).wanted
+
+
+# --- running
+
+
+def test_a_run_leaves_the_files_of_the_contract(tmp_path: Path):
+    from pxr import Usd, UsdGeom
+
+    scene = load_scene(write_scene(tmp_path, "datum = 'centre'\n[surface]\nshape = 'dome'\nresolution = 9\n"))
+    steps: list[int] = []
+    result = run_scene(scene, tmp_path / "out", on_progress=lambda progress: steps.append(progress.step))
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(result.files)
+    pattern = {"trial.dxf", "trial.svg", "pattern.pdf", "pattern.json"}
+    assert set(result.files) == {"metrics.json", "trial.obj", "frames.usdc", "picture.png", "review.html", *pattern}
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert metrics == json.loads(json.dumps(result.metrics))
+    piece = metrics["pieces"]["trial"]
+    assert (piece["vertices"], piece["faces"], piece["flipped_faces"]) == (81, 64, 0)
+    assert piece["fabric"] == DEFAULT_FABRIC
+    assert piece["stages"][-1]["converged"]
+    assert 0.0 < piece["length_error"] < 0.03
+    assert steps[-1] == sum(stage["steps"] for stage in piece["stages"] if stage["name"] in ("steps", "relax"))
+    assert steps == sorted(steps)
+
+    stage = Usd.Stage.Open(str(tmp_path / "out" / "frames.usdc"))
+    prim = stage.GetPrimAtPath("/World/trial")
+    for key in ("model_energy_j", "strain_energy_j", "length_error"):
+        assert prim.GetAttribute(f"warpflat:{key}").Get(stage.GetEndTimeCode()) == piece[key]
+    points = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/trial_pattern")).GetPointsAttr()
+    texture = [
+        [float(x) for x in line.split()[1:]]
+        for line in (tmp_path / "out" / "trial.obj").read_text().splitlines()
+        if line.startswith("vt ")
+    ]
+    last = np.asarray(points.Get(stage.GetEndTimeCode()))
+    np.testing.assert_allclose(last[:, :2], texture, atol=1e-7)
+    assert np.abs(np.asarray(points.Get(stage.GetStartTimeCode())) - last).max() > 1e-4
+
+
+def test_files_that_are_not_wanted_are_not_written(tmp_path: Path):
+    text = (
+        "[surface]\nshape = 'strip'\nresolution = 9\n[output]\nframes = 0\npicture = false\n[pattern]\nformats = []\n"
+    )
+    result = run_scene(load_scene(write_scene(tmp_path, text)), tmp_path)
+    assert set(result.files) == {"metrics.json", "trial.obj"}
+
+
+def test_a_run_that_is_stopped_leaves_no_half_file(tmp_path: Path):
+    scene = load_scene(write_scene(tmp_path, DOME))
+
+    def stop(progress: object) -> None:
+        if getattr(progress, "step", 0) >= 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_scene(scene, tmp_path / "out", on_progress=stop)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_that_meets_its_step_limit_says_so(tmp_path: Path):
+    scene = load_scene(write_scene(tmp_path, DOME + "[relax]\nmax_steps = 3\n"))
+    result = run_scene(scene, tmp_path / "out")
+    assert result.metrics["pieces"]["trial"]["stages"][-1]["converged"] is False
+
+
+# --- the shipped scenes
+
+# Batch files name scenes; tests/app/batch loads them.
+SHIPPED = [path for path in sorted(SCENES.glob("*.toml")) if not {"scenes", "forms", "tasks"} & read_toml(path).keys()]
+
+# The kinds of openings of each.
+OPENINGS = {
+    path: {str(table["kind"]).removesuffix("s") for table in read_toml(path).get("openings", ())} for path in SHIPPED
+}
+
+# Pieces that only drafting makes, of garments whose seams match on a coarse mesh, too.
+DRAFTED = {
+    "jeans": {"front_left_pocket_facing", "front_left_pocket_bag", "back_left_pocket", "yoke_left"},
+    "leggings": {"leg_left", "abdomen_band"},
+    "leotard": {"thigh_band", "neck_band"},
+}
+
+# Scenes that are run with all their files: a plain piece, one with a cut, one worn stretched, a garment.
+DRAWN = ("dome", "fisheye_dart", "compression_sleeve", "a_line_skirt")
+
+
+def made_light(scene: Scene) -> Scene:
+    """A scene on a coarser mannequin, most without pictures, frames, and patterns to print; `docs/make_gallery.py` runs all as they are."""
+    settings = scene.settings
+    if settings.mannequin is not None and settings.mannequin.size is not None:
+        settings = settings.model_copy(
+            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 40.0})}
+        )
+    if settings.marker is not None:
+        settings = settings.model_copy(update={"marker": settings.marker.model_copy(update={"seconds": 1})})
+    if scene.name in DRAWN:
+        return replace(scene, settings=settings)
+    output = settings.output.model_copy(update={"frames": 0, "picture": False})
+    pattern = settings.pattern.model_copy(update={"formats": ["json"]})
+    return replace(scene, settings=settings.model_copy(update={"output": output, "pattern": pattern}))
+
+
+# The last line of a sheet.
+SHEET = re.compile(r"sheet [A-Z]+\d+  -  ")
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
+    text = path.read_text()
+    assert text.startswith("# ")
+    if "WARPFLAT_DATA" in text and not DATA:
+        pytest.skip("WARPFLAT_DATA is not set: the folder with the real meshes")
+    result = run_scene(made_light(load_scene(path)), tmp_path)
+    for name, piece in result.metrics["pieces"].items():
+        assert piece["stages"][-1]["converged"], name
+        assert piece["flipped_faces"] == 0, name
+    assert "not_drawn" not in result.metrics["pattern"]
+    if path.stem in ("cone", "cylinder"):
+        assert result.metrics["pieces"][path.stem]["length_error"] < 1e-6
+    for name in result.files:
+        assert (tmp_path / name).stat().st_size > 0
+    assert ("frames.usdc" in result.files) == (path.stem in DRAWN)
+    if path.stem in DRAWN:
+        assert validate_usd(tmp_path / "frames.usdc") == []
+    assert json.loads((tmp_path / "metrics.json").read_text())["pieces"].keys() == result.metrics["pieces"].keys()
+    # The pattern as printed: nothing leaves its piece, no word is cut, and every opening is named in every file.
+    pattern = read_pattern_json(tmp_path / "pattern.json")
+    assert faults(pattern) == []
+    if path.stem in DRAFTED:
+        # It can be put on.
+        assert all(ring["passes"] is not False for ring in result.metrics["rings"])
+        assert all(seam.matches for seam in pattern.seams)
+        assert DRAFTED[path.stem] <= {piece.name for pieces in pattern.pieces.values() for piece in pieces}
+    openings = OPENINGS[path]
+    if openings:
+        # A PDF is written and read for one scene of each set of openings, on large sheets: fewer pages have to be read.
+        is_read = path == next(other for other in SHIPPED if OPENINGS[other] == openings)
+        export_patterns(tmp_path, ["svg", "dxf", *["pdf"][: int(is_read)]], out=tmp_path / "opened", paper="A0")
+        own_name = path.stem.replace("_", " ")
+        texts = [(tmp_path / "opened" / f"{path.stem}.{ending}").read_text() for ending in ("svg", "dxf")]
+        if is_read:
+            pages = [page.extract_text() for page in PdfReader(tmp_path / "opened" / "pattern.pdf").pages]
+            guide, sheets = (
+                "".join(page for page in pages if bool(SHEET.search(page)) == wanted) for wanted in (False, True)
+            )
+            assert "Measures" in guide
+            assert "from the back" in guide
+            texts += [guide, sheets]
+        for text in texts:
+            named = set(
+                re.findall(
+                    r"zip|button|vent|slit|keyhole|wrap|godet", text.replace(path.stem, "").replace(own_name, "")
+                )
+            )
+            assert openings <= named
+
+
+def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(SCENES / "scripted.py"), run_name="__main__")
+    told = capsys.readouterr().out
+    assert "flips 0" in told
+    assert "inf" not in told
+    _, *cloths = re.split("^(?:denim|interlock)$", told, flags=re.MULTILINE)
+    for cloth in cloths:
+        energies = [float(energy) for energy in re.findall(r"([0-9.]+) mJ", cloth)]
+        assert len(energies) >= 5
+        assert energies == sorted(energies, reverse=True)
+    assert (tmp_path / "out" / "scripted" / "denim" / "metrics.json").exists()
+
+
+def test_the_kernels_driven_by_hand_come_to_rest(capsys: pytest.CaptureFixture[str]):
+    runpy.run_path(str(SCENES / "kernels.py"), run_name="__main__")
+    told = capsys.readouterr().out
+    energies, wide = (
+        [float(text) for text in re.findall(pattern, told)] for pattern in (r"([0-9.]+) mJ", r"([0-9.]+) cm wide")
+    )
+    developed, free, pulled = energies
+    assert free < pulled
+    assert free < developed
+    assert wide[2] < wide[1], "one's own force makes it narrower"
+    assert "NOT at rest" not in told

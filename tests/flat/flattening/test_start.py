@@ -1,0 +1,72 @@
+"""The start of a relaxation: as-rigid iterations where they pay, a layout of one's own, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from devices import DEVICE
+
+from warpflat.core.errors import InputError
+from warpflat.flat.flattening.flatten_piece import flatten
+from warpflat.flat.flattening.start import choose_start
+from warpflat.flat.surface.injective import is_injective
+from warpflat.flat.surface.io.read_layout import read_layout
+from warpflat.flat.surface.shapes import make_shape
+
+
+def bodice(**options):
+    return make_shape("bodice", resolution=21, triangles=True, **options)
+
+
+def test_triangles_start_from_as_rigid_iterations_and_grids_from_their_profiles():
+    surface = bodice()
+    start = choose_start(surface, surface.lines["centre"])
+    assert start.as_rigid
+    assert is_injective(surface, start.positions)
+    chord = start.positions[surface.lines["centre"][[0, -1]]]
+    assert abs(chord[1, 0] - chord[0, 0]) < 1e-12
+    assert chord[1, 1] > chord[0, 1]
+    grid = make_shape("bodice", resolution=21)
+    assert choose_start(grid, grid.lines["centre"]).start == "the profiles development"
+
+
+def test_an_own_start_of_any_unit_side_and_angle_gives_the_same_pattern():
+    surface = bodice()
+    chosen = flatten(surface, datum="centre", device=DEVICE)
+    assert chosen.measures["start"] == "as-rigid iterations from the geodesic development"
+    own = 37.0 * chosen.positions @ [[0.6, 0.8], [0.8, -0.6]] + [5.0, -2.0]
+    given = flatten(surface, datum="centre", start=own, device=DEVICE)
+    assert given.measures["start"] == "the layout given"
+    assert given.flipped_faces == 0
+    assert given.stages[-1].model_energy_j == pytest.approx(chosen.stages[-1].model_energy_j, rel=1e-3)
+    apart = given.positions - given.positions.mean(axis=0) - chosen.positions + chosen.positions.mean(axis=0)
+    assert np.abs(apart).max() < 2e-4
+
+
+def test_a_start_that_is_none_is_refused_in_one_line():
+    surface = bodice()
+    flat = surface.vertices[:, :2].copy()
+    for start, words in (
+        (flat[:-1], "440 rows; must be 441"),
+        (flat[:, 0], "must be a row of two numbers"),
+        (np.where(np.arange(len(flat))[:, None] == 7, np.nan, flat), "vertex 7 has no place"),
+        (np.where(np.arange(len(flat))[:, None] == 200, flat + 1.0, flat), "faces; must mirror none"),
+    ):
+        with pytest.raises(InputError, match=words) as error:
+            flatten(surface, datum="centre", start=start, device=DEVICE)
+        assert "\n" not in str(error.value)
+
+
+def test_a_layout_is_read_from_texture_coordinates(tmp_path):
+    file = tmp_path / "own.obj"
+    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.5\nvt 0 0\nvt 1 0\nf 1/2 2/3 3/1\n")
+    np.testing.assert_array_equal(read_layout(file), [[0, 0], [1, 0], [0.5, 0.5]])
+    for text, words in (
+        ("v 0 0 0\nf 1 1 1\n", "no texture coordinates"),
+        ("v 0 0 0\nvt x\nf 1/1\n", "line 2"),
+        ("v 0 0 0\nvt 0 0\nvt 1 1\nf 1/1 1/2\n", "two texture coordinates"),
+        ("v 0 0 0\nvt 0 0\nf 1/9\n", "not in the file"),
+    ):
+        file.write_text(text)
+        with pytest.raises(InputError, match=words):
+            read_layout(file)

@@ -1,0 +1,304 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from surface_meshes import broken_invariants, cylinder, grid, scattered, sphere
+
+from warpflat.core.errors import InputError
+from warpflat.flat.surface.half_edges import mesh_edges
+from warpflat.flat.surface.paths.border import line_on_border
+from warpflat.flat.surface.paths.lines import (
+    line_between,
+    line_from_curve,
+    line_from_indices,
+    line_on_plane,
+    with_lines,
+)
+from warpflat.flat.surface.repair.validate import make_surface
+
+
+def runs_along_edges(surface, line):
+    edges = {tuple(edge) for edge in mesh_edges(surface.faces).tolist()}
+    return all((min(a, b), max(a, b)) in edges for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True))
+
+
+def length(surface, line):
+    return np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
+
+
+@pytest.fixture
+def sheet():
+    return make_surface(*grid(7, 5), name="sheet")
+
+
+@pytest.fixture
+def tube():
+    angle = 2 * np.pi * np.arange(24) / 24
+    i = np.arange(24 * 9).reshape(9, 24)
+    quads = np.stack([i[:-1], np.roll(i[:-1], -1, 1), np.roll(i[1:], -1, 1), i[1:]], axis=-1).reshape(-1, 4)
+    rings = [np.stack([np.sin(angle), np.full(24, y), np.cos(angle)], axis=-1) for y in np.linspace(0, 2, 9)]
+    return make_surface(np.concatenate(rings), quads, name="tube")
+
+
+def test_indices_are_checked_edge_by_edge(sheet):
+    assert line_from_indices(sheet, [0, 1, 1, 8]).tolist() == [0, 1, 8]
+    with pytest.raises(InputError, match="breaks between vertices 1 and 9 of 'sheet'"):
+        line_from_indices(sheet, [0, 1, 9])
+    with pytest.raises(InputError, match="vertex 35 does not exist in 'sheet': valid are 0 to 34"):
+        line_from_indices(sheet, [28, 35])
+    for bad in ([3], [0.5, 1.0], 7, [[0, 1]]):
+        with pytest.raises(InputError, match="at least two vertex indices"):
+            line_from_indices(sheet, bad)
+    with pytest.raises(InputError, match="two different"):
+        line_from_indices(sheet, [3, 3])
+
+
+def test_indices_may_count_the_vertices_of_the_file():
+    vertices, quads = grid(3, 2)
+    padded = np.vstack([[[5.0, 5.0, 5.0]], vertices, vertices[:1]])
+    faces = (quads + 1).tolist()
+    surface = make_surface(padded, [[7, *faces[0][1:]], faces[1]])
+    assert line_from_indices(surface, [7, 2, 3], as_read=True).tolist() == [5, 0, 1]
+    assert line_between(surface, 7, 3, as_read=True).tolist() == [5, 0, 1]
+    # Vertex 1 of the file is not used, but vertex 7 lies at its place.
+    assert line_from_indices(surface, [1, 2], as_read=True).tolist() == [5, 0]
+    with pytest.raises(InputError, match="vertex 0 of the input is not part"):
+        line_from_indices(surface, [0, 2], as_read=True)
+
+
+def test_shortest_path_takes_indices_or_points_and_keeps_to_the_chord(sheet):
+    path = line_between(sheet, 0, [1.0, 1.01, 0.02])
+    assert path[[0, -1]].tolist() == [0, 34]
+    assert runs_along_edges(sheet, path)
+    assert length(sheet, path) == pytest.approx(2.0)
+    off = np.abs(sheet.vertices[path, 0] - sheet.vertices[path, 1]) / np.sqrt(2)
+    assert off.max() < 0.2
+
+
+def test_path_is_the_shortest_by_the_lengths_of_the_edges():
+    surface = make_surface(*scattered(400, sphere)[:2])
+    ends = np.argmin(surface.vertices[:, 0]), np.argmax(surface.vertices[:, 0])
+    path = line_between(surface, *map(int, ends))
+    assert runs_along_edges(surface, path)
+    chord = np.linalg.norm(np.diff(surface.vertices[list(ends)], axis=0))
+    assert chord < length(surface, path) < 1.25 * chord
+
+
+def test_path_ends_that_are_none_are_refused(sheet):
+    with pytest.raises(InputError, match=r"is 3\.61 m off the piece 'sheet'.*nearest vertex is 34"):
+        line_between(sheet, 0, [3.0, 4.0, 0.0])
+    with pytest.raises(InputError, match="both ends"):
+        line_between(sheet, 3, 3)
+    for bad in ("left", [1.0, 2.0], [np.nan, 0, 0], True, 1.5):
+        with pytest.raises(InputError, match="vertex index or a point"):
+            line_between(sheet, 0, bad)
+
+
+def test_plane_through_a_column_gives_that_column_upwards(sheet):
+    assert line_on_plane(sheet, [0.5, 9, 9], [2, 0, 0]).tolist() == [3, 10, 17, 24, 31]
+    assert line_on_plane(sheet, [0.5, 9, 9], [-2, 0, 0]).tolist() == [31, 24, 17, 10, 3]
+    assert line_on_plane(sheet, [0, 0.5, 0], [0, 1, 0]).tolist() == [20, 19, 18, 17, 16, 15, 14]
+
+
+def test_plane_on_the_border_gives_the_border(sheet):
+    assert line_on_plane(sheet, [0, 0, 0], [1, 0, 0]).tolist() == [0, 7, 14, 21, 28]
+    assert line_on_plane(sheet, [1, 0, 0], [1, 0, 0]).tolist() == [6, 13, 20, 27, 34]
+
+
+@pytest.mark.parametrize("slant", [0.0, 0.4, -1.0])
+def test_slanting_plane_is_followed_within_an_edge(slant):
+    surface = make_surface(*scattered(900, cylinder)[:2])
+    normal = np.array([1.0, slant, 0.0])
+    line = line_on_plane(surface, [0.01, 0.25, 0.0], normal)
+    assert runs_along_edges(surface, line)
+    off = (surface.vertices[line] - [0.01, 0.25, 0.0]) @ normal / np.linalg.norm(normal)
+    edge = np.linalg.norm(np.diff(surface.vertices[mesh_edges(surface.faces)], axis=1), axis=2).mean()
+    assert np.abs(off).max() < 1.3 * edge
+    assert np.sqrt(np.mean(off**2)) < 0.6 * edge
+    assert surface.vertices[line[-1], 1] > surface.vertices[line[0], 1]
+    assert len(np.unique(line)) == len(line)
+
+
+def test_plane_around_a_tube_gives_a_closed_line(tube):
+    line = line_on_plane(tube, [0, 0.51, 0], [0, 1, 0])
+    assert line[0] == line[-1]
+    assert len(line) == 25
+    assert np.unique(tube.vertices[line, 1]).tolist() == [0.5]
+    slant = line_on_plane(tube, [0, 1.0, 0], [0.3, 1, 0])
+    assert slant[0] == slant[-1]
+    assert runs_along_edges(tube, slant)
+    angles = np.unwrap(np.arctan2(tube.vertices[slant, 0], tube.vertices[slant, 2]))
+    assert abs(angles[-1] - angles[0]) == pytest.approx(2 * np.pi)
+    assert len(np.unique(slant)) == len(slant) - 1
+
+
+def test_longest_of_several_sections_counts():
+    vertices, quads = grid(9, 5)
+    legs = np.delete(quads, [3, 4, 11, 12], axis=0)
+    legs = legs[~np.isin(np.arange(len(legs)), [0])]
+    surface = make_surface(vertices, legs)
+    line = line_on_plane(surface, [0, 0.1, 0], [0, 1, 0])
+    assert surface.vertices[line, 0].min() == pytest.approx(0.625)
+    assert surface.vertices[line, 0].max() == pytest.approx(1.0)
+
+
+def test_plane_that_misses_or_is_none_is_refused(sheet):
+    with pytest.raises(InputError, match=r"does not cut the piece 'sheet'.*0 to 1 m and the plane lies at 2 m"):
+        line_on_plane(sheet, [2, 0, 0], [1, 0, 0])
+    with pytest.raises(InputError, match="no length"):
+        line_on_plane(sheet, [0, 0, 0], [0, 0, 0])
+    with pytest.raises(InputError, match="a point and a normal"):
+        line_on_plane(sheet, [0, 0], [1, 0, 0])
+
+
+def test_sides_of_the_border_as_seen_from_outside(sheet):
+    assert line_on_border(sheet, "bottom").tolist() == [0, 1, 2, 3, 4, 5, 6]
+    assert line_on_border(sheet, "top").tolist() == [28, 29, 30, 31, 32, 33, 34]
+    assert line_on_border(sheet, "left").tolist() == [0, 7, 14, 21, 28]
+    assert line_on_border(sheet, "right").tolist() == [6, 13, 20, 27, 34]
+    # From behind, left and right change places.
+    back = make_surface(sheet.vertices, sheet.faces[:, ::-1])
+    assert line_on_border(back, "left").tolist() == [6, 13, 20, 27, 34]
+    # Lying flat and facing up, the front (+Z) is at the bottom.
+    flat = make_surface(sheet.vertices * [1, 1, -1] @ [[1, 0, 0], [0, 0, -1], [0, 1, 0]], sheet.faces)
+    assert line_on_border(flat, "bottom").tolist() == [0, 1, 2, 3, 4, 5, 6]
+
+
+def test_sides_of_a_half_cylinder_and_of_a_tapered_piece():
+    i = np.arange(13 * 6).reshape(6, 13)
+    bent = make_surface(*grid(13, 6, cylinder))
+    assert line_on_border(bent, "left").tolist() == i[:, 0].tolist()
+    assert line_on_border(bent, "top").tolist() == i[-1].tolist()
+    vertices, quads = grid(13, 6)
+    vertices[:, 0] = (vertices[:, 0] - 0.5) * (1 - 0.5 * vertices[:, 1])
+    assert line_on_border(make_surface(vertices, quads), "right").tolist() == i[:, -1].tolist()
+
+
+def slit_tube(columns=25, rows=15, opening=0.0, slit=0.0):
+    """A sleeve about +Y, wider above, slit at `slit` [rad] from +X towards -Z, seen from outside; `opening` [rad] wide."""
+
+    def place(u, v):
+        angle = slit + opening / 2 + (2 * np.pi - opening) * u
+        radius = 0.05 + 0.03 * v
+        return np.stack([radius * np.cos(angle), 0.3 * v, -radius * np.sin(angle)], axis=-1)
+
+    return grid(columns, rows, place)
+
+
+@pytest.mark.parametrize("slit", [0.0, 1.0, 2.0, np.pi, 4.5])
+@pytest.mark.parametrize("opening", [0.0, 0.1, 2.5])
+def test_sides_of_a_piece_that_wraps_round_lie_between_its_own_corners(slit, opening):
+    vertices, quads = slit_tube(opening=opening, slit=slit)
+    i = np.arange(25 * 15).reshape(15, 25)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    # The right way up, and an arm that is held out.
+    across = vertices @ np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for faces in (quads, triangles):
+        sleeve = make_surface(vertices, faces)
+        assert line_on_border(sleeve, "bottom").tolist() == i[0].tolist()
+        assert line_on_border(sleeve, "right").tolist() == i[:, -1].tolist()
+        assert line_on_border(sleeve, "top").tolist() == i[-1].tolist()
+        assert line_on_border(sleeve, "left").tolist() == i[:, 0].tolist()
+    if opening == 0.0:
+        arm = make_surface(across, quads)
+        assert line_on_border(arm, "right").tolist() == i[0].tolist()
+        assert line_on_border(arm, "top").tolist() == i[:, -1][::-1].tolist()
+
+
+def test_sides_of_a_piece_that_wraps_round_are_refused_where_they_cannot_be_told():
+    vertices, quads = slit_tube()
+    lying = make_surface(vertices[:, [2, 0, 1]], quads, name="sleeve")
+    with pytest.raises(
+        InputError,
+        match="which of the four sides of 'sleeve' is 'left' cannot be told from the front; give start and end",
+    ):
+        line_on_border(lying, "left")
+    tube = make_surface(
+        vertices, quads[(np.arange(len(quads)) < 24 * 6) | (np.arange(len(quads)) % 24 < 12)], name="step"
+    )
+    with pytest.raises(
+        InputError, match="'step' wraps round, and its border does not turn at four corners only; give start"
+    ):
+        line_on_border(tube, "left")
+
+
+def test_sides_that_curl_a_little_out_of_sight_end_at_the_corners():
+    """A back with a square neckline, through 220 degrees: from the front its outermost points lie beside its corners."""
+    vertices, quads = slit_tube(opening=np.radians(140), slit=-np.pi / 2)
+    row, column = np.divmod(np.arange(len(quads)), 24)
+    back = make_surface(vertices, quads[(row < 10) | (np.abs(column - 11.5) > 4)], name="back")
+    bottom, right = line_on_border(back, "bottom"), line_on_border(back, "right")
+    assert back.input_index[bottom].tolist() == list(range(25))
+    assert back.input_index[right].tolist() == list(range(24, 25 * 15, 25))
+
+
+def test_stretch_between_two_places(sheet):
+    assert line_on_border(sheet, start=1, end=14).tolist() == [1, 0, 7, 14]
+    assert line_on_border(sheet, start=[0.17, -0.1, 0], end=14).tolist() == [1, 0, 7, 14]
+    with_faces = line_on_border(sheet, start=1, end=14, direction="with")
+    assert with_faces[:3].tolist() == [1, 2, 3]
+    assert with_faces[-2:].tolist() == [21, 14]
+    assert line_on_border(sheet, start=1, end=14, direction="against").tolist() == [1, 0, 7, 14]
+    whole = line_on_border(sheet, start=6, end=6, direction="with")
+    assert len(whole) == 21
+    assert whole[0] == whole[-1] == 6
+
+
+def test_stretch_that_is_none_is_refused(sheet, tube):
+    with pytest.raises(InputError, match=r"unknown side 'botom'.*did you mean 'bottom'"):
+        line_on_border(sheet, "botom")
+    with pytest.raises(InputError, match="unknown direction 'long'"):
+        line_on_border(sheet, start=0, end=1, direction="long")
+    with pytest.raises(InputError, match="not both"):
+        line_on_border(sheet, "top", start=0)
+    with pytest.raises(InputError, match="needs a side"):
+        line_on_border(sheet, start=0)
+    with pytest.raises(InputError, match="vertex 8 of 'sheet' does not lie on its border"):
+        line_on_border(sheet, start=0, end=8)
+    with pytest.raises(InputError, match="different border loops"):
+        line_on_border(tube, start=0, end=200)
+
+
+def test_curve_along_edges_is_found_again(sheet):
+    line = line_between(sheet, 0, 34)
+    assert np.array_equal(line_from_curve(sheet, sheet.vertices[line]), line)
+    assert line_from_curve(sheet, sheet.vertices[[3, 31]] + [0.01, 0, 0.02]).tolist() == [3, 10, 17, 24, 31]
+
+
+def test_free_curve_is_followed_without_zigzag():
+    surface = make_surface(*scattered(900, sphere)[:2])
+    t = np.linspace(-0.5, 0.5, 200)
+    curve = 0.2 * np.stack([np.sin(t) * np.cos(0.4 * t**2), np.sin(0.4 * t**2), np.cos(t) * np.cos(0.4 * t**2)], 1)
+    line = line_from_curve(surface, curve)
+    assert runs_along_edges(surface, line)
+    assert len(np.unique(line)) == len(line)
+    off = np.linalg.norm(surface.vertices[line][:, None] - curve[None], axis=2).min(axis=1)
+    assert off.max() < 0.01
+    assert length(surface, line) < 1.25 * np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()
+
+
+def test_closed_curve_gives_a_closed_line(tube):
+    t = np.linspace(0, 2 * np.pi, 100)
+    curve = np.stack([np.sin(t), np.full(100, 1.02), np.cos(t)], axis=1)
+    line = line_from_curve(tube, curve)
+    assert line[0] == line[-1]
+    assert len(line) == 25
+
+
+def test_curve_off_the_piece_is_refused(sheet):
+    with pytest.raises(InputError, match=r"curve 'hem' does not lie on the piece 'sheet': its point 1 is 4 m off"):
+        line_from_curve(sheet, [[0, 0, 0], [5, 1, 0]], name="hem")
+    with pytest.raises(InputError, match="shorter than the edges"):
+        line_from_curve(sheet, [[0, 0, 0], [0.01, 0, 0]])
+    with pytest.raises(InputError, match="at least two points"):
+        line_from_curve(sheet, [[0, 0, 0]])
+
+
+def test_lines_are_added_and_replaced(sheet):
+    once = with_lines(sheet, {"a": [0, 1], "b": [0, 7]})
+    twice = with_lines(once, {"a": [1, 2]})
+    assert broken_invariants(twice) == []
+    assert {name: line.tolist() for name, line in twice.lines.items()} == {"a": [1, 2], "b": [0, 7]}
+    assert dict(sheet.lines) == {}
+    with pytest.raises(InputError, match="line 'c': the line breaks"):
+        with_lines(sheet, {"c": [0, 34]})

@@ -1,0 +1,157 @@
+"""Button stands, their facings and buttons; keyholes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from bodies import body_of_size
+
+from warpflat.core.errors import InputError
+from warpflat.garment.construction.button_stand import button_depths
+from warpflat.garment.construction.constraints import Straight
+from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.form_garment import flatten_form
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.linings import add_interfacing
+from warpflat.garment.construction.openings import Buttons, Opening, part_at_centres
+from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.mannequin.forms import shipped_form
+from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.pieces import Pattern
+
+BUTTONED = Opening(kind="buttons", line="centre front", length=np.inf, width=0.02, buttons=Buttons())
+FACING = Finishing(kind="facing", edge="neck", width=0.055)
+
+
+@pytest.fixture(scope="module")
+def bodice() -> Garment:
+    """A bodice parted at centre front."""
+    mannequin = body_of_size(30.0)
+    form = mannequin.form(part_at_centres(mannequin.layout, shipped_form("bodice"), [BUTTONED]))
+    straight = [Straight(piece=name, line="centre front", along="warp") for name in ("front_left", "front_right")]
+    return flatten_form(mannequin, form, fabric="woven", constraints=straight, curves_mm=0.0)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Garment:
+    """A bodice in two pieces."""
+    mannequin = body_of_size(30.0)
+    return flatten_form(mannequin, mannequin.form("bodice"), fabric="woven", sewn=True, curves_mm=0.0)
+
+
+def pattern_of(garment: Garment, *openings: Opening, finishing: tuple[Finishing, ...] = ()) -> Pattern:
+    return pattern_of_garment({"": replace(garment, openings=openings, finishing=finishing)}, name="bodice")[0]
+
+
+def test_stand_lies_upon_the_other_half_where_it_is_buttoned(bodice: Garment):
+    separate = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing="separate"))
+    before, after = pattern_of(bodice).piece("front_left", ""), pattern_of(bodice, separate).piece("front_left", "")
+    line = after.internal_lines["centre front"]
+    along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
+    across = np.array([along[1], -along[0]])
+    added = shapely.Polygon(after.outline).difference(shapely.Polygon(before.outline).buffer(1e-7))
+    mirror = shapely.transform(added, lambda p: p - 2 * np.outer((p - line[0]) @ across, across))
+    # Its mirror image about the centre line lies within the piece, and is 20 mm wide.
+    assert mirror.difference(shapely.Polygon(before.outline).buffer(1e-5)).area < 1e-7
+    assert added.area == pytest.approx(0.02 * np.linalg.norm(line[1] - line[0]), rel=0.02)
+    edge = after.edge("centre front button stand").points
+    assert np.allclose(np.abs((edge - line[0]) @ across), 0.02, atol=2e-4)
+
+
+def test_buttons_lie_on_the_centre_and_one_on_the_bust(bodice: Garment):
+    pattern = pattern_of(bodice, BUTTONED)
+    front = pattern.piece("front_left", "")
+    marks = np.array(list(front.marks.values()))
+    assert len(marks) >= 4
+    line = shapely.LineString(front.internal_lines["centre front"])
+    assert max(line.distance(shapely.Point(mark)) for mark in marks) < 1e-9
+    bust = next(points for name, points in front.internal_lines.items() if name.startswith("bust"))
+    assert min(np.linalg.norm(marks - end, axis=1).min() for end in bust[[0, -1]]) < 1e-3
+    holes = [points for name, points in front.internal_lines.items() if name.rstrip(" 0123456789") == "buttonhole"]
+    assert [np.linalg.norm(np.diff(hole, axis=0)) for hole in holes] == pytest.approx([0.021] * len(marks))
+    drafted = next(piece for piece in draft_garment(pattern).pieces[""] if piece.name == "front_left")
+    assert len(drafted.drill_holes) == len(marks)
+    assert "centre front" not in {seam.name for seam in pattern.seams}
+
+
+@pytest.mark.parametrize("facing", ["grown-on", "separate"])
+def test_facing_of_neck_and_stand_is_joined_at_the_shoulders(bodice: Garment, facing: str):
+    opening = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing=facing))
+    pattern = pattern_of(bodice, opening, finishing=(FACING,))
+    names = [piece.name for piece in pattern.pieces[""]]
+    assert ("front_left_neck_facing" in names) == (facing == "separate")
+    drafted = draft_garment(pattern)
+    assert all(seam.matches for seam in drafted.seams)
+    own = {seam.name: seam for seam in drafted.seams}
+    assert {"front left neck facing", "back neck facing", "shoulder left of neck facing"} <= set(own)
+    assert own["shoulder left of neck facing"].length_mm[0] == pytest.approx(55.0, abs=0.1)
+    if facing == "grown-on":
+        front = pattern.piece("front_left", "")
+        fold = shapely.LineString(front.internal_lines["fold line"])
+        # Folded back, it lies upon the piece.
+        points = front.edge("facing neck").points
+        start, end = np.asarray(fold.coords)
+        along = (end - start) / np.linalg.norm(end - start)
+        folded = start + 2 * np.outer((points - start) @ along, along) - (points - start)
+        assert np.allclose(folded[::-1], front.edge("neck").points, atol=1e-9)
+
+
+def test_interfacing_of_a_grown_on_facing_is_as_large_as_that(bodice: Garment):
+    pattern = add_interfacing(pattern_of(bodice, BUTTONED, finishing=(FACING,)), "fleece")
+    front, own = pattern.piece("front_left", ""), pattern.piece("front_left_facing_interfacing", "")
+    separate = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing="separate"))
+    facing = pattern_of(bodice, separate, finishing=(FACING,)).piece("front_left_neck_facing", "")
+    assert shapely.Polygon(own.outline).area == pytest.approx(shapely.Polygon(facing.outline).area, rel=1e-6)
+    assert shapely.Polygon(front.outline).buffer(1e-6).contains(shapely.Polygon(own.outline))
+    assert (own.fabric, own.quantity) == ("fleece", 2)
+
+
+def test_ring_open_from_edge_to_edge_passes(bodice: Garment):
+    shut, opened = (
+        {ring.name: ring for ring in replace(bodice, openings=openings).rings} for openings in ((), (BUTTONED,))
+    )
+    assert not shut["neck"].passes
+    assert all(ring.passes for name, ring in opened.items() if not name.startswith("armhole"))
+
+
+def test_stand_of_a_part_of_the_seam_leaves_the_rest_sewn(bodice: Garment):
+    pattern = pattern_of(bodice, replace(BUTTONED, length=0.2))
+    front = pattern.piece("front_left", "")
+    assert "centre front" in {seam.name for seam in pattern.seams}
+    full = pattern_of(bodice).piece("front_left", "").edge("centre front").length
+    assert front.edge("centre front").length == pytest.approx(full - 0.2, abs=1e-3)
+    assert all(seam.matches for seam in draft_garment(pattern).seams)
+
+
+def test_buttons_keep_to_the_count_of_another_size():
+    depths = button_depths(Buttons(spacing=0.09), 0.5, 0.2)
+    assert len(button_depths(Buttons(spacing=0.09), 0.55, 0.22, len(depths))) == len(depths)
+    assert len(button_depths(Buttons(count=7), 0.5, None)) == 7
+    with pytest.raises(InputError, match="no room for buttons"):
+        button_depths(Buttons(), 0.03, None)
+
+
+def test_curved_edge_has_no_stand(whole: Garment):
+    side = Opening(kind="buttons", line="side left", length=np.inf, width=0.02, buttons=Buttons())
+    with pytest.raises(InputError, match=r"strays .* mm from straight and cannot have a button stand"):
+        pattern_of(whole, side)
+
+
+def test_keyhole_is_drawn_on_its_piece_and_on_its_facing(whole: Garment):
+    hole = Opening(kind="keyhole", line="centre back", length=0.12, width=0.012)
+    plain, pattern = pattern_of(whole, finishing=(FACING,)), pattern_of(whole, hole, finishing=(FACING,))
+    assert [piece.name for piece in pattern.pieces[""]] == [piece.name for piece in plain.pieces[""]]
+    for name in ("back", "back_neck_facing"):
+        piece = pattern.piece(name, "")
+        assert np.linalg.norm(np.diff(piece.internal_lines["keyhole"], axis=0)) == pytest.approx(0.12, abs=1e-3)
+        ring = shapely.LineString(piece.internal_lines["keyhole end"])
+        assert shapely.Polygon(piece.outline).contains(ring)
+        assert np.ptp(shapely.get_coordinates(ring)[:, 0]) == pytest.approx(0.012, rel=0.02)
+    larger = shapely.Polygon(pattern.piece("back_neck_facing", "").outline)
+    around = shapely.LineString(pattern.piece("back", "").internal_lines["keyhole"]).buffer(0.03)
+    assert larger.contains(around.intersection(shapely.Polygon(plain.piece("back", "").outline).buffer(-1e-4)))
+    neck = next(ring for ring in replace(whole, openings=(hole,)).rings if ring.name == "neck")
+    assert neck.opened == pytest.approx(0.24)

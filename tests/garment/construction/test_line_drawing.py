@@ -1,0 +1,95 @@
+"""The line drawing of a garment: its waistband and its zip are seen, each from the sides from which they can be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import body_of_size
+
+from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.form_garment import flatten_form
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.line_drawing import describe_worn
+from warpflat.garment.construction.openings import Buttons, Opening, part_at_centres
+from warpflat.garment.mannequin.forms import shipped_form
+
+
+def skirt(opening: Opening, *, half: bool) -> Garment:
+    mannequin, form = body_of_size(30.0), shipped_form("skirt")
+    form = form if half else part_at_centres(mannequin.layout, form, [opening])
+    garment = flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True, curves_mm=0.0)
+    return replace(garment, openings=(opening,), finishing=(Finishing(kind="waistband", edge="waist", width=0.03),))
+
+
+def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_side():
+    garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=True)
+    views = describe_worn({"": garment}, "").views
+    for name, sign in (("front", 1.0), ("back", -1.0)):
+        # What of the band is on the far side lies behind all pieces.
+        _, *pieces, band, zipped = views[name]
+        top = max(float(piece.outlines[0][:, 1].max()) for piece in pieces)
+        (ring,) = band.outlines
+        assert float(ring[:, 1].max()) == pytest.approx(top + 0.03, abs=0.003)
+        # From side to side, of a half garment too.
+        waist = max(float(np.ptp(piece.outlines[0][piece.outlines[0][:, 1] > top - 0.01, 0])) for piece in pieces)
+        assert float(np.ptp(ring[:, 0])) == pytest.approx(waist, rel=0.05)
+        middles = np.array([line.mean(axis=0) for line in zipped.lines])
+        assert (sign * middles[:, 0] > 0.05).all()
+        assert 0.15 < float(np.ptp(middles[:, 1])) < 0.21
+        assert zipped.outlines == ()
+
+
+def test_every_button_is_drawn_in_front():
+    opening = Opening(kind="buttons", line="centre front", length=0.4, buttons=Buttons(count=5))
+    views = describe_worn({"": skirt(opening, half=False)}, "").views
+    (buttons,) = [piece for piece in views["front"] if not piece.outlines]
+    heights = [float(circle[:, 1].mean()) for circle in buttons.lines]
+    assert len(heights) == 5
+    assert heights == sorted(heights, reverse=True)
+    assert all(float(np.ptp(circle[:, 0])) == pytest.approx(0.018) for circle in buttons.lines)
+    assert all(piece.outlines for piece in views["back"])
+
+
+def test_a_zip_at_the_centre_back_is_not_seen_from_the_front():
+    views = describe_worn({"": skirt(Opening(kind="zip", line="centre back", length=0.2), half=False)}, "").views
+    drawn = {name: [piece for piece in row if not piece.outlines] for name, row in views.items()}
+    assert drawn["front"] == []
+    (zipped,) = drawn["back"]
+    assert all(abs(float(line.mean(axis=0)[0])) < 0.01 for line in zipped.lines)
+
+
+@pytest.mark.parametrize(
+    ("wish", "wider", "lines"),
+    [
+        (Finishing(kind="ruffle", edge="knee", width=0.2, share=3.0, pleat=0.05), 0.015, 11),
+        (Finishing(kind="ruffle", edge="knee", width=0.1, share=1.8), 0.04, 17),
+        (Finishing(kind="flounce", edge="knee", width=0.2, turns=1.0), 0.14, 7),
+    ],
+)
+def test_ruffle_hangs_below_its_edge_with_its_folds(wish: Finishing, wider: float, lines: int):
+    garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=True)
+    plain, drawn = (describe_worn({"": replace(garment, finishing=row)}, "").views for row in ((), (wish,)))
+    for name in ("front", "back"):
+        before, after = (
+            np.concatenate([ring for piece in row[name] for ring in piece.outlines]) for row in (plain, drawn)
+        )
+        assert float(before[:, 1].min() - after[:, 1].min()) == pytest.approx(wish.width, abs=0.02)
+        knee = before[before[:, 1] < before[:, 1].min() + 0.02, 0]
+        assert float(np.ptp(after[:, 0]) - np.ptp(knee)) > wider
+        # Folds of the near side alone are seen.
+        seen = [sum(len(piece.lines) for piece in row[name]) for row in (plain, drawn)]
+        assert seen[1] - seen[0] == pytest.approx(lines, abs=2)
+
+
+def test_right_half_of_a_wrap_covers_the_left_one():
+    garment = skirt(Opening(kind="wrap", line="centre front", length=np.inf, width=0.12), half=False)
+    views = describe_worn({"": garment}, "").views
+    shell = [piece for piece in views["front"] if piece.outlines][1:-1]
+    # To the viewer's right of the centre by its width; nothing of the centre line is seen on it.
+    upper = shell[-1]
+    (ring,) = upper.outlines
+    assert float(ring[:, 0].max()) == pytest.approx(0.12, abs=0.01)
+    assert float(ring[:, 0].min()) < -0.15
+    assert not any(np.abs(line[:, 0]).max() < 0.01 for line in upper.lines)

@@ -1,0 +1,119 @@
+"""Openings along the seams of a form: parted pieces, rings, notches, edges of slits and vents."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import body_of_size
+
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
+from warpflat.garment.construction.form_garment import flatten_form
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.openings import Opening, one_sided, part_at_centres
+from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.mannequin.forms import shipped_form
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.pieces import Pattern, Piece
+
+ZIP = Opening(kind="zip", line="centre back", length=0.20)
+
+
+@pytest.fixture(scope="module")
+def mannequin() -> Mannequin:
+    return body_of_size(30.0)
+
+
+@pytest.fixture(scope="module")
+def skirt(mannequin: Mannequin) -> Garment:
+    """A skirt parted at centre back for a zip."""
+    form = part_at_centres(mannequin.layout, shipped_form("a_line_skirt"), [ZIP])
+    return flatten_form(mannequin, mannequin.form(form), fabric="denim", curves_mm=0.0)
+
+
+def pattern_of(skirt: Garment, *openings: Opening) -> Pattern:
+    return pattern_of_garment({"": replace(skirt, openings=openings)}, name="skirt")[0]
+
+
+def passes(garment: Garment) -> dict[str, bool | None]:
+    return {ring.name: ring.passes for ring in garment.rings}
+
+
+def test_zip_at_centre_back_parts_the_back_and_lets_the_waist_pass(skirt: Garment):
+    assert list(skirt.pieces) == ["front", "back_left", "back_right"]
+    assert not passes(skirt)["waist"]
+    zipped = replace(skirt, openings=(ZIP,))
+    assert passes(zipped)["waist"]
+    waist = next(ring for ring in zipped.rings if ring.name == "waist")
+    assert waist.opened == pytest.approx(2 * 0.20)
+    # The abdomen lies some way down the zip: only the rest of it is open there.
+    line = zipped.form.pieces["back_left"].surface.lines
+    down = set(line["centre back"].tolist()) & set(line["abdomen"].tolist())
+    edge = zipped.form.pieces["back_left"].edges["centre back"]
+    flat = zipped.pieces["back_left"].positions
+    top = max(edge.tolist(), key=lambda v: zipped.form.pieces["back_left"].surface.vertices[v, 1])
+    (level,) = down
+    depth = np.linalg.norm(flat[top] - flat[level])
+    abdomen = next(ring for ring in zipped.rings if ring.name == "abdomen")
+    assert abdomen.opened == pytest.approx(2 * (0.20 - depth), abs=1e-3)
+
+
+def test_zip_that_ends_too_early_lets_nothing_pass(skirt: Garment):
+    assert not passes(replace(skirt, openings=(replace(ZIP, length=0.05),)))["waist"]
+
+
+def test_zip_has_a_notch_at_its_end_and_a_line(skirt: Garment):
+    pattern = pattern_of(skirt, ZIP)
+    assert {p.name: p.quantity for p in pattern.pieces[""]} == {"front": 1, "back_left": 2}
+    back = next(p for p in draft_garment(pattern).pieces[""] if p.name == "back_left")
+    assert "invisible zip 200 mm" in back.internal_lines
+    edge = next(e for e in back.edges if e.name == "centre back")
+    high = max(edge.line[0], edge.line[-1], key=lambda p: p[1])
+    away = [float(np.linalg.norm(n.at - high)) for n in back.notches if n.seam == "centre back"]
+    assert min(abs(each - 0.20) for each in away) < 1e-3
+
+
+def free_edge(piece: Piece, name: str) -> float:
+    return polyline_length(piece.edge(name).points)
+
+
+def test_slit_and_vent_are_edges_of_their_own(skirt: Garment):
+    vent = Opening(kind="vent", line="centre back", length=0.15, width=0.04)
+    slits = [Opening(kind="slit", line=f"side {side}", length=0.1, width=0.015) for side in ("left", "right")]
+    before, after = pattern_of(skirt), pattern_of(skirt, ZIP, vent, *slits)
+    back, plain = after.piece("back_left", ""), before.piece("back_left", "")
+    assert free_edge(back, "centre back vent") == pytest.approx(0.15, abs=1e-9)
+    assert free_edge(back, "centre back") == pytest.approx(free_edge(plain, "centre back") - 0.15, abs=1e-6)
+    assert (back.edge("centre back vent").width, back.edge("centre back vent").kind) == (0.04, "hem")
+    front = after.piece("front", "")
+    for side in ("left", "right"):
+        assert free_edge(front, f"side {side} slit") == pytest.approx(0.1, abs=1e-9)
+        points = front.edge(f"side {side} slit").points
+        assert points[:, 1].max() < front.edge(f"side {side}").points[:, 1].max() - 0.3
+    assert all(report.matches for report in draft_garment(after).seams)
+
+
+def test_opening_on_one_side_alone_keeps_both_patterns(skirt: Garment):
+    one = Opening(kind="slit", line="side left", length=0.1)
+    assert one_sided([one])
+    assert not one_sided([one, replace(one, line="side right")])
+    assert not one_sided([ZIP])
+    assert one_sided([one, replace(one, line="side right", length=0.2)])
+    pattern = pattern_of(skirt, one)
+    assert {p.name for p in pattern.pieces[""]} == {"front", "back_left", "back_right"}
+    assert all(report.matches for report in draft_garment(pattern).seams)
+
+
+def test_opening_that_cannot_be_is_named(skirt: Garment):
+    with pytest.raises(InputError, match="no seam 'side'"):
+        pattern_of(skirt, Opening(kind="zip", line="side", length=0.2))
+    with pytest.raises(InputError, match=r"ends 900 mm along 'centre back', which is \d+ mm long"):
+        pattern_of(skirt, replace(ZIP, length=0.9))
+    whole = float(
+        polyline_length(skirt.pieces["back_left"].positions[skirt.form.pieces["back_left"].edges["centre back"]])
+    )
+    with pytest.raises(InputError, match="leaves nothing of the seam"):
+        pattern_of(skirt, Opening(kind="vent", line="centre back", length=whole - 0.01))

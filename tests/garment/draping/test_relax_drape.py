@@ -1,0 +1,118 @@
+"""Cloth at rest in space against closed forms: cylinders, a hanging strip, a cantilever."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cloths import cloth_of, cylinder_body, cylinder_cloth, grid, sheet
+from scipy.integrate import solve_bvp
+
+from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.relax_drape import DrapedCloth, relax_drape
+from warpflat.garment.draping.sewn_cloth import SewnCloth
+
+RADIUS, HEIGHT, COLUMNS, ROWS = 0.12, 0.2, 17, 11
+
+
+def on_cylinder(scale: float) -> tuple[SewnCloth, DrapedCloth]:
+    """Cloth on a cylinder, its two straight sides held."""
+    cloth = cylinder_cloth(cloth_of(), scale=scale, radius=RADIUS, height=HEIGHT, columns=COLUMNS, rows=ROWS)
+    body = cylinder_body(radius=RADIUS, height=HEIGHT, columns=COLUMNS)
+    held = np.isin(np.arange(len(cloth.designed)) % COLUMNS, (0, COLUMNS - 1))
+    return cloth, relax_drape(cloth, body, held=held)
+
+
+def weft_strain(cloth: SewnCloth, positions: np.ndarray) -> np.ndarray:
+    """Per vertical strip and row."""
+    ends = [points.reshape(-1, COLUMNS, points.shape[-1]) for points in (cloth.flat, positions)]
+    lengths = [np.linalg.norm(np.diff(points, axis=1), axis=2) for points in ends]
+    return lengths[1] / lengths[0] - 1.0
+
+
+def test_the_exact_pattern_of_a_cylinder_lies_on_it():
+    cloth, worn = on_cylinder(1.0)
+    assert worn.converged
+    assert worn.residual <= 5e-3
+    gaps = cylinder_body(radius=RADIUS, height=HEIGHT, columns=COLUMNS).gaps(worn.positions)
+    assert np.abs(gaps).mean() < 5e-5
+    assert gaps.min() > -1e-6
+    # Between its sides it sags as a sheared strip does, by w L^2 / 8 G.
+    sag = cloth.designed[:, 1] - worn.positions[:, 1]
+    weight = cloth.fabric.areal_density * 9.80665
+    assert sag.max() == pytest.approx(weight * (np.pi * RADIUS) ** 2 / (8 * cloth.fabric.shear_stiffness), rel=0.1)
+
+
+def test_a_pattern_that_is_too_narrow_presses_as_a_hoop_does():
+    cloth, worn = on_cylinder(0.98)
+    strain = 1.0 / 0.98 - 1.0
+    assert worn.converged
+    assert np.linalg.norm(worn.positions - cloth.designed, axis=1).max() < 2e-5
+    np.testing.assert_allclose(weft_strain(cloth, worn.positions), strain, rtol=0.02)
+    inner = np.zeros((ROWS, COLUMNS), dtype=bool)
+    inner[2:-2, 2:-2] = True
+    worn_area = cloth.vertex_areas() / 0.98
+    pressure = (worn.pressing / worn_area)[inner.ravel()]
+    np.testing.assert_allclose(pressure, cloth.fabric.stiffness_weft * strain / RADIUS, rtol=0.02)
+
+
+def test_a_pattern_that_is_too_wide_lifts_off():
+    cloth, worn = on_cylinder(1.02)
+    assert np.linalg.norm(worn.positions - cloth.designed, axis=1).max() > 2e-3
+
+
+def test_a_hanging_strip_stretches_by_its_own_weight():
+    """Its end sinks by w g L^2 / 2 K."""
+    length, rows = 1.0, 21
+    x, y = (each.ravel() for each in np.meshgrid([0.0, 0.05, 0.1], np.linspace(0.0, length, rows)))
+    fabric = cloth_of(stiffness_warp=120.0, stiffness_weft=120.0)
+    cloth = sheet(np.column_stack([x, y]), np.column_stack([x, y, 0 * x]), grid(rows, 3), fabric)
+    worn = relax_drape(cloth, None, held=y == length, options=DrapeOptions(tolerance=1e-4))
+    assert worn.converged
+    sunk = -worn.positions[y == 0.0, 1].mean()
+    assert sunk == pytest.approx(fabric.areal_density * 9.80665 * length**2 / (2 * 120.0), rel=0.02)
+
+
+def test_a_cantilever_bends_as_a_heavy_elastica_does():
+    """Its bending length, the cube root of B / w, found from the tip's place by the elastica B a'' = -w (L - s) cos a.
+
+    The strip is wide and stiff, for its free edges curl: bending one way and the other way across costs nothing.
+    """
+    rows, columns, spacing, bending = 9, 13, 0.005, 1e-5
+    fabric = cloth_of(stiffness_warp=1500.0, stiffness_weft=1500.0, shear_stiffness=100.0, bending=bending)
+    # Three rows are clamped: the last of them bends, so that the clamp is half a row before it.
+    z = spacing * np.arange(-2, rows)
+    x, y = (each.ravel() for each in np.meshgrid(spacing * np.arange(columns), z))
+    cloth = sheet(np.column_stack([x, y]), np.column_stack([-x, 0 * x, y]), grid(rows + 2, columns), fabric)
+    worn = relax_drape(cloth, None, held=y < 1e-9, options=DrapeOptions(tolerance=1e-3, max_steps=60_000))
+    assert worn.converged
+    tip = worn.positions[-columns:].mean(axis=0)
+    weight, length = fabric.areal_density * 9.80665, (rows - 0.5) * spacing
+
+    def angle_of_tip(stiffness: float) -> float:
+        """The tip's angle below the level, seen from the clamp."""
+        s = np.linspace(0.0, length, 41)
+        found = solve_bvp(
+            lambda s, a: np.array([a[1], -weight * (length - s) * np.cos(a[0]) / stiffness]),
+            lambda a, b: np.array([a[0], b[1]]), s, np.zeros((2, 41)),
+        )  # fmt: skip
+        assert found.success
+        slope = found.sol(s)[0]
+        return float(np.arctan2(np.trapezoid(np.sin(slope), s), np.trapezoid(np.cos(slope), s)))
+
+    stiffnesses = bending * np.linspace(0.8, 1.25, 10)
+    angles = np.array([angle_of_tip(stiffness) for stiffness in stiffnesses])
+    found = np.interp(np.arctan2(-tip[1], tip[2] + 0.5 * spacing), angles[::-1], stiffnesses[::-1])
+    assert (found / bending) ** (1 / 3) == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_drape_is_repeated_bit_for_bit(monkeypatch: pytest.MonkeyPatch):
+    results = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("WARPFLAT_THREADS", threads)
+        cloth = cylinder_cloth(cloth_of(), scale=1.02, radius=RADIUS, height=HEIGHT, columns=33, rows=33)
+        body = cylinder_body(radius=RADIUS, height=HEIGHT, columns=33)
+        held = np.arange(len(cloth.designed)) % 33 == 0
+        results.append(relax_drape(cloth, body, held=held, options=DrapeOptions(max_steps=200)))
+    np.testing.assert_array_equal(results[0].positions, results[1].positions)
+    assert results[0].steps == results[1].steps == 200
+    assert not results[0].converged

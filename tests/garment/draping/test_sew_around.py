@@ -1,0 +1,212 @@
+"""Patterns are sewn around a thin body that grows: sleeves by their seams, limbs drawn out, openings linked with limbs, tangles refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bodies import body_of_size
+from cloths import cylinder_body, grid, sheet
+from devices import DEVICE
+
+import warpflat
+from warpflat.core.errors import InputError
+from warpflat.flat.surface.connectivity import border_loops
+from warpflat.garment.draping.check_sewn import check_sewn, pierced_edges
+from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
+from warpflat.garment.draping.limbs import around_legs, inside_arms, limb_lines, links, on_arm
+from warpflat.garment.draping.mesh_pieces import mesh_pieces
+from warpflat.garment.draping.openings import find_openings, limbs_of
+from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.sew_around import sew_around, stretches
+from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
+from warpflat.garment.draping.wrap_pieces import find_roles, wrap_pieces
+from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+
+# Corners of half a top, counter-clockwise from the hem's left end: sides, armholes, shoulders and the neck between these.
+TOP = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.35), (0.43, 0.56), (0.34, 0.58), (0.16, 0.58), (0.07, 0.56), (0.0, 0.35)]
+ARMHOLE = 2.0 * float(np.hypot(0.07, 0.21))
+
+
+def piece(name: str, corners: list[tuple[float, float]]) -> Piece:
+    ring = np.array([*corners, corners[0]])
+    return Piece(name=name, edges=[Edge(name=f"e{k}", points=ring[k : k + 2]) for k in range(len(corners))])
+
+
+def joined(first: str, second: str) -> Seam:
+    """Sides "piece.edge + piece.edge"; the second runs against its edges."""
+    sides = [
+        tuple(SeamSide(piece=p, edge=e, reversed=k == 1) for p, e in (word.split(".") for word in text.split(" + ")))
+        for k, text in enumerate((first, second))
+    ]
+    return Seam(name=f"{first} {second}", sides=(sides[0], sides[1]))
+
+
+def shirt() -> Pattern:
+    """A top of two equal pieces and two sleeves, whose names tell nothing; one sleeve is drawn upside down."""
+    sleeve = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.25), (0.0, 0.25)]
+    pieces = [piece("p", TOP), piece("q", TOP), piece("l", sleeve), piece("r", sleeve)]
+    seams = [joined(f"p.e{k}", f"q.e{8 - k}") for k in (1, 3, 5, 7)]
+    seams += [joined("l.e1", "l.e3"), joined("r.e1", "r.e3")]
+    seams += [joined("p.e2 + q.e6", "l.e2"), joined("q.e2 + p.e6", "r.e0")]
+    return Pattern(name="shirt", pieces={"": pieces}, seams=seams)
+
+
+def test_limbs_run_on_and_a_thin_body_grows():
+    body = body_of_size(30.0)
+    surface = body.surface()
+    vertices, faces = draw_out_limbs(surface.vertices, surface.faces)
+    loops = border_loops(faces)
+    assert len(loops) == len(border_loops(surface.faces))
+    # Both ankles end 30 cm lower, side by side; the surface stays one, wound alike.
+    assert vertices[:, 1].min() == pytest.approx(surface.vertices[:, 1].min() - 0.3)
+    directed = np.concatenate([faces[:, [k, (k + 1) % 4]] for k in range(4)])
+    assert len(np.unique(directed, axis=0)) == len(directed)
+    # Balls in a cylinder have its radius; thin, it has .35 of it, and halfway the mean of both.
+    tube = cylinder_body(radius=0.1, height=0.6, columns=40)
+    thin, far = ThinBody(tube), np.array([[0.3, 0.3, 0.0]])
+    for share, radius in ((0.0, 0.035), (0.5, 0.0675), (1.0, 0.1)):
+        thin.grow(share)
+        assert thin.nearest(far)[0][0, 0] == pytest.approx(radius, abs=4e-3)
+        np.testing.assert_allclose(thin.nearest(far)[1][0], [1.0, 0.0, 0.0], atol=0.05)
+    thin.grow(1.0)
+    np.testing.assert_allclose(tube.nearest(far)[0][0], [0.1, 0.3, 0.0], atol=2e-3)
+
+
+def test_openings_are_linked_with_the_limbs_that_they_go_around():
+    lines = limb_lines(body_of_size(30.0))
+    angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+
+    def ring(middle: np.ndarray, radius: float, axis: np.ndarray) -> np.ndarray:
+        u = np.cross(axis, [0.0, 0.0, 1.0])
+        u /= np.linalg.norm(u)
+        v = np.cross(axis, u)
+        return middle + radius * (np.outer(np.cos(angle), u) + np.outer(np.sin(angle), v / np.linalg.norm(v)))
+
+    for limb in ("left arm", "right arm", "left leg", "right leg"):
+        _, near, end, _ = lines[limb]
+        found = links(ring(0.5 * (near + end), 0.05, end - near), lines)
+        assert {each: abs(count) for each, count in found.items()} == {each: int(each == limb) for each in found}
+        assert not any(links(ring(0.5 * (near + end) + [0.0, 0.0, 0.2], 0.05, end - near), lines).values())
+    up = np.array([0.0, 1.0, 0.0])
+    hem, neck = (links(ring(middle, 0.4, up), lines) for middle in (lines["left leg"][1] * [0, 1, 1], lines["head"][1]))
+    assert hem["left leg"] == hem["right leg"] != 0
+    assert hem["left arm"] == hem["right arm"] == 0
+    # Around the neck is around all else, the other way round, and so is around the face.
+    assert len(set(neck.values())) == 1
+    assert abs(neck["left arm"]) == 1
+    face = links(ring(lines["head"][2] + [0.0, 0.0, 0.3], 0.1, np.array([0.01, 0.0, 1.0])), lines)
+    assert {abs(count) for count in face.values()} == {1}
+
+
+def test_a_shirt_is_sewn_by_its_seams_alone():
+    """Sleeves are what its openings tell, on the side to which they are sewn, the right way up; around both arms in the end."""
+    pattern, body = shirt(), body_of_size(30.0)
+    pieces = {each.name: each for each in pattern.pieces[""]}
+    meshes, welds = mesh_pieces(pieces, pattern.seams, 0.04)
+    openings = find_openings(meshes, welds)
+    assert [each.length for each in openings] == pytest.approx([1.0, ARMHOLE, ARMHOLE, 0.36])
+    assert [round(each.turn, 6) for each in openings[:3]] == [0.0, 0.0, 0.0]
+    assert find_roles(meshes, welds, {}, openings) == ([{"l"}, {"r"}], set())
+    placed = wrap_pieces(meshes, welds, body)
+    for name, side in (("l", "left"), ("r", "right")):
+        wrist, cap = (
+            placed[name][meshes[name].edges[edge]].mean(axis=0)
+            for edge in (("e0", "e2") if name == "l" else ("e2", "e0"))
+        )
+        assert cap[1] > wrist[1] + 0.1
+        assert np.linalg.norm(wrist - body.line(f"wrist {side}").mean(axis=0)) < np.linalg.norm(
+            cap - body.line(f"wrist {side}").mean(axis=0)
+        )
+    worn, _ = drape_pattern(
+        pattern, body, fabric=warpflat.find_fabric("woven"), placement=Placement(spacing=0.04),
+        options=DrapeOptions(max_steps=300), device=DEVICE,
+    )  # fmt: skip
+    lines = limb_lines(body)
+    for name, limb in (("l.e0", "left arm"), ("r.e2", "right arm")):
+        found = links(worn.positions[worn.cloth.lines[name][:-1]], lines)
+        assert abs(found[limb]) == 1
+        assert sum(map(abs, found.values())) == 1
+    assert pierced_edges(worn.cloth, worn.positions)[0].mean() < 0.1
+    # The same places, moved off the arm, or crumpled.
+    limbs = limbs_of(openings, worn.positions, {"l", "r"})
+    beside = worn.positions + np.array([0.0, 0.0, 0.5])
+    check = {"openings": openings, "limbs": limbs, "lines": lines}
+    with pytest.raises(InputError, match="falls off: the garment goes around no part of the body"):
+        check_sewn(worn.cloth, beside, **check)
+    aside = worn.positions.copy()
+    aside[worn.cloth.welded[worn.cloth.piece_vertices["l"]]] += [0.0, 0.0, 0.4]
+    with pytest.raises(InputError, match="piece 'l': its opening of 443 mm was sewn beside the left arm"):
+        check_sewn(worn.cloth, aside, **check)
+    crumpled = worn.positions * [2.5, 1.0, 2.5]
+    with pytest.raises(InputError, match=r"sewn into a tangle, most at '.': .* is stretched by over 50 %"):
+        check_sewn(worn.cloth, crumpled, openings, [""] * len(openings), lines)
+
+
+def test_a_sleeve_goes_with_its_cuff_and_a_hood_with_the_face():
+    """The sleeve has no opening of its own then, and is as near to the neck; a hood of two tall halves takes the neck's opening."""
+    pattern = shirt()
+    cuff = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.06), (0.0, 0.06)]
+    half = [(0.0, 0.0), (0.18, 0.0), (0.18, 0.3), (0.0, 0.3)]
+    cuffs = [joined("l.e0", "m.e2"), joined("m.e1", "m.e3"), joined("r.e2", "n.e2"), joined("n.e1", "n.e3")]
+    hood = [joined("p.e4", "x.e0"), joined("q.e4", "y.e0"), joined("x.e2", "y.e2"), joined("x.e1", "y.e3")]
+    pieces = {each.name: each for each in [*pattern.pieces[""], piece("m", cuff), piece("n", cuff)]}
+    meshes, welds = mesh_pieces(pieces, [*pattern.seams, *cuffs], 0.04)
+    sleeves, found = find_roles(meshes, welds, {}, find_openings(meshes, welds))
+    assert sorted(map(sorted, sleeves)) == [["l", "m"], ["n", "r"]]
+    assert found == set()
+    pieces |= {"x": piece("x", half), "y": piece("y", half)}
+    meshes, welds = mesh_pieces(pieces, [*pattern.seams, *cuffs, *hood], 0.04)
+    sleeves, found = find_roles(meshes, welds, {}, find_openings(meshes, welds))
+    assert sorted(map(sorted, sleeves)) == [["l", "m"], ["n", "r"]]
+    assert found == {"x", "y"}
+
+
+def test_cloth_of_the_trunk_starts_inside_the_arms_and_legs_around_the_legs():
+    body = body_of_size(30.0)
+    lines = limb_lines(body)
+    skin = body.surface().vertices
+    beyond = on_arm(skin, lines)
+    assert (skin[beyond][:, 1] > lines["left arm"][2][1] - 0.1).all()
+    wide = np.array([[0.6, lines["left arm"][2][1], 0.0], [0.05, 1.0, 0.0]])
+    inside = inside_arms(wide, lines)
+    assert inside[0, 0] == pytest.approx(lines["left arm"][2][0] - 0.04)
+    np.testing.assert_array_equal(inside[1], wide[1])
+    # Two tubes that meet at the top, both 5 cm too near to the middle.
+    top = lines["left leg"][1, 1]
+    angle, y = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 17), np.linspace(top - 0.5, top - 0.02, 13))
+    tubes = [
+        np.column_stack([(side * 0.02 + 0.1 * np.cos(angle)).ravel(), y.ravel(), 0.1 * np.sin(angle).ravel()])
+        for side in (1, -1)
+    ]
+    faces = np.concatenate([grid(13, 17), grid(13, 17) + 13 * 17])
+    hems = [np.arange(17), 13 * 17 + np.arange(17)]
+    moved = around_legs(np.concatenate(tubes), faces, hems, lines)
+    low = moved[:17]
+    axis = np.interp(top - 0.5, lines["left leg"][:0:-1, 1], lines["left leg"][:0:-1, 0])
+    assert 0.5 * (low[:, 0].min() + low[:, 0].max()) == pytest.approx(axis)
+    assert low[:, 0].min() > 0.0
+    assert moved[13 * 17 : 13 * 17 + 17, 0].max() < 0.0
+
+
+def test_a_wide_band_is_drawn_around_a_body_without_strain():
+    """It starts as a flat loop twice as far off as it is long; around the thin body it closes, and the body grows into it."""
+    tube = cylinder_body(radius=0.1, height=0.3, columns=40)
+    columns, rows, girth = 41, 6, 2.0 * np.pi * 0.11
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0.0, girth, columns), np.linspace(0.1, 0.2, rows)))
+    angle = 2.0 * np.pi * x / girth
+    space = np.column_stack([0.25 * np.sin(angle), y, 0.25 * np.cos(angle)])
+    band = sheet(np.column_stack([x, y]), space, grid(rows, columns), warpflat.find_fabric("woven"))
+    # Its ends are sewn: the last column is the first.
+    welded = np.arange(rows * columns).reshape(rows, columns)
+    welded[:, -1] = welded[:, 0]
+    used, number = np.unique(welded, return_inverse=True)
+    number = number.reshape(-1).astype(np.int32)
+    faces = np.where(band.faces >= 0, number[band.faces], -1).astype(np.int32)
+    band = replace(band, welded=number, faces=faces, designed=space[used])
+    found = sew_around(band, band.designed, ThinBody(tube))
+    assert np.abs(stretches(band, found)).max() < 0.05
+    assert tube.gaps(found).min() > -2e-3
+    assert np.hypot(found[:, 0], found[:, 2]).mean() == pytest.approx(0.11, abs=0.01)

@@ -1,0 +1,117 @@
+"""Scans that show less than a whole body: what is refused, and which tapes say that they are guesses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from body_tapes import armpit_and_crotch
+from landmarks import Landmarks
+from limb_tapes import arm_tapes, tape_across
+from scans import needs_bodies, posed_body, posed_scan, scan, scanned_body, triangles_of
+
+from warpflat.core.errors import InputError
+from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.scan_pose import across_trunk
+from warpflat.garment.mannequin.slicer import Slicer
+
+
+def _between(points: np.ndarray, faces: np.ndarray, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """The part of a body between two shares of its height."""
+    share = points[faces[:, :3]][:, :, 1] / points[:, 1].max()
+    return points, faces[(share.min(axis=1) > low) & (share.max(axis=1) < high)]
+
+
+@needs_bodies
+def test_a_body_without_its_head_is_refused() -> None:
+    with pytest.raises(InputError, match="the head is missing"):
+        Mannequin.from_scan(*_between(*scan("male"), 0.0, 0.89), resolution_mm=40.0)
+
+
+@needs_bodies
+def test_a_body_without_feet_says_so() -> None:
+    body = Mannequin.from_scan(*_between(*scan("female"), 0.06, 1.1), resolution_mm=40.0)
+    assert (
+        "foot left and foot right could not be measured on the scan; heights count from its lowest point" in body.notes
+    )
+    assert body.measures["ankle left"].guess is not None
+
+
+@needs_bodies
+def test_the_fullest_place_of_an_evenly_full_arm_is_a_guess() -> None:
+    faces = scan("male_heavy")[1]
+    landmarks = Landmarks(faces)
+    for copy, is_guess in (("arms down", True), ("as it is", False)):
+        posed = posed_scan("male_heavy", copy)
+        body = posed_body("male_heavy", copy) if is_guess else scanned_body("male_heavy")
+        mesh = trimesh.Trimesh(posed, triangles_of(faces), process=False)
+        assert [body.measures[f"biceps {s}"].guess is not None for s in ("left", "right")] == [is_guess] * 2
+        # Its elbow bends in a bow.
+        for side in ("left", "right"):
+            ours = body.measures[f"elbow {side}"]
+            wrist, elbow, upper = landmarks.bones(posed, side)
+            lower = (elbow - wrist) / np.linalg.norm(elbow - wrist)
+            height, girth = tape_across(mesh, elbow, (lower + upper) / np.linalg.norm(lower + upper))
+            assert ours.guess or (abs(ours.height - height) < 0.004 and abs(ours.girth - girth) < 0.009), (copy, side)
+    assert not any("elbow" in name and m.guess for name, m in scanned_body("female").measures.items())
+
+
+@needs_bodies
+def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
+    """On bodies with one mesh a landmark's vertices on one are the landmark's on all, mixes among them."""
+    (one, faces), (other, _) = scan("child"), scan("male_heavy")
+    points = 0.5 * (one + other)
+    body, marks = Mannequin.from_scan(points, faces, resolution_mm=40.0), Landmarks(faces)
+    # Where no fold shows, its place is a guess, and near all the same.
+    assert body.measures["underbust"].guess == "no fold shows under the bust"
+    assert abs(body.measures["underbust"].height - marks.fold(points)) < 0.004
+    # Fat moves the crease behind the knee down, and the skin over it less.
+    knee = body.measures["knee left"]
+    assert abs(knee.height - marks.knee(points, "left")) < 0.004 or knee.guess is not None
+
+
+@needs_bodies
+def test_the_upper_arm_is_measured_from_where_the_arm_joins_the_trunk() -> None:
+    """The scan shows where; the body's nearest vertex lies up to a centimetre off."""
+    bodies, faces = [scan(name)[0] for name in ("female", "male", "male_heavy", "child")], scan("child")[1]
+    for shares, scales in (((0.16, 0.0, 0.0, 0.84), (1.05, 0.97, 1.08)), ((0.0, 0.33, 0.67, 0.0), (1.1, 0.93, 1.0))):
+        points = sum(share * body for share, body in zip(shares, bodies, strict=True)) * scales
+        mesh = trimesh.Trimesh(points, triangles_of(faces), process=False)
+        armpit, tips, marks = armpit_and_crotch(mesh)[0], points[:, 0], Landmarks(faces)
+        body = Mannequin.from_scan(points, faces, resolution_mm=40.0)
+        for side, tip in (("left", np.argmax(tips)), ("right", np.argmin(tips))):
+            height, girth = arm_tapes(mesh, armpit, int(tip), marks.bones(points, side))["biceps"]
+            ours = body.measures[f"biceps {side}"]
+            assert abs(ours.height - height) < 0.004
+            assert abs(ours.girth - girth) < 0.006
+
+
+def test_a_body_with_feet_as_small_as_a_childs_is_not_refused() -> None:
+    model, (finer, triangles) = BodyModel.load(), finer_body()
+    shape = np.random.default_rng(101).normal(size=len(model.shapes))
+    straight = rotation(np.zeros((len(model.joints), 3)))
+    person = Person(shape=shape, bend=straight, turn=np.eye(3), scale=1.58, place=np.zeros(3))
+    body = Mannequin.from_scan(finer @ model.vertices(person), triangles, resolution_mm=40.0)
+    assert "foot left" not in body.measures
+    assert body.measures["ankle left"].girth > 0.15
+
+
+def test_trunk_of_two_equal_parts_has_a_direction() -> None:
+    """Two parts of one area are no tie that cannot be broken."""
+    one = trimesh.creation.box((0.25, 2.0, 0.125))
+    aside = np.array([0.5, 0.0, 0.0])
+    points = np.concatenate([one.vertices - aside, one.vertices + aside])
+    slicer = Slicer(points, np.concatenate([one.faces, one.faces + len(one.vertices)]))
+    left = across_trunk(slicer, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    assert abs(left[1]) < 1e-9
+    assert np.linalg.norm(left) == pytest.approx(1.0)
+
+
+@needs_bodies
+def test_tapes_of_arms_above_the_shoulders_are_guesses() -> None:
+    """The shoulder's flesh comes into them: a tape laid on the mesh is 60 to 110 mm off."""
+    up, level = posed_body("male", "arms up"), posed_body("male", "arms level")
+    for name in ("biceps left", "biceps right"):
+        assert up.measures[name].guess == "the arms are raised above the shoulders"
+        assert level.measures[name].guess is None

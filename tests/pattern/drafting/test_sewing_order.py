@@ -1,0 +1,321 @@
+"""Steps of making a garment, the seams in their order, and what is needed beside the cloth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpflat.core.errors import InputError
+from warpflat.garment.construction.finishing import Finishing, finish_edges
+from warpflat.garment.construction.linings import add_interfacing, add_lining
+from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.drafting.seam_words import joint_words
+from warpflat.pattern.drafting.sewing_order import notions, seam_letters, sewing_steps
+from warpflat.pattern.drafting.words import language_words, printed_in
+from warpflat.pattern.export.pattern_json import pattern_from_json, pattern_json
+
+
+def top(*openings: SeamOpening) -> Pattern:
+    """A front and the two halves of a back, with a neck, and armholes 20 cm long above the side seams."""
+    neck = np.array([[0.1, 0.5], [0.05, 0.46], [0.0, 0.45], [-0.05, 0.46], [-0.1, 0.5]])
+    right = {
+        "hem": [[0.0, 0.0], [0.2, 0.0]],
+        "side right": [[0.2, 0.0], [0.2, 0.3]],
+        "armhole right": [[0.2, 0.3], [0.2, 0.5]],
+        "shoulder right": [[0.2, 0.5], [0.1, 0.5]],
+    }
+    half = {**right, "neck right": neck[:3], "centre back": [[0.0, 0.45], [0.0, 0.0]]}
+    mirrored = {
+        name.replace("right", "left"): np.array(points)[::-1] * [-1.0, 1.0] for name, points in reversed(half.items())
+    }
+    front = {
+        "hem": [[-0.2, 0.0], [0.2, 0.0]],
+        **{k: v for k, v in right.items() if k != "hem"},
+        "neck": neck,
+        **{k: v for k, v in mirrored.items() if k.split(" ")[0] in ("side", "armhole", "shoulder")},
+    }
+
+    def piece(name: str, lines: dict[str, Sequence[Sequence[float]]]) -> Piece:
+        edges = [Edge(name=k, points=np.array(v), kind="hem" if k == "hem" else "seam") for k, v in lines.items()]
+        first = next(i for i, edge in enumerate(edges) if edge.name == "hem")
+        return Piece(name=name, fabric="wool", edges=[*edges[first:], *edges[:first]])
+
+    pieces = [piece("front", front), piece("back_right", half), piece("back_left", mirrored)]
+    seams = [
+        Seam(
+            name=f"{name} {side}",
+            sides=((SeamSide(piece="front", edge=f"{name} {side}"),), (SeamSide(piece=f"back_{side}", edge=f"{name} {side}"),)),
+        )
+        for name in ("side", "shoulder")
+        for side in ("left", "right")
+    ]  # fmt: skip
+    back = (
+        (SeamSide(piece="back_right", edge="centre back"),),
+        (SeamSide(piece="back_left", edge="centre back", reversed=True),),
+    )
+    centre = Seam(name="centre back", sides=back, openings=openings)
+    return Pattern(name="top", pieces={"": pieces}, seams=[*seams, centre])
+
+
+ZIP = SeamOpening(kind="zip", length=0.3, style="invisible")
+
+
+def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
+    facing, binding = (
+        Finishing(kind="facing", edge="neck", width=0.05),
+        Finishing(kind="binding", edge="armhole", width=0.035),
+    )
+    pattern = finish_edges(top(ZIP), [facing, binding], gaps=["centre back"])
+    drafted = draft_garment(add_lining(add_interfacing(pattern, "interfacing"), "lining"))
+    steps = [step.words for step in sewing_steps(drafted, "")]
+    places = {
+        name: next(i for i, step in enumerate(steps) if text in step)
+        for name, text in {
+            "fuse": "Fuse the interfacing: front neck facing",
+            "zip": "Sew the invisible zip of 30 cm to both edges of A (centre back: back right to back left), from the upper edge",
+            "shoulders": "Sew while it lies flat, notch to notch: B (shoulder: front to back left)",
+            "sides": "Close, right sides together, notch to notch: C (side: front to back left)",
+            "facings": "Sew the facings to their edges",
+            "linings": "(centre back of the lining: back right lining to back left lining, open beside the zip)",
+            "at the zip": "At the zip, turn in the edges and sew them to its tape by hand: back right neck right facing",
+            "baste": "Baste the lining to the shell, wrong sides together: armhole (front lining",
+            "ends": "Join the ends of bands and bindings",
+            "bind": "Sew the bindings on, right sides together, notch to notch",
+            "hems": "Turn up and sew the hems: 3 cm (front, back right, back left)",
+        }.items()
+    }
+    assert list(places.values()) == sorted(places.values())
+    assert "Then close the seam below it" in steps[places["zip"]]
+    # Nothing is finished twice, and no armhole is left raw.
+    assert not any("raw edges with strips" in step for step in steps)
+    assert notions(drafted, "") == ("sewing thread", "1 invisible zip of 30 cm")
+    # The letters follow the steps.
+    assert seam_letters(drafted)["centre back"] == "A"
+    # Each step knows what it sews, in whatever words.
+    sewn = [step.sewn for step in sewing_steps(drafted, "")]
+    assert sewn[places["zip"]] == {"back_right": {"centre back"}, "back_left": {"centre back"}}
+    assert sewn[places["baste"]] == {
+        "front_lining": {"armhole right", "armhole left"},
+        "back_right_lining": {"armhole right"},
+        "back_left_lining": {"armhole left"},
+    }
+    assert sewn[places["hems"]]["front"] == {"hem"}
+    # A pattern that was written and read again is sewn alike.
+    again = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
+    assert sewing_steps(again, "") == sewing_steps(drafted, "")
+    with printed_in(language_words("de")):
+        german_steps = sewing_steps(drafted, "")
+    german = " ".join(step.words for step in german_steps)
+    assert [step.sewn for step in german_steps] == sewn
+    assert "Reißverschluss, 30 cm, an beide Kanten von A (hintere Mitte" in german
+    assert "Säume umschlagen und nähen: 3 cm (Vorderteil" in german
+
+
+def test_a_zip_in_one_side_alone_is_one_zip():
+    pattern = top()
+    seams = [replace(seam, openings=(ZIP,)) if seam.name == "side left" else seam for seam in pattern.seams]
+    drafted = draft_garment(replace(pattern, seams=seams))
+    assert notions(drafted, "") == ("sewing thread", "1 invisible zip of 30 cm")
+    steps = [step.words for step in sewing_steps(drafted, "")]
+    (zip_in,) = [step for step in steps if "zip" in step]
+    assert "(side left: front to back left)" in zip_in
+    assert any("side right: front to back right" in step for step in steps)
+
+
+@pytest.mark.parametrize(
+    ("opening", "expected"),
+    [
+        (SeamOpening(kind="vent", length=0.1), "Turn in the long edges of the vent of 10 cm below C"),
+        (SeamOpening(kind="slit", length=0.1), "Turn in the edges of the slit of 10 cm below C"),
+        (SeamOpening(kind="buttons", length=0.2), "Close A (centre back: back right to back left) below the buttons"),
+        (
+            SeamOpening(kind="zip", length=0.2, begin=0.045, style="lapped"),
+            "Sew the lapped zip of 20 cm to both edges of A (centre back: back right to back left), from 4.5 cm below the upper edge",
+        ),
+        (SeamOpening(kind="zip", length=0.45, whole=True, style="lapped"), "all along: "),
+    ],
+)
+def test_every_opening_has_a_step(opening: SeamOpening, expected: str):
+    steps = [step.words for step in sewing_steps(draft_garment(top(opening)), "")]
+    assert any(expected in step for step in steps)
+
+
+def test_a_zip_above_a_vent_is_closed_down_to_the_vent():
+    steps = [step.words for step in sewing_steps(draft_garment(top(ZIP, SeamOpening(kind="vent", length=0.1))), "")]
+    assert "Then close the seam below it, down to the vent." in steps[0]
+    assert steps[1].startswith("Turn in the long edges of the vent of 10 cm")
+    with pytest.raises(InputError, match=r"unknown kind of opening 'zipp'; did you mean 'zip'\?"):
+        SeamOpening(kind="zipp", length=0.1)
+
+
+def test_a_band_that_is_shorter_than_its_edge_is_stretched():
+    band = Finishing(kind="band", edge="neck", width=0.02, share=0.85)
+    (step,) = [
+        step.words
+        for step in sewing_steps(draft_garment(finish_edges(top(), [band])), "")
+        if "bands" in step.words and "edges" in step.words
+    ]
+    assert "stretch the neck band)" in step
+
+
+def test_nothing_ends_at_a_zip_that_is_not_there():
+    facing = Finishing(kind="facing", edge="neck", width=0.05)
+    pattern = finish_edges(top(SeamOpening(kind="buttons", length=0.2)), [facing], gaps=["centre back"])
+    assert not any("zip" in step.words for step in sewing_steps(draft_garment(pattern), ""))
+
+
+@pytest.mark.parametrize(
+    ("openings", "expected"),
+    [
+        ((), ["Sew while it lies flat, notch to notch: A (side: front to back)."]),
+        (
+            (ZIP,),
+            [
+                "Sew the invisible zip of 30 cm to both edges of A (side left: front to back), from the upper edge down to the end "
+                "of its line: lay its teeth open on the sewing lines, right sides together, and sew close beside them. Then close the "
+                "seam below it.",
+                "Close, right sides together, notch to notch: A (side right: front to back).",
+            ],
+        ),
+    ],
+)
+def test_of_halves_on_the_fold_both_sides_are_sewn(openings: tuple[SeamOpening, ...], expected: list[str]):
+    corners = np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.5], [0.0, 0.5], [0.0, 0.0]])
+    kinds = {"hem": "hem", "side left": "seam", "waist": "cut", "centre": "fold"}
+
+    def half(name: str) -> Piece:
+        edges = [Edge(name=edge, points=corners[k : k + 2], kind=kind) for k, (edge, kind) in enumerate(kinds.items())]
+        return Piece(name=name, edges=edges)
+
+    sides = tuple((SeamSide(piece=name, edge="side left"),) for name in ("front", "back"))
+    seam = Seam(name="side left", sides=(sides[0], sides[1]), openings=openings)
+    drafted = draft_garment(Pattern(name="skirt", pieces={"": [half("front"), half("back")]}, seams=[seam]))
+    assert [step.words for step in sewing_steps(drafted, "")][: len(expected)] == expected
+
+
+def test_pocket_and_straps_that_no_seam_takes_are_sewn_on():
+    """As an apron's: nothing of them is left to be bound, and the pocket is hemmed once."""
+
+    def strip(name: str, width: float, kinds: Sequence[str]) -> Piece:
+        corners = np.array([[0.0, 0.0], [width, 0.0], [width, 0.2], [0.0, 0.2], [0.0, 0.0]])
+        names = ("bottom", "right", "top", "left")
+        edges = [Edge(name=n, points=corners[k : k + 2], kind=kinds[k]) for k, n in enumerate(names)]
+        return Piece(name=name, edges=edges)
+
+    pieces = (
+        strip("panel", 0.5, ["hem"] * 4),
+        strip("pocket", 0.2, ["seam", "seam", "hem", "seam"]),
+        strip("tie", 0.1, ["cut"] * 4),
+    )
+    steps = [step.words for step in sewing_steps(draft_garment(Pattern(name="apron", pieces={"": pieces})), "")]
+    assert [step.partition(":")[0].partition(",")[0] for step in steps] == [
+        "Hem the upper edges of the patch pockets",
+        "Press the long edges of the straps to their middle",
+        "Turn up and sew the hems",
+    ]
+    assert [step.rpartition(": ")[2] for step in steps[:2]] == ["pocket.", "tie."]
+    assert "pocket" not in steps[2]
+
+
+def test_a_waistband_above_a_zip_has_a_hook():
+    band = Finishing(kind="waistband", edge="neck", width=0.03)
+    assert "1 hook and bar" in notions(draft_garment(finish_edges(top(ZIP), [band], gaps=["centre back"])), "")
+    assert "1 hook and bar" not in notions(draft_garment(finish_edges(top(), [band])), "")
+
+
+@pytest.mark.parametrize(
+    ("kind", "share", "expected"),
+    [
+        ("band", 0.85, "Fold the bands lengthwise, wrong sides together, and sew both their edges on, notch to notch"),
+        ("binding", 1.0, "Sew the bindings on, right sides together, notch to notch: "),
+        ("ruffle", 1.5, "Sew the ruffles on, right sides together, notch to notch: "),
+    ],
+)
+def test_each_strip_is_sewn_on_as_its_kind_is(kind: str, share: float, expected: str):
+    finishing = Finishing(kind=kind, edge="neck", width=0.03, share=share)
+    drafted = draft_garment(finish_edges(top(), [finishing]))
+    steps = [step.words for step in sewing_steps(drafted, "")]
+    assert sum(step.startswith(expected) for step in steps) == 1
+    with printed_in(language_words("de")):
+        assert not any(expected in step.words for step in sewing_steps(drafted, ""))
+
+
+def test_a_waistband_has_ends_only_above_an_opening():
+    band = Finishing(kind="waistband", edge="neck", width=0.03)
+    for openings, gaps, ends in (((ZIP,), ["centre back"], True), ((), [], False)):
+        steps = sewing_steps(draft_garment(finish_edges(top(*openings), [band], gaps=gaps)), "")
+        (step,) = [step.words for step in steps if step.words.startswith("Sew the waistband on, ")]
+        assert ("sew its ends" in step) == ends
+
+
+def test_a_lining_is_sewn_to_its_vent():
+    pattern = top()
+    pieces = [
+        replace(
+            piece,
+            edges=[
+                replace(e, name=f"{e.name} vent", kind="hem") if e.name == "centre back" else e for e in piece.edges
+            ],
+        )
+        for piece in pattern.pieces[""]
+    ]
+    seams = [seam for seam in pattern.seams if seam.name != "centre back"]
+    drafted = draft_garment(add_lining(replace(pattern, pieces={"": pieces}, seams=seams), "lining"))
+    (step,) = [step for step in sewing_steps(drafted, "") if step.words.startswith("At the vent, ")]
+    assert step.sewn == {f"back_{side}_lining": frozenset({"centre back vent"}) for side in ("right", "left")}
+
+
+def test_ring_is_sewn_after_the_seams_that_it_crosses():
+    # A hat: two sides of 30 by 10 cm, a round crown, and a brim in two halves below the sides.
+    angles = np.linspace(0.0, np.pi, 33)
+    half = 0.3 / np.pi * np.column_stack([np.cos(angles), np.sin(angles)])
+    crown = Piece(name="crown", edges=[Edge(name="front", points=half), Edge(name="back", points=-half)])
+    box = {
+        "bottom": [[0.0, 0.0], [0.3, 0.0]],
+        "right": [[0.3, 0.0], [0.3, 0.1]],
+        "top": [[0.3, 0.1], [0.0, 0.1]],
+        "left": [[0.0, 0.1], [0.0, 0.0]],
+    }
+    others = [
+        Piece(
+            name=name,
+            edges=[
+                Edge(name=edge, points=np.array(points), kind="hem" if "brim" in name and edge == "bottom" else "seam")
+                for edge, points in box.items()
+            ],
+        )
+        for name in ("side_1", "side_2", "brim_1", "brim_2")
+    ]
+
+    def seam(one: str, other: str) -> Seam:
+        first, second = (SeamSide(piece=each.split(".")[0], edge=each.split(".")[1]) for each in (one, other))
+        made = Seam(name=f"{one} {other}", sides=((first,), (replace(second, reversed=True),)))
+        return replace(made, name=f"{joint_words(made)}{' 2' if '2' in one else ''}")
+
+    pairs = [
+        ("crown.front", "side_1.top"), ("side_2.top", "crown.back"), ("side_1.bottom", "brim_1.top"),
+        ("side_2.bottom", "brim_2.top"), ("side_1.right", "side_2.left"), ("side_2.right", "side_1.left"),
+        ("brim_1.right", "brim_2.left"), ("brim_2.right", "brim_1.left"),
+    ]  # fmt: skip
+    drafted = draft_garment(Pattern(name="hat", pieces={"": [crown, *others]}, seams=[seam(*pair) for pair in pairs]))
+    steps = [step.words for step in sewing_steps(drafted, "")]
+    # What lies flat first: the brim to the sides, then the ring that all of it is, and the crown around.
+    assert [step.partition(",")[0] for step in steps[:3]] == [
+        "Join the panels",
+        "Close",
+        "Sew around",
+    ]
+    assert all(
+        words in steps[0] for words in ("side 1 to side 2", "brim 1 to brim 2", "side 1 to brim 1", "side 2 to brim 2")
+    )
+    assert all(words in steps[1] for words in ("side 2 to side 1", "brim 2 to brim 1"))
+    assert all(words in steps[2] for words in ("crown to side 1", "side 2 to crown"))
+    assert "brim" not in steps[2]
+    # They are called by their pieces once.
+    assert "crown to side: " not in " ".join(steps)

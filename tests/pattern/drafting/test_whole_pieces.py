@@ -1,0 +1,44 @@
+"""Halves unfolded, and pieces cut turned over: what a mirror image turns round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpflat.pattern.drafting.piece_parts import Dart, Edge
+from warpflat.pattern.drafting.pieces import Piece
+from warpflat.pattern.drafting.whole_pieces import MIRRORED, whole_pieces
+
+
+def darted(*, on_fold: bool) -> Piece:
+    """A piece with a dart in its hem, half on the fold or cut twice."""
+    corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.11, 0.1], [0.12, 0.0], [0.2, 0.0], [0.2, 0.3], [0.0, 0.3]])
+    names = ("hem 1", "leg to the tip", "leg to the hem", "hem 2", "side", "top", "centre")
+    kinds = ("hem", "dart", "dart", "hem", "cut", "cut", "fold" if on_fold else "cut")
+    edges = [
+        Edge(name=name, points=corners[[k, (k + 1) % 7]], kind=kind)
+        for k, (name, kind) in enumerate(zip(names, kinds, strict=True))
+    ]
+    dart = Dart(name="dart", left="leg to the tip", right="leg to the hem")
+    return Piece(name="front", edges=edges, darts=[dart], quantity=1 if on_fold else 2, paired=not on_fold)
+
+
+@pytest.mark.parametrize("on_fold", [True, False])
+def test_a_mirrored_dart_runs_from_the_border_to_its_tip_and_back(on_fold: bool) -> None:
+    whole, seams, _ = whole_pieces([darted(on_fold=on_fold)], [], unsewn=True)
+    names = {"front"} if on_fold else {"front", "front" + MIRRORED}
+    assert set(whole) == names
+    darts = [(piece, dart) for piece in whole.values() for dart in piece.darts]
+    assert len(darts) == len(seams) == 2
+    tips = []
+    for piece, dart in darts:
+        left, right = piece.edge(dart.left).points, piece.edge(dart.right).points
+        np.testing.assert_array_equal(left[-1], right[0])
+        order = [edge.name for edge in piece.edges]
+        assert order.index(dart.right) == order.index(dart.left) + 1
+        assert [left[0, 1], left[-1, 1], right[-1, 1]] == pytest.approx([0.0, 0.1, 0.0])
+        tips.append(left[-1, 0])
+    assert tips == pytest.approx([0.11, -0.11])
+    for piece in whole.values():
+        x, y = np.concatenate([edge.points[:-1] for edge in piece.edges]).T
+        assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0.0, "counter-clockwise"

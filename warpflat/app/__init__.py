@@ -1,0 +1,1 @@
+"""What a person starts: scenes, the command line, batches, the studio, pages to review."""

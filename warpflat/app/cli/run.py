@@ -1,0 +1,128 @@
+"""`warpflat run`: a scene file is run, and what came out is reported."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from warpflat.app.cli.options import (
+    DONE,
+    EXIT_CODES,
+    NOT_CONVERGED,
+    RUN_FILES,
+    ComputingCommand,
+    output_options,
+    shear_limit_option,
+)
+
+if TYPE_CHECKING:
+    from warpflat.app.scene.load import Scene
+    from warpflat.app.scene.run import SceneResult
+
+__all__ = ["report_run", "run", "run_and_report", "start_warp_silently"]
+
+
+@click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
+@click.argument("scene", type=click.Path(path_type=Path))
+@shear_limit_option
+@output_options()
+def run(
+    scene: Path,
+    out: Path | None,
+    quiet: bool,
+    verbose: bool,
+    as_json: bool,
+    device: str | None,
+    shear_limit: float | None,
+) -> int:
+    """Run a scene file.
+
+    A scene is a TOML file that names a surface, its feature lines, a fabric and settings; see the folder scenes.
+
+    \b
+    Examples:
+      warpflat run scenes/dome.toml
+      warpflat run scenes/bodice.toml --out bodice --json
+    """
+    from warpflat.app.scene.load import load_scene
+
+    loaded = load_scene(scene).allowing(shear_limit)
+    return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
+
+
+def run_and_report(
+    scene: Scene, out: Path | None, *, quiet: bool, verbose: bool, as_json: bool, device: str | None
+) -> int:
+    from warpflat.app.cli.progress_bar import ProgressBar
+    from warpflat.core.beside import Beside, work_beside
+
+    folder = out if out is not None else Path("out") / scene.name
+    with ExitStack() as stack:
+        bar = stack.enter_context(ProgressBar(scene.name, hidden=quiet or as_json))
+        if "warp" in sys.modules:
+            # A process beside this one asks Warp for its devices, which starts it.
+            start_warp_silently()
+        stack.enter_context(work_beside())
+        built = None
+        if scene.settings.mannequin is not None and scene.settings.auto_cut is None and scene.settings.shape != "auto":
+            from warpflat.app.scene.form import scene_form
+
+            # Before the solver is loaded, which takes as long.
+            built = stack.enter_context(Beside(partial(scene_form, scene), "building the mannequin")).result
+        from warpflat.app.scene.run import run_scene
+
+        if built is not None and scene.settings.output.picture:
+            # While the mannequin is waited for: the processes that draw have it from this one.
+            import matplotlib.backends.backend_agg
+            import matplotlib.figure  # noqa: F401
+
+        start_warp_silently()
+        result = run_scene(scene, folder, on_progress=bar, device=device, built=built)
+    return report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
+
+
+def start_warp_silently() -> None:
+    """Start Warp without its greeting: standard output is for results, and a mistake is one line on standard error."""
+    import warp
+
+    from warpflat.core.compile import start_warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    start_warp()
+
+
+def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as_json: bool) -> int:
+    """Print the result of a run, and return the exit code."""
+    from warpflat.app.cli.summary import notes_line, summary_lines
+    from warpflat.app.cli.tables import drape_lines, run_summary, warnings_of
+    from warpflat.flat.flattening.fit_report import fit_lines
+
+    warnings = warnings_of(result.metrics)
+    if not (quiet or as_json):
+        # What was left out has a line of its own at the end.
+        printed = {*warnings, *result.metrics.get("notes", ())}
+        notes = [note for note in result.notes if note not in printed]
+        for line in [f"note: {note}" for note in notes] if verbose else filter(None, [notes_line(notes)]):
+            click.echo(f"warpflat: {line}", err=True)
+    for warning in warnings:
+        click.echo(f"warpflat: {warning}", err=True)
+    if as_json:
+        click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet and not verbose:
+        # A pipe takes whole lines.
+        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+        for line in summary_lines(result.metrics, result.files, str(folder), size=result.size, width=width):
+            click.echo(line)
+    elif not quiet:
+        if result.size:
+            click.echo(f"size: {result.size}")
+        click.echo(run_summary(result.metrics, result.files, str(folder)))
+        for line in (*fit_lines(result.metrics), *drape_lines(result.metrics)):
+            click.echo(line)
+    return NOT_CONVERGED if warnings else DONE

@@ -1,0 +1,194 @@
+"""A scene is run in several fabrics, and the patterns are compared: in a table, a picture and a true-size drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpflat.app.scene.comparison import Comparison
+from warpflat.app.scene.drape import drape_scene
+from warpflat.app.scene.form_shaping import settle_shape
+from warpflat.app.scene.load import Scene, scene_fabric
+from warpflat.app.scene.plan import MeshPlan, plan_scene
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.flat.cutting.remedies import advise
+from warpflat.flat.flattening.fit_report import STRAINS
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.flattening.verdict import judge
+from warpflat.garment.construction.garment import Garment
+
+__all__ = ["compare_fabrics", "compared_files", "comparison_table", "laid_upon", "save_comparison"]
+
+
+def compare_fabrics(
+    scene: Scene,
+    fabrics: Sequence[str],
+    *,
+    on_progress: Callable[[str, Progress], bool | None] | None = None,
+    device: str | None = None,
+    drape: bool = False,
+) -> Comparison:
+    """Run a scene in each of several fabrics, with the same cuts, seams and constraints.
+
+    Args:
+        scene: a surface with its cuts, all of which are made, or a garment on a mannequin; its own fabric does not count.
+        fabrics: two names or more, of the library or the scene's fabric files; others are compared with the first.
+        on_progress: called with the fabric and its `Progress` after every step.
+        device: Warp device, before the scene's own.
+        drape: sew each of them and put it on its body, by the settings of the scene's `[drape]` table if it has one.
+
+    Raises:
+        InputError: fewer than two fabrics, one given twice or unknown, or the scene is wrong.
+    """
+    if len(fabrics) < 2:
+        raise InputError(
+            f"{len(fabrics)} fabric given to compare; name two or more, such as --fabric denim --fabric jersey"
+        )
+    # In the scene's own fabric, so that all patterns have the same darts.
+    scene, _ = settle_shape(scene, device=device)
+    dressed, known = {}, dict[str, str]()
+    for name in fabrics:
+        one = replace(scene, settings=scene.settings.model_copy(update={"fabric": name}))
+        fabric = scene_fabric(one)
+        if fabric.name in known:
+            raise InputError(f"fabric {name!r} is given twice ({known[fabric.name]}); compare different ones")
+        known.update(dict.fromkeys((fabric.name, *fabric.aliases), fabric.name))
+        dressed[fabric.name] = one
+    plan = plan_scene(scene, device=device)
+    if isinstance(plan, MeshPlan):
+        # Cuts are found once, and all of them are made, so that all patterns have the same points.
+        plan = replace(plan, sequences=[replace(sequence, auto=None) for sequence in plan.sequences])
+    garments: dict[str, Garment] = {}
+    for name, one in dressed.items():
+
+        def report(_: str, progress: Progress, fabric: str = name) -> bool | None:
+            return None if on_progress is None else on_progress(fabric, progress)
+
+        cloth = replace(plan, scene=one) if isinstance(plan, MeshPlan) else plan_scene(one, device=device)
+        garments[name] = cloth.flatten(callback=report)
+    results = {name: {part: advise(flat) for part, flat in garment.parts.items()} for name, garment in garments.items()}
+    first = next(iter(results.values()))
+    layouts = {
+        name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
+        for name, pieces in results.items()
+    }
+    sewing = {name: garment.sewing_metrics() for name, garment in garments.items()}
+    drapes = {name: drape_scene(dressed[name], garments[name], device=device) for name in garments if drape}
+    return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing, drapes=drapes)
+
+
+def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
+    """Turn and shift a layout (#V by 2 [m]) to lie as near as it can to a target layout (Kabsch 1976)."""
+    centre, aim = layout.mean(axis=0), target.mean(axis=0)
+    u, _, v = np.linalg.svd((layout - centre).T @ (target - aim))
+    turn = u @ np.diag([1.0, float(np.sign(np.linalg.det(u @ v)))]) @ v
+    return np.asarray((layout - centre) @ turn + aim)
+
+
+def compared_files(*, drape: bool) -> list[str]:
+    """Return the names of the files of a comparison."""
+    return ["compare.json", "compare.png", "compare.svg", *(["compare-drape.png"] if drape else [])]
+
+
+def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
+    """Write `compare.json`, `compare.png` and `compare.svg` (outlines in true size), all of them or none.
+
+    Raises:
+        InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
+    """
+    from warpflat.app.scene.compare_picture import write_overlay_picture, write_overlay_svg
+    from warpflat.core.output import optional_file, output_folder, write_report
+    from warpflat.garment.draping.picture import write_compared_drapes
+
+    sources = [
+        file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources
+    ]
+    files = ["compare.svg"]
+    with output_folder(folder, compared_files(drape=bool(comparison.drapes)), sources=sources, guard=True) as to:
+        write_overlay_svg(to / "compare.svg", comparison)
+        with optional_file(to / "compare.png", files) as path:
+            write_overlay_picture(path, comparison)
+        if comparison.drapes:
+            with optional_file(to / "compare-drape.png", files) as path:
+                write_compared_drapes(path, comparison.drapes)
+        write_report(to / "compare.json", comparison.as_dict(), name="compare", files=files)
+    return [file for file in compared_files(drape=True) if file in ("compare.json", *files)]
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """Return area, border lengths, energies, strains and distances as text: a block per piece, a column per fabric."""
+    blocks = []
+    for piece in comparison.pieces:
+        distances = list(comparison.distances(piece).values())
+        measures = [comparison.results[fabric][piece].measures for fabric in comparison.fabrics]
+        borders = [comparison.borders(fabric, piece) for fabric in comparison.fabrics]
+        rows = [
+            ("area [cm2]", [f"{1e4 * m['area_m2']:.1f}" for m in measures]),
+            *((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]) for name in borders[0]),
+            ("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]),
+            ("model energy [mJ]", [f"{1e3 * m['model_energy_j']:.4g}" for m in measures]),
+            ("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]),
+            *_strain_rows([m["wear"] for m in measures], "min", "max"),
+            ("beyond limit [%]", [f"{100 * m['wear']['outside']:.1f}" for m in measures]),
+            ("held beyond it [%]", [f"{100 * m['wear']['held']:.1f}" for m in measures]),
+            ("converged", ["yes" if m["converged"] else "NO" for m in measures]),
+            *[(f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in distances)]) for point in distances[0]],
+        ]
+        blocks.append(_columns(piece, comparison.fabrics, rows))
+    if comparison.drapes:
+        # Gap, strain and pressure of each drape.
+        found = [comparison.drapes[fabric].measures() for fabric in comparison.fabrics]
+        verdicts = [verdict for m in found if (verdict := judge({"pieces": {}, "drape": m}))]
+
+        def millimetres(key: str, part: str) -> list[str]:
+            return [f"{1e3 * m[key][part]:.1f}" for m in found]
+
+        blocks.append(
+            _columns(
+                "worn",
+                comparison.fabrics,
+                [
+                    ("largest gap [mm]", [f"{1e3 * max(m['gap_m'].values(), default=0.0):.1f}" for m in found]),
+                    ("gap at", [max(m["gap_m"], key=m["gap_m"].__getitem__, default="-") for m in found]),
+                    ("distance, mean [mm]", millimetres("distance_m", "mean")),
+                    ("misfit, mean [mm]", millimetres("misfit_m", "mean")),
+                    ("misfit, most [mm]", millimetres("misfit_m", "max")),
+                    *_strain_rows(found, "p5", "p95"),
+                    ("beyond limit [%]", [f"{100 * m['outside']:.1f}" for m in found]),
+                    ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
+                    ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
+                    ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
+                    ("fits", ["yes" if verdict.fits else "no" for verdict in verdicts]),
+                    ("at rest", ["yes" if m["converged"] else "NO" for m in found]),
+                ],
+            )
+        )
+    note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
+    return "\n\n".join(blocks) + f"\n\n{note}"
+
+
+def _strain_rows(measures: Sequence[Mapping[str, Any]], low: str, high: str) -> list[tuple[str, list[str]]]:
+    """Return a row each for warp, weft and shear, from one key of an entry to another."""
+    return [
+        (
+            f"{word if unit == 'degrees' else f'strain {word}'} [{unit}]",
+            [f"{factor * each[key][low]:+.1f} to {factor * each[key][high]:+.1f}" for each in measures],
+        )
+        for key, word, factor, unit in STRAINS
+    ]
+
+
+def _columns(title: str, fabrics: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:
+    left = max(len(title), *(len(name) for name, _ in rows))
+    widths = [max(len(fabric), *(len(cells[k]) for _, cells in rows)) for k, fabric in enumerate(fabrics)]
+    lines = ["  ".join([title.ljust(left), *(f.rjust(w) for f, w in zip(fabrics, widths, strict=True))])]
+    lines += [
+        "  ".join([name.ljust(left), *(cell.rjust(w) for cell, w in zip(cells, widths, strict=True))])
+        for name, cells in rows
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,163 @@
+"""Outlines of one pattern in several fabrics, laid upon each other: a picture with close-ups, and a true-size SVG."""
+
+from __future__ import annotations
+
+import os
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from warpflat.app.scene.comparison import Comparison, outline
+from warpflat.core.output import atomic_path
+from warpflat.flat.surface.connectivity import border_loops
+from warpflat.pattern.export.figure import new_figure
+from warpflat.pattern.export.letters import all_letters
+
+__all__ = ["write_overlay_picture", "write_overlay_svg"]
+
+
+# Okabe and Ito's colours, which can be distinguished without red-green vision; and dashes, for print in grey.
+_STYLES: tuple[tuple[str, tuple[float, ...]], ...] = (
+    ("#000000", ()),
+    ("#d55e00", (6, 2)),
+    ("#0072b2", (2, 1.5)),
+    ("#009e73", (8, 2, 2, 2)),
+    ("#cc79a7", (4, 1, 1, 1)),
+    ("#e69f00", (1, 1)),
+    ("#56b4e9", (10, 3)),
+)
+_CLOSE_UPS = 3
+_MARGIN_MM = 15.0
+
+
+def _style(number: int) -> tuple[str, tuple[float, ...]]:
+    return _STYLES[number % len(_STYLES)]
+
+
+def write_overlay_svg(path: str | os.PathLike[str], comparison: Comparison) -> None:
+    """Write the outlines in true size (a unit is a millimetre), in a group per piece with a path per fabric.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    root = ET.Element("svg", {"xmlns": "http://www.w3.org/2000/svg"})
+    left, height = _MARGIN_MM, 0.0
+    legend = _MARGIN_MM + 6.0 * len(comparison.fabrics)
+    for piece in comparison.pieces:
+        points = np.concatenate([comparison.layouts[fabric][piece] for fabric in comparison.fabrics])
+        low, high = 1e3 * points.min(axis=0), 1e3 * points.max(axis=0)
+        group = ET.SubElement(root, "g", {"id": piece.replace(" ", "_"), "fill": "none", "stroke-width": "0.4"})
+        for number, fabric in enumerate(comparison.fabrics):
+            colour, dashes = _style(number)
+            parts = []
+            for loop in outline(comparison.results[fabric][piece], comparison.layouts[fabric][piece]):
+                x = 1e3 * loop[:-1, 0] - low[0] + left
+                y = high[1] - 1e3 * loop[:-1, 1] + legend + _MARGIN_MM
+                parts.append("M" + " L".join(f"{a:.3f},{b:.3f}" for a, b in zip(x, y, strict=True)) + " Z")
+            attributes = {"id": f"{piece}.{fabric}".replace(" ", "_"), "stroke": colour, "d": " ".join(parts)}
+            if dashes:
+                attributes["stroke-dasharray"] = " ".join(f"{d:g}" for d in dashes)
+            ET.SubElement(group, "path", attributes)
+        left += float(high[0] - low[0]) + _MARGIN_MM
+        height = max(height, float(high[1] - low[1]))
+    for number, fabric in enumerate(comparison.fabrics):
+        colour, dashes = _style(number)
+        y = _MARGIN_MM + 6.0 * number
+        line = {"x1": f"{_MARGIN_MM}", "x2": f"{_MARGIN_MM + 20}", "y1": f"{y}", "y2": f"{y}", "stroke": colour}
+        if dashes:
+            line["stroke-dasharray"] = " ".join(f"{d:g}" for d in dashes)
+        ET.SubElement(root, "line", {**line, "stroke-width": "0.6"})
+        text = ET.SubElement(root, "text", {"x": f"{_MARGIN_MM + 23}", "y": f"{y + 1.5}", "font-size": "4.5"})
+        text.text = fabric
+    tall = legend + height + 2 * _MARGIN_MM
+    root.set("width", f"{left:.3f}mm")
+    root.set("height", f"{tall:.3f}mm")
+    root.set("viewBox", f"0 0 {left:.3f} {tall:.3f}")
+    with atomic_path(path) as temporary:
+        ET.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+
+
+@all_letters()
+def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) -> None:
+    """Draw each piece with its outlines laid upon each other, and close-ups of where they are furthest apart.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    rows = len(comparison.pieces)
+    figure = new_figure(13.0, 6.6 * rows + 0.9, dpi=110)
+    grid = figure.add_gridspec(rows * _CLOSE_UPS, 2, width_ratios=(2.6, 1.0), hspace=0.35, wspace=0.05)
+    for row, piece in enumerate(comparison.pieces):
+        whole = figure.add_subplot(grid[row * _CLOSE_UPS : (row + 1) * _CLOSE_UPS, 0])
+        _draw_outlines(whole, comparison, piece, width=1.4)
+        # The named points that are furthest apart, or the one of the outline that is.
+        first, *others = [comparison.layouts[fabric][piece] for fabric in comparison.fabrics]
+        points = comparison.points(piece)
+        if not points:
+            faces = comparison.results[comparison.fabrics[0]][piece].faces
+            outline = np.concatenate([np.unique(loop) for loop in border_loops(faces)])
+            moved = np.max([np.linalg.norm(other - first, axis=1) for other in others], axis=0)
+            points = {"furthest apart": int(outline[np.argmax(moved[outline])])}
+        places = []
+        for label, vertex in points.items():
+            apart = max(float(np.linalg.norm(other[vertex] - first[vertex])) for other in others)
+            places.append((label, np.mean([layout[vertex] for layout in (first, *others)], axis=0), apart))
+        places = sorted(places, key=lambda place: -place[2])[:_CLOSE_UPS]
+        for number, (label, at, apart) in enumerate(places):
+            close = figure.add_subplot(grid[row * _CLOSE_UPS + number, 1])
+            _draw_outlines(close, comparison, piece, width=1.8)
+            reach = max(2.0 * apart, 0.004)
+            close.set_xlim(at[0] - 1.6 * reach, at[0] + 1.6 * reach)
+            close.set_ylim(at[1] - reach, at[1] + reach)
+            close.set_xticks([])
+            close.set_yticks([])
+            length = 10.0 ** np.floor(np.log10(1.6 * reach))
+            x, y = at[0] - 1.5 * reach, at[1] - 0.9 * reach
+            close.plot([x, x + length], [y, y], color="black", linewidth=2)
+            close.annotate(
+                f"{1e3 * length:g} mm", (x + length, y), xytext=(4, -3), textcoords="offset points", fontsize=9
+            )
+            close.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=10)
+            whole.plot(*at, "o", mfc="none", mec="#555555", ms=11)
+            whole.annotate(
+                str(number + 1),
+                (float(at[0]), float(at[1])),
+                xytext=(9, 6),
+                textcoords="offset points",
+                color="#555555",
+                fontsize=10,
+            )
+            close.text(0.03, 0.9, str(number + 1), transform=close.transAxes, color="#555555", fontsize=11)
+        whole.set_axis_off()
+        most = {fabric: 1e3 * d["outline, most"] for fabric, d in comparison.distances(piece).items()}
+        words = ", ".join(f"{fabric} {mm:.1f} mm" for fabric, mm in most.items())
+        whole.set_title(f"{piece}: outline apart by at most {words}", fontsize=11, loc="left")
+        low, high = whole.get_xlim()[0], whole.get_ylim()[0]
+        length = 0.1 if whole.get_xlim()[1] - low > 0.25 else 0.02
+        whole.plot([low, low + length], [high, high], color="black", linewidth=2)
+        whole.annotate(
+            f"{100 * length:.0f} cm", (low + length / 2, high), xytext=(0, 4), textcoords="offset points", ha="center"
+        )
+    handles = []
+    for colour, dashes in map(_style, range(len(comparison.fabrics))):
+        handles.append(Line2D([], [], color=colour, linestyle=(0, dashes) if dashes else "-", linewidth=1.6))
+    figure.legend(
+        handles,
+        [f"{fabric} (compared with)" if k == 0 else fabric for k, fabric in enumerate(comparison.fabrics)],
+        loc="upper center",
+        ncols=min(len(comparison.fabrics), 6),
+        frameon=False,
+        fontsize=11,
+    )
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png", bbox_inches="tight", metadata={"Software": "warpflat"})
+
+
+def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: float) -> None:
+    for number, fabric in enumerate(comparison.fabrics):
+        colour, dashes = _style(number)
+        for loop in outline(comparison.results[fabric][piece], comparison.layouts[fabric][piece]):
+            axis.plot(*loop.T, color=colour, linewidth=width, linestyle=(0, dashes) if dashes else "-")
+    axis.set_aspect("equal")

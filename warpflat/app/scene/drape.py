@@ -1,0 +1,119 @@
+"""The garment of a scene is draped, if the scene says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpflat.app.scene.frames import FrameSchedule
+from warpflat.app.scene.load import Scene, errors_named
+from warpflat.app.scene.schema import DrapeTable
+from warpflat.core.activity import report_activity
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.pattern_files import garment_files, pattern_names
+
+if TYPE_CHECKING:
+    from warpflat.flat.flattening.result import Flattening
+    from warpflat.garment.draping.result import Drape
+
+__all__ = ["drape_names", "drape_scene", "write_drape"]
+
+
+def drape_names(scene: Scene) -> list[str]:
+    """Return the files that a scene's drape will write, as far as they are known: without those of a form's pieces."""
+    settings, output, table = scene.settings, scene.settings.output, scene.settings.drape
+    if table is None:
+        return []
+    names = [f"{scene.name}.draped.obj"] if settings.mannequin is None else []
+    names += ["drape.png"] if output.picture else []
+    names += ["worn.usdc"] if table.usd else []
+    names += ["drape.webp"] if output.picture and FrameSchedule(output).wanted else []
+    if table.correct or table.correct_fabric is not None:
+        names += ["corrected.png"] if output.picture else []
+        names += pattern_names(f"{scene.name}.corrected", _corrected_formats(scene))
+    return names
+
+
+def _corrected_formats(scene: Scene) -> list[str]:
+    """Return the formats of the corrected pattern: the PDF and the JSON have one name in a folder, which is the first pattern's."""
+    return [each for each in scene.settings.pattern.formats if each not in ("pdf", "json")]
+
+
+def write_drape(
+    scene: Scene, garment: Garment, folder: Path, *, device: str | None = None
+) -> tuple[dict[str, Any], list[str]]:
+    """Drape a scene's garment, and write its files.
+
+    Args:
+        scene: with a `[drape]` table.
+        garment: flattened.
+        folder: an existing one.
+        device: Warp device.
+
+    Returns:
+        The entries of `metrics.json`, and the names of the files.
+
+    Raises:
+        InputError: an unknown line, or the folder cannot be written.
+    """
+    from warpflat.garment.draping.write import write_drape_files
+
+    draped = drape_scene(scene, garment, device=device)
+    output = scene.settings.output
+    table = scene.settings.drape
+    assert table is not None
+    files = write_drape_files(
+        draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted, usd=table.usd
+    )
+    metrics = {"drape": draped.measures()}
+    if table.correct or table.correct_fabric is not None:
+        # Correct the pattern, and write it beside the first.
+        from warpflat.app.scene.pattern_options import pattern_options
+        from warpflat.core.output import optional_file
+        from warpflat.flat.fabric.library import find_fabric
+        from warpflat.garment.draping.correct_pattern import correct_pattern
+
+        report_activity("correcting the pattern")
+        with errors_named(scene.where):
+            other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
+            found = correct_pattern(
+                draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None
+            )
+            drawing = pattern_options(scene.settings.pattern, None)
+        if output.picture:
+            with optional_file(folder / "corrected.png", files) as path:
+                from warpflat.garment.draping.correction_picture import write_correction_picture
+
+                write_correction_picture(path, found)
+        corrected = found.apply(garment)
+        assert isinstance(corrected, Garment)
+        drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
+        written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
+        metrics["drape"]["correction"] = found.measures(garment)
+        files += written.files
+    return metrics, files
+
+
+def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | None = None) -> Drape:
+    """Drape a scene's garment or piece by the settings of its `[drape]` table, or by the defaults.
+
+    Args:
+        scene: the scene.
+        garment: flattened.
+        device: Warp device.
+
+    Raises:
+        InputError: an unknown line, or half pieces.
+    """
+    from warpflat.garment.draping.drape_garment import drape
+    from warpflat.garment.draping.options import DrapeOptions
+
+    table = scene.settings.drape or DrapeTable()
+    report_activity("draping")
+    with errors_named(scene.where):
+        options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
+        return drape(
+            garment, hold=table.hold, elastics=[each.edge for each in scene.settings.finishing if each.elastic], options=options,
+            device=device or scene.settings.device,
+        )  # fmt: skip

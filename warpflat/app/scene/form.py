@@ -1,0 +1,77 @@
+"""The mannequin and the form of a scene. No solver is loaded for them: a run builds them while it loads one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from warpflat.app.scene.cuts import cut_form
+from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
+from warpflat.app.scene.openings import scene_finishing, scene_openings
+from warpflat.app.scene.pulled_on import wide_enough
+from warpflat.garment.construction.openings import part_at_centres
+from warpflat.garment.mannequin.ease import ease_from
+from warpflat.garment.mannequin.forms import Form, FormResult, form_from_mapping, shipped_form
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.shapes import shaped_form
+from warpflat.garment.mannequin.table import mannequin_from_table
+
+__all__ = ["scene_form", "scene_recipe"]
+
+
+def scene_form(
+    scene: Scene, mannequin: Mannequin | None = None, *, before: FormResult | None = None
+) -> tuple[Mannequin, FormResult]:
+    """Build the pieces of the scene's form on its mannequin, or on another one; return both.
+
+    Args:
+        scene: with a form.
+        mannequin: another one than the scene's.
+        before: a form on this mannequin that may have much in common, to save time.
+
+    Raises:
+        InputError: the body, the form or a brick is wrong.
+    """
+    mannequin, form = scene_recipe(scene, mannequin)
+    with errors_named(f"{scene.where}: {'cuts' if scene.settings.cuts else 'form'}"):
+        built = mannequin.form(form, half=scene.settings.half, before=before)
+    if scene.settings.pulled_on:
+        with errors_named(f"{scene.where}: pulled_on"):
+            built = wide_enough(
+                mannequin,
+                built,
+                strain_limit=scene_fabric(scene).strain_limit,
+                openings=scene_openings(scene.settings),
+                finishing=scene_finishing(scene.settings.finishing),
+            )
+    return mannequin, built
+
+
+def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:
+    """Return the scene's mannequin, or the one that is given, and its form with its cuts, not yet built on it.
+
+    Raises:
+        InputError: the body, the form or a brick is wrong.
+    """
+    settings = scene.settings
+    assert settings.mannequin is not None  # the schema sees to it
+    if mannequin is None:
+        with errors_named(f"{scene.where}: mannequin"):
+            mannequin = mannequin_from_table(
+                settings.mannequin, path_of=lambda file: scene.folder / expand_variables(file)
+            )
+    with errors_named(f"{scene.where}: form"):
+        if isinstance(settings.form, str):
+            form = shipped_form(settings.form)
+        else:
+            form = form_from_mapping(scene.name, settings.form or {})
+    if settings.ease is not None:
+        form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
+    with errors_named(f"{scene.where}: form"):
+        if not settings.half:
+            form = part_at_centres(mannequin.layout, form, scene_openings(settings))
+        shape = "darts" if settings.shape == "auto" else settings.shape
+        woven = not scene_fabric(scene).is_knit
+        form = shaped_form(mannequin.layout, form, shape, mannequin.vertices, woven=woven)
+    # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
+    with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
+        return mannequin, cut_form(mannequin, form, settings.cuts)

@@ -1,0 +1,221 @@
+"""The ledger of a scene's cuts: what each candidate would release, tried on a mesh, or on a form's piece and the mirror image of that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+from warpflat.app.scene.cuts import CutSequence, cut_of_dart, cuts_beside, flatten_and_cut, place_of, scene_with
+from warpflat.app.scene.form import scene_form, scene_recipe
+from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
+from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, scene_cuts
+from warpflat.core.errors import InputError
+from warpflat.flat.cutting.candidates import Peaks, find_candidates, find_peaks
+from warpflat.flat.cutting.cut_plan import CutPlan
+from warpflat.flat.cutting.ledger import Ledger, LedgerEntry, RankedBy, coarse_options, make_ledger, try_all
+from warpflat.garment.construction.form_garment import flatten_form
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.mannequin.bricks import select_bricks
+from warpflat.garment.mannequin.darts import dart_along, usual_darts
+from warpflat.garment.mannequin.forms import Form
+from warpflat.garment.mannequin.halves import is_side
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.part_pieces import princess_seams
+
+__all__ = ["FormTrial", "candidate_cuts", "cuts_of_entry", "scene_ledger", "trial_of_scene", "try_cuts", "with_cut"]
+
+
+def scene_ledger(scene: Scene, *, by: RankedBy = "per_cm", device: str | None = None) -> Ledger:
+    """Try and rank cuts that a scene's garment could have next.
+
+    Of a mesh, after its own cuts and without its seams and constraints: those of
+    :func:`warpflat.flat.cutting.candidates.find_candidates`. Of a form: those of :func:`candidate_cuts`.
+
+    Raises:
+        InputError: the scene is wrong, or there is nothing to cut for.
+    """
+    if scene.settings.mannequin is not None:
+        base = trial_of_scene(scene, device=device)
+        entries, refused = try_cuts(base, list(candidate_cuts(base)), by=by)
+        if not entries:
+            why = "; ".join(f"{name}: {reason}" for name, reason in refused[:1]) or "its pieces store no energy"
+            raise InputError(f"{scene.where}: there is no cut to compare: {why}")
+        peaks = [f"{name}: {place}" for name, found in base.peaks.items() for place in found.words]
+        return Ledger(
+            name=scene.name,
+            pieces=tuple(base.garment.pieces.values()),
+            peaks=tuple(peaks),
+            entries=entries,
+            refused=refused,
+            notes=("cuts are tried piece by piece, their darts sewn; a run sews the whole garment",),
+        )
+    relax = scene_relax_options(scene)
+    sequence = scene_cuts(scene, device=device)
+    with errors_named(scene.where):
+        result = flatten_and_cut(sequence, flatten=partial(flatten_surface, scene, device=device), relax=relax)
+        ledger = make_ledger(result, relax=relax, by=by)
+    asked = [key for key in ("seams", "constraints") if getattr(scene.settings, key)]
+    if not asked:
+        return ledger
+    note = f"candidates are compared without the scene's {' and '.join(asked)}; a run keeps them, --apply too"
+    return replace(ledger, notes=(note,))
+
+
+def cuts_of_entry(ledger: Ledger, number: int) -> CutSequence:
+    """Return the cuts of a mesh's piece, and after them the candidate of a number (from 1) in its ledger.
+
+    Raises:
+        InputError: there is no such number.
+    """
+    result = ledger.entry(number).result
+    assert result is not None
+    return CutSequence(surface=result.surface, plans=tuple(CutPlan.from_applied(made) for made in result.cuts))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FormTrial:
+    """A scene's pieces, relaxed coarsely one by one, with the legs of their darts sewn.
+
+    Attributes:
+        plan: the scene's garment.
+        recipe: its form.
+        garment: the pieces.
+    """
+
+    plan: GarmentPlan
+    recipe: Form
+    garment: Garment
+
+    @property
+    def mannequin(self) -> Mannequin:
+        """The body."""
+        return self.plan.mannequin
+
+    @property
+    def bricks(self) -> dict[str, list[str]]:
+        """The bricks of every piece, on both sides of the body."""
+        layout = self.mannequin.layout
+        return {name: select_bricks(layout, recipe.bricks) for name, recipe in self.recipe.pieces.items()}
+
+    @cached_property
+    def peaks(self) -> dict[str, Peaks]:
+        """Where the energy of the pieces is, without those that store none inside."""
+        found = {name: find_peaks(piece) for name, piece in self.garment.pieces.items()}
+        return {name: peaks for name, peaks in found.items() if peaks.vertices}
+
+
+def trial_of_scene(scene: Scene, *, device: str | None = None) -> FormTrial:
+    """Flatten a scene's pieces one by one.
+
+    Raises:
+        InputError: as :func:`warpflat.app.scene.plan.plan_garment`.
+    """
+    plan = plan_garment(scene, device=device)
+    _, recipe = scene_recipe(scene, plan.mannequin)
+    return FormTrial(plan=plan, recipe=recipe, garment=_flatten(plan, plan.form.pieces))
+
+
+def _flatten(plan: GarmentPlan, names: Sequence[str] | Mapping[str, Any], scene: Scene | None = None) -> Garment:
+    """Flatten some pieces of a plan's form, or of another scene's form on its body, without seams between them."""
+    form = plan.form if scene is None else scene_form(scene, plan.mannequin)[1]
+    alone = replace(form, pieces={name: form.pieces[name] for name in names}, seams=(), ease={})
+    settings = {**plan.settings, "relax": coarse_options(plan.settings["relax"]), "curves_mm": 0.0}
+    return flatten_form(plan.mannequin, alone, **settings)
+
+
+def candidate_cuts(base: FormTrial, *, usual_only: bool = False) -> Iterator[dict[str, Any]]:
+    """Yield tables of cuts that the pieces do not have yet: once a side, as both sides are cut.
+
+    Args:
+        base: the pieces before them.
+        usual_only: the darts of a pattern book only.
+    """
+    layout, bricks, form = base.mannequin.layout, base.bricks, base.plan.form
+    present = {dart.place for dart in base.recipe.darts}
+    names = {(dart.piece, dart.name) for dart in base.recipe.darts}
+    for dart in usual_darts(layout, form.vertices, bricks):
+        if dart.place not in present:
+            yield cut_of_dart(dart if (dart.piece, dart.like) in names else replace(dart, like=None))
+    if usual_only:
+        return
+    found: set[tuple[Any, ...]] = set()
+    for dart in (dart for name, own in bricks.items() for dart in princess_seams(layout, own, name)):
+        found.add((dart.piece, dart.line, dart.part))
+        yield cut_of_dart(dart)
+    for name, piece in base.garment.pieces.items():
+        if all(is_side(brick, "right") for brick in bricks[name]):
+            continue
+        # From the border along lines to the peaks of its energy, and along whole lines.
+        try:
+            candidates = find_candidates(piece, base.peaks.get(name))
+        except InputError:
+            continue
+        for candidate in candidates:
+            if len(candidate.paths) != 1:
+                continue
+            row = form.pieces[name].grid_vertices[candidate.paths[0]]
+            words = candidate.name.replace(",", "").replace(" left", "").replace(" right", "")
+            along = dart_along(layout, form.vertices, bricks[name], row, piece=name, name=words)
+            if along is not None and (key := (along.piece, along.line, along.part)) not in found:
+                found.add(key)
+                yield cut_of_dart(along)
+
+
+def with_cut(scene: Scene, cut: Mapping[str, Any], mannequin: Mannequin | None = None) -> Scene:
+    """Return a scene with one cut more; one that is left out in the scene is put back instead.
+
+    A seam takes over darts of the scene.
+
+    Args:
+        scene: with a form.
+        cut: a table of `[[cuts]]`.
+        mannequin: the scene's, if it has been made.
+    """
+    own = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
+    kept = [table for table in own if not (table.get("omit") and place_of(table) == place_of(cut))]
+    if len(kept) < len(own):
+        return scene_with(scene, cuts=kept)
+    if set(cut.get("part") or ()) == {0.0, 1.0}:
+        own = cuts_beside(*scene_recipe(scene, mannequin), own, cut)
+    return scene_with(scene, cuts=[*own, dict(cut)])
+
+
+def try_cuts(
+    base: FormTrial, cuts: Sequence[Mapping[str, Any]], *, by: RankedBy
+) -> tuple[tuple[LedgerEntry, ...], tuple[tuple[str, str], ...]]:
+    """Try cuts of a form on their pieces, each on its own; return them, the best first, and those that are refused, and why."""
+
+    def evaluate(cut: Mapping[str, Any]) -> LedgerEntry:
+        scene = with_cut(base.plan.scene, cut, base.mannequin)
+        try:
+            form = scene_form(scene, base.mannequin)[1]
+            before = base.plan.form.pieces
+            legs = form.legs()
+            darts = [d for d in form.darts if d.asked.place == place_of(cut) and (d.piece, d.name) in legs]
+            changed = {dart.piece for dart in darts} or set(form.pieces) - set(before)
+            garment = _flatten(base.plan, [name for name in form.pieces if name in changed], scene)
+        except InputError as reason:
+            raise InputError(str(reason).removeprefix(f"{scene.where}: ")) from None
+        paths = [form.vertices[dart.row] for dart in darts]
+        paths += [
+            form.pieces[seam.pieces[0]].surface.vertices[run.vertices[0]]
+            for seam in form.seams
+            for run in seam.runs
+            if not darts and changed.issuperset(seam.pieces)
+        ]
+        return LedgerEntry.measure(
+            _name(cut),
+            [base.garment.pieces[name] for name in before if name in changed or name not in form.pieces],
+            list(garment.pieces.values()),
+            paths=paths,
+            cracks=[(garment.pieces[d.piece], *legs[d.piece, d.name]) for d in darts],
+            cut=cut,
+        )
+
+    return try_all(cuts, _name, evaluate, by=by)
+
+
+def _name(cut: Mapping[str, Any]) -> str:
+    return f"{cut['piece']}.{cut['name']}"

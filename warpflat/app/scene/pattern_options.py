@@ -1,0 +1,62 @@
+"""Pattern options of a scene: its tables `pattern` and `marker`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from warpflat.garment.construction.edge_rules import EdgeRules
+
+if TYPE_CHECKING:
+    from warpflat.app.scene.schema import ClothTable, MarkerTable, PatternTable
+from warpflat.garment.construction.pattern_files import PatternOptions
+from warpflat.pattern.drafting.shrinkage import Shrinkage
+from warpflat.pattern.drafting.words import language_words
+
+__all__ = ["pattern_options"]
+
+
+def pattern_options(
+    table: PatternTable, marker: MarkerTable | None, cut_from: ClothTable | None = None
+) -> PatternOptions:
+    """Return the pattern options of a scene's tables `pattern`, `marker` and `cloth`.
+
+    Raises:
+        InputError: a gap that is wide against the cloth.
+    """
+    from warpflat.pattern.drafting.marker import Cloth
+    from warpflat.pattern.drafting.matched_lay import Stripes
+
+    cloth = None
+    if marker is not None:
+        stripes = Stripes()
+        if cut_from is not None:
+            stripes = Stripes(
+                warp=cut_from.repeat_warp_mm / 1000, weft=cut_from.repeat_weft_mm / 1000, seams=tuple(cut_from.match)
+            )
+        cloth = Cloth(
+            width=marker.width, one_way=marker.one_way, reversible=marker.reversible, gap=marker.gap, folded=marker.folded,
+            stripes=stripes,
+        )  # fmt: skip
+    return PatternOptions(
+        formats=tuple(table.formats),
+        dialect=table.dialect,
+        paper=table.paper,
+        tolerance=None if table.tolerance_mm is None else table.tolerance_mm / 1000,
+        rules=EdgeRules(
+            seam=table.allowance_mm / 1000,
+            hem=table.hem_mm / 1000,
+            kinds=table.kinds,
+            allowances={edge: width / 1000 for edge, width in table.allowances_mm.items()},
+        ),
+        cloth=cloth,
+        units=table.units,
+        names=table.names,
+        words={**language_words(table.language), **table.words},
+        marker_seconds=5 if marker is None else marker.seconds,
+        shrinkage=Shrinkage()
+        if cut_from is None
+        else Shrinkage(warp=cut_from.shrinkage_warp, weft=cut_from.shrinkage_weft),
+        lining="" if cut_from is None else cut_from.lining,
+        interfacing="" if cut_from is None else cut_from.interfacing,
+        pocketing="" if cut_from is None else cut_from.pocketing,
+    )

@@ -1,0 +1,482 @@
+"""A scene's garment, checked and not yet flattened. Its pieces and seams come from a mesh, from several, or from a form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
+from warpflat.app.scene.form import scene_form, scene_recipe
+from warpflat.app.scene.found_seams import found_seams, plain_panel
+from warpflat.app.scene.frames import FrameRecorder
+from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
+from warpflat.app.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
+from warpflat.app.scene.pattern_options import pattern_options
+from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
+from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
+from warpflat.core.activity import report_activity
+from warpflat.core.errors import InputError, StepError
+from warpflat.core.output import optional_step
+from warpflat.flat.cutting.cut_piece import cut
+from warpflat.flat.cutting.remedies import advise
+from warpflat.flat.cutting.separate_pieces import cut_surfaces
+from warpflat.flat.fabric.library import as_fabric
+from warpflat.flat.flattening.flatten_all import flatten_all
+from warpflat.flat.flattening.flatten_piece import flatten
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.surface.border_seams import BorderSeam
+from warpflat.flat.surface.io.sewn_panels import SewnPanel
+from warpflat.flat.surface.mesh import Surface
+from warpflat.garment.construction.as_cut import garment_as_cut
+from warpflat.garment.construction.constraints import Constraint
+from warpflat.garment.construction.drawn_curves import CURVES_MM
+from warpflat.garment.construction.ease import SeamWish, cap_wishes, seam_ratios
+from warpflat.garment.construction.form_garment import FormGarment, flatten_form
+from warpflat.garment.construction.form_plan import check_fold_grain, find_fold_lines, plan_form
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.openings import Opening, sized_opening
+from warpflat.garment.construction.pattern_files import PatternOptions, check_names
+from warpflat.garment.construction.sew_pieces import name_seams, sew_pieces
+from warpflat.garment.construction.to_pattern import check_edge_names
+from warpflat.garment.mannequin.bricks import select_bricks
+from warpflat.garment.mannequin.darts import dart_along
+from warpflat.garment.mannequin.forms import FormResult
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.table import mannequin_from_table
+from warpflat.garment.seams.find import GRAIN, FoundSeams, seam_words
+
+__all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
+
+# How a note begins on pieces that cannot be sewn.
+_UNSEWN = "the pieces are not sewn, and their seams do not match: each lies as it does on its own"
+# Work units that a piece takes alone at most before it is sewn to others.
+_ALONE = 4000
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeshPlan:
+    """A garment whose pieces are meshes: one, perhaps to be cut, or all of a file.
+
+    Attributes:
+        scene: the scene.
+        drawing: options of the pattern files.
+        sequences: the pieces, uncut, each with its cuts.
+        seams: those that the scene names.
+        found: seams that were found on a whole garment, which its pieces come from.
+        panels: of the sewn pattern that the file has, which is taken as it is.
+        device: Warp device, before the scene's own.
+    """
+
+    scene: Scene
+    drawing: PatternOptions
+    sequences: Sequence[CutSequence]
+    seams: Sequence[BorderSeam] = ()
+    found: FoundSeams | None = None
+    panels: Sequence[SewnPanel] = ()
+    device: str | None = None
+
+    @property
+    def mannequin(self) -> None:
+        """Nobody wears a mesh."""
+
+    @property
+    def surfaces(self) -> list[Surface]:
+        """The pieces in space, uncut."""
+        return [sequence.surface for sequence in self.sequences]
+
+    def flatten(
+        self,
+        *,
+        callback: Callable[[str, Progress], bool | None] | None = None,
+        recorders: Mapping[str, FrameRecorder] | None = None,
+    ) -> Garment:
+        """Flatten, cut and sew the garment.
+
+        Args:
+            callback: called with a piece's name and its `Progress` after every step.
+            recorders: of the film by piece; they keep the last frame of every stage.
+
+        Raises:
+            InputError: a piece cannot be flattened, or a seam or a constraint asks what it cannot be.
+        """
+        scene, settings, relax = self.scene, self.scene.settings, scene_relax_options(self.scene)
+        tables = settings.pieces
+        names, recorders = [surface.name for surface in self.surfaces], recorders or {}
+        steps = {name: None if callback is None else partial(callback, name) for name in names}
+        with errors_named(scene.where):
+            if len(names) == 1 and self.found is None and not tables and not self.panels:
+                step = steps[names[0]]
+                pieces = [flatten_surface(scene, self.surfaces[0], relax, callback=step, device=self.device)]
+            else:
+                pieces = flatten_all(
+                    self.surfaces,
+                    fabric=scene_fabric(scene),
+                    # Pieces of a garment whose seams were found know how their grain runs.
+                    datum=[
+                        datum or (GRAIN if GRAIN in surface.lines else None)
+                        for surface in self.surfaces
+                        for datum in [None if surface.name not in tables else tables[surface.name].datum]
+                    ],
+                    grain_angle=[
+                        settings.grain_angle
+                        if surface.name not in tables or tables[surface.name].grain_angle is None
+                        else float(tables[surface.name].grain_angle or 0.0)
+                        for surface in self.surfaces
+                    ],
+                    model=settings.model,
+                    wear=scene_wear(scene),
+                    # How a piece would lie alone is where sewing begins: it need not be known to the last where it is found slowly.
+                    relax=replace(relax, max_steps=min(_ALONE, relax.max_steps))
+                    if self.found and self.found.seams
+                    else relax,
+                    callback=None if callback is None else lambda number, progress: callback(names[number], progress),
+                    device=self.device or settings.device,
+                )
+            for place, (name, sequence) in enumerate(zip(names, self.sequences, strict=True)):
+                recorder = recorders.get(name)
+                if recorder is not None:
+                    recorder.record_result(pieces[place])
+                for number, plan in enumerate(sequence.plans):
+                    if sequence.is_needed(pieces[place], number):
+                        if recorder is not None:
+                            recorder.record_cut_line(pieces[place], plan)
+                        pieces[place] = cut(pieces[place], plan, relax=relax, callback=steps[name])
+                        if recorder is not None:
+                            recorder.record_result(pieces[place])
+            lines = {piece.surface.name: piece.network.surface.lines for piece in pieces}
+            constraints = scene_constraints(settings.constraints, lines)
+            # Where nobody has said what meets what, a seam is eased as a tailor does it.
+            eased = self.found is not None or bool(self.panels)
+            sewing = partial(
+                sew_pieces, pieces, constraints, seams=self.seams, options=relax, name=scene.name, eased=eased, bands=settings.bands,
+                shorter=settings.bands_shorter,
+            )  # fmt: skip
+            with optional_step(_UNSEWN, of=StepError) as unsewn:
+                garment = sewing()
+            if unsewn:
+                garment = sewing(relaxed=False)
+            if self.panels:
+                garment = garment_as_cut(
+                    self.panels, self.surfaces, fabric=scene_fabric(scene), name=scene.name, flattened=garment,
+                    device=self.device or settings.device,
+                )  # fmt: skip
+        if garment.sewn is not None or self.panels:
+            for name, recorder in recorders.items():
+                recorder.record_result(garment.pieces[name])
+        found = () if self.found is None else (seam_words(self.found), *self.found.notes)
+        return replace(
+            garment, remarks=(*unsewn, *found, *(note for sequence in self.sequences for note in sequence.notes))
+        )
+
+    def advise(self, piece: Flattening) -> Flattening:
+        """Return a piece with cuts that would help where it does not fit."""
+        return advise(piece)
+
+    def other_sizes(self) -> dict[str, GarmentPlan]:
+        """A mesh has one size."""
+        return {}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GarmentPlan:
+    """A garment whose pieces are a form on a mannequin.
+
+    Attributes:
+        scene: the scene.
+        mannequin, form: the body, and the pieces on it.
+        drawing: options of the pattern files.
+        wishes: fullness and gathers of seams.
+        constraints: on edges and lines.
+        openings: along seams.
+        settings: further arguments of :func:`warpflat.garment.construction.garment.flatten_form`.
+    """
+
+    scene: Scene
+    mannequin: Mannequin
+    form: FormResult
+    drawing: PatternOptions
+    wishes: Sequence[SeamWish]
+    constraints: Sequence[Constraint]
+    openings: Sequence[Opening]
+    settings: Mapping[str, Any]
+
+    @property
+    def surfaces(self) -> list[Surface]:
+        """The pieces in space."""
+        return [piece.surface for piece in self.form.pieces.values()]
+
+    def flatten(
+        self,
+        *,
+        callback: Callable[[str, Progress], bool | None] | None = None,
+        recorders: Mapping[str, FrameRecorder] | None = None,
+        known: Mapping[str, Flattening] | None = None,
+    ) -> FormGarment:
+        """Flatten and sew the garment; as :meth:`MeshPlan.flatten`, `known` as :func:`warpflat.flatten_form` takes it.
+
+        Raises:
+            InputError: as :func:`warpflat.flatten_form`.
+        """
+        with errors_named(self.scene.where):
+            flattened = partial(
+                flatten_form,
+                self.mannequin,
+                self.form,
+                callback=callback,
+                known=known,
+                wishes=self.wishes,
+                constraints=self.constraints,
+                **self.settings,
+            )
+            with optional_step(_UNSEWN, of=StepError) as unsewn:
+                garment = flattened()
+            if unsewn:
+                garment = flattened(sewn=False)
+            finishing = scene_finishing(self.scene.settings.finishing)
+            pockets = scene_pockets(self.scene.settings.pockets)
+        for name, recorder in (recorders or {}).items():
+            piece = garment.pieces[name]
+            for layout in (piece.unsewn, piece):
+                if layout is not None:
+                    recorder.record_result(layout)
+        return replace(
+            garment,
+            openings=tuple(self.openings),
+            finishing=finishing,
+            pockets=pockets,
+            remarks=(*unsewn, *garment.remarks),
+        )
+
+    @cached_property
+    def bricks(self) -> dict[str, list[str]]:
+        """The bricks of every piece, on both sides of the body."""
+        recipe, layout = scene_recipe(self.scene, self.mannequin)[1], self.mannequin.layout
+        return {name: select_bricks(layout, piece.bricks) for name, piece in recipe.pieces.items()}
+
+    def advise(self, piece: Flattening) -> Flattening:
+        """Return a piece with cuts that would help, each with the table of a scene's `[[cuts]]` that makes it, if one can."""
+        name, advised = piece.surface.name, advise(piece)
+        cloth, remedies = self.form.pieces[name], []
+        on_fold = () if cloth.fold is None else cloth.grid_vertices[cloth.edges[cloth.fold]].tolist()
+        for remedy in advised.remedies:
+            row = cloth.grid_vertices[remedy.path]
+            title = remedy.words.split(",")[0].removeprefix("a ").removesuffix(" left").removesuffix(" right")
+            dart = dart_along(self.mannequin.layout, self.form.vertices, self.bricks[name], row, piece=name, name=title)
+            table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
+            remedies.append(replace(remedy, table=table))
+        return advised.with_remedies(remedies) if remedies else advised
+
+    def other_sizes(self) -> dict[str, GarmentPlan]:
+        """Return the garment in the sizes that its pattern has besides the mannequin's own.
+
+        Raises:
+            InputError: there is no such size, or the form cannot be built on it.
+        """
+        table, found = self.scene.settings.mannequin, {}
+        for size in self.scene.settings.pattern.sizes:
+            if table is not None and size != table.size:
+                with errors_named(f"{self.scene.where}: pattern.sizes"):
+                    body = mannequin_from_table(table.model_copy(update={"size": size}), path_of=Path)
+                    body, form = scene_form(self.scene, body)
+                found[size] = replace(self, mannequin=body, form=form)
+        return found
+
+
+def plan_scene(
+    scene: Scene,
+    *,
+    device: str | None = None,
+    cuts: CutSequence | None = None,
+    built: tuple[Mannequin, FormResult] | None = None,
+) -> MeshPlan | GarmentPlan:
+    """Check what a scene asks of its garment, wherever its pieces come from; see :func:`plan_mesh` and :func:`plan_garment`.
+
+    Raises:
+        InputError: the source, a line, a cut, the fabric, a seam or a setting is wrong.
+    """
+    if scene.settings.mannequin is None:
+        return plan_mesh(scene, device=device, cuts=cuts)
+    return plan_garment(scene, device=device, built=built)
+
+
+def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | None = None) -> MeshPlan:
+    """Read the meshes of a scene, and plan their cuts.
+
+    Args:
+        scene: with a surface.
+        device: Warp device, before the scene's own.
+        cuts: to be made instead of the scene's own.
+
+    Raises:
+        InputError: the surface, a line, a cut, a seam, an edge of the pattern or a setting is wrong.
+    """
+    settings = scene.settings
+    scene_relax_options(scene)  # a mistake is reported before anything is made
+    with errors_named(scene.where):
+        drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
+        seams = scene_surface_seams(settings.seams, scene.name)
+    panels = [] if cuts is not None else scene_sewn_panels(scene)
+    surface = None if cuts is not None or panels else plain_panel(scene)
+    found = None if cuts is not None or surface is not None or panels else found_seams(scene)
+    parts: Sequence[Surface] | None = [panel.surface for panel in panels] or None
+    if not panels and cuts is None:
+        parts = found.pieces if found is not None else scene_pieces(scene)
+    # A pattern that is taken as it is keeps its corners.
+    drawing = replace(drawing, true=drawing.true and not panels)
+    if parts is None:
+        sequences = [cuts or scene_cuts(scene, device=device, surface=surface)]
+    else:
+        if settings.drape is not None:
+            raise InputError(
+                f'{scene.where}: a drape takes one piece, or the folder of a run: warpflat drape DIR --body "EU 38"'
+            )
+        # Lines along seams name the edges of the pattern. What a piece is cut along may be one of them.
+        opened = []
+        for part in with_piece_tables(scene, name_seams(parts) if settings.pieces else parts):
+            table = settings.pieces.get(part.name)
+            with errors_named(f"{scene.where}: pieces.{part.name}" if table is not None else scene.where):
+                opened.append(plan_cuts(part, [] if table is None else table.cuts))
+        sequences = [
+            replace(each, surface=surface, notes=tuple(f"{surface.name}: {note}" for note in each.notes))
+            for each, surface in zip(opened, name_seams([each.surface for each in opened]), strict=True)
+        ]
+    rules = drawing.rules
+    if rules.kinds or rules.allowances or drawing.names:
+        with errors_named(scene.where):
+            # Whichever of the automatic cuts are made.
+            surfaces = [
+                piece
+                for sequence in sequences
+                for count in sequence.counts
+                for piece in cut_surfaces(sequence.surface, list(sequence.plans[:count]))
+            ]
+        with errors_named(f"{scene.where}: pattern"):
+            check_edge_names(surfaces, rules, cuts=[plan.name for sequence in sequences for plan in sequence.plans])
+            check_names(drawing.names, {surface.name: None for surface in surfaces})
+    return MeshPlan(
+        scene=scene, drawing=drawing, sequences=sequences, seams=seams, found=found, panels=panels, device=device
+    )
+
+
+def scene_cuts(scene: Scene, *, device: str | None = None, surface: Surface | None = None) -> CutSequence:
+    """Plan the cuts of a scene and work their paths into its surface; those of `auto_cut` are looked for.
+
+    Args:
+        scene: with a surface.
+        device: Warp device, before the scene's own.
+        surface: the scene's, if it has been read before.
+
+    Raises:
+        InputError: the surface, a line or a cut is wrong.
+    """
+    settings = scene.settings
+    surface = surface or scene_surface(scene)
+    with errors_named(scene.where):
+        sequence = plan_cuts(surface, settings.cuts)
+        if settings.auto_cut is not None:
+            sequence = plan_automatic_cuts(
+                sequence,
+                settings.auto_cut,
+                flatten=partial(flatten_surface, scene, device=device),
+                relax=scene_relax_options(scene),
+            )
+    return sequence
+
+
+def flatten_surface(
+    scene: Scene,
+    surface: Surface,
+    relax: RelaxOptions,
+    *,
+    callback: Callable[[Progress], bool | None] | None = None,
+    device: str | None = None,
+) -> Flattening:
+    """Flatten a surface by the settings of a scene, before it is cut or sewn.
+
+    Raises:
+        InputError: it cannot be flattened, or the file of `start` is wrong.
+    """
+    settings, start = scene.settings, None
+    if settings.start is not None:
+        from warpflat.flat.surface.io.read_layout import read_layout
+
+        with errors_named(f"{scene.where}: start"):
+            start = read_layout(scene.folder / expand_variables(settings.start))
+    return flatten(
+        surface,
+        fabric=scene_fabric(scene),
+        datum=settings.datum,
+        grain_angle=settings.grain_angle,
+        model=settings.model,
+        wear=scene_wear(scene),
+        start=start,
+        relax=relax,
+        callback=callback,
+        device=device or settings.device,
+    )
+
+
+def plan_garment(
+    scene: Scene, *, device: str | None = None, built: tuple[Mannequin, FormResult] | None = None
+) -> GarmentPlan:
+    """Check what a scene asks of its garment.
+
+    Args:
+        scene: with a form on a mannequin.
+        device: Warp device, before the scene's own.
+        built: the scene's mannequin and form, if they have been built before.
+
+    Raises:
+        InputError: the body, the form, the fabric, a seam, a constraint, an edge of the pattern or a setting is wrong.
+    """
+    settings = scene.settings
+    relax, fabric = scene_relax_options(scene), scene_fabric(scene)
+    report_activity("building the mannequin")
+    mannequin, form = built or scene_form(scene)
+    with errors_named(f"{scene.where}: pattern"):
+        drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
+        openings = scene_openings(settings)
+        if settings.half:
+            drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
+        plan = plan_form(form, drawing.rules)
+        check_names(drawing.names, form.pieces)
+    for number, opening in enumerate(openings):
+        with errors_named(f"{scene.where}: openings[{number}]"):
+            on_form = {name: piece.surface.vertices for name, piece in form.pieces.items()}
+            openings[number] = sized_opening(form, opening, on_form)
+    with errors_named(f"{scene.where}: grain_angle"):
+        check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
+    wishes = scene_wishes(settings.seams)
+    with errors_named(f"{scene.where}: seams"):
+        seam_ratios(form, wishes)
+        wishes += cap_wishes(form, as_fabric(fabric), wishes)
+    with errors_named(scene.where):
+        constraints = scene_constraints(
+            settings.constraints,
+            {name: piece.surface.lines for name, piece in form.pieces.items()},
+            {name: piece.fold for name, piece in form.pieces.items() if piece.fold},
+        )
+    constraints += [each for each in straight_stands(form, openings) if each not in constraints]
+    return GarmentPlan(
+        scene=scene,
+        mannequin=mannequin,
+        form=form,
+        drawing=drawing,
+        wishes=wishes,
+        constraints=constraints,
+        openings=openings,
+        settings={
+            "fabric": fabric,
+            "grain_angle": settings.grain_angle,
+            "curves_mm": CURVES_MM if settings.curves_mm is None else settings.curves_mm,
+            "model": settings.model,
+            "wear": scene_wear(scene),
+            "relax": relax,
+            "device": device or settings.device,
+        },
+    )

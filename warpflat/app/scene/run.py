@@ -1,0 +1,312 @@
+"""A scene is run: its garment is flattened, cut and sewn, advised on, drafted as a pattern, and all files are written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpflat.app.review.page import pack_frames, pack_pictures, write_review
+from warpflat.app.scene.cuts import CutSequence
+from warpflat.app.scene.drape import drape_names, write_drape
+from warpflat.app.scene.form_shaping import ClosedDarts, require_open_darts, settle_shape
+from warpflat.app.scene.found_seams import seams_entry
+from warpflat.app.scene.frames import MANNEQUIN, Film, FrameSchedule
+from warpflat.app.scene.load import Scene
+from warpflat.app.scene.plan import GarmentPlan, MeshPlan, plan_scene
+from warpflat.app.scene.schema import FileSurface
+from warpflat.core.activity import report_activity
+from warpflat.core.beside import Beside
+from warpflat.core.errors import StepError
+from warpflat.core.memory_limit import require_memory_for_run
+from warpflat.core.output import (
+    expect_files,
+    file_in,
+    latest_file,
+    optional_file,
+    optional_step,
+    output_folder,
+    remove_stale,
+    require_own_metrics,
+)
+from warpflat.flat.flattening.fit_report import Remedy
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.flattening.verdict import judge
+from warpflat.flat.surface.io.read import size_words
+from warpflat.garment.construction.form_garment import FormGarment
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.pattern_files import WrittenPattern, garment_files, pattern_names
+from warpflat.garment.construction.sew_pieces import unsewn_notes
+from warpflat.garment.mannequin.forms import FormResult
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.pattern.export.letters import note_on_names
+
+# From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
+_MANY = 500_000
+
+__all__ = ["SceneResult", "files_of_run", "run_scene"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneResult:
+    """The result of a run.
+
+    Attributes:
+        metrics: as `metrics.json`.
+        files: names of the files that were written.
+        notes: what was repaired or chosen, one sentence each.
+        size: of what was read from a mesh file, in words; "" for anything else.
+    """
+
+    metrics: dict[str, Any]
+    files: tuple[str, ...]
+    notes: tuple[str, ...]
+    size: str = ""
+
+
+def run_scene(
+    scene: Scene,
+    out: str | Path,
+    *,
+    on_progress: Callable[[Progress], bool | None] | None = None,
+    device: str | None = None,
+    cuts: CutSequence | None = None,
+    built: Callable[[], tuple[Mannequin, FormResult]] | None = None,
+) -> SceneResult:
+    """Flatten the scene's surface, all pieces of its file, or the pieces of its form, and write the result.
+
+    Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see
+    `warpflat.garment.construction.pattern_files`). Files that an earlier run has left there and this one does not make are removed at the
+    end (see `warpflat.core.output`). All of that happens together; a run that fails leaves the folder
+    as it was, and no run replaces a file that it has read.
+
+    Args:
+        scene: what to do.
+        out: folder for the files, made if need be.
+        on_progress: called after each step.
+        device: Warp device, before the scene's own.
+        cuts: of a surface, to be made instead of the scene's own (see `warpflat.app.scene.ledger.cuts_of_entry`).
+        built: gives the scene's mannequin and form, where they are built already.
+
+    Raises:
+        InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
+            is made from would be replaced.
+    """
+    sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
+    with output_folder(out, files_of_run(scene), sources=sources, guard=True) as folder:
+        require_own_metrics(folder)
+        settled, notes = settle_shape(scene, device=device)
+        form = built() if built is not None and settled is scene else None
+        while True:
+            try:
+                plan = plan_scene(settled, device=device, cuts=cuts, built=form)
+                result = _run(plan, folder, on_progress=on_progress, device=device)
+            except ClosedDarts as closed:
+                settled, form, notes = closed.without, None, (*notes, *closed.notes)
+            else:
+                return replace(result, notes=(*notes, *result.notes))
+
+
+def files_of_run(scene: Scene) -> list[str]:
+    """Return the files that a run will write, as far as they are known; those of a form's pieces or of parts of a cut are not."""
+    settings, output = scene.settings, scene.settings.output
+    on_form, worn = settings.mannequin is not None, output.picture and settings.wear is not None
+    alone = not on_form and getattr(settings.surface, "component", None) != "all"
+    patterns = pattern_names(scene.name, settings.pattern.formats, marker=settings.marker is not None)
+    asked = {
+        "metrics.json": True,
+        f"{scene.name}.obj": alone,
+        "frames.usdc": FrameSchedule(output).wanted,
+        "picture.png": output.picture,
+        "review.html": output.picture and output.review,
+        "wear.png": worn and on_form,
+        f"{scene.name}.wear.png": worn and not on_form,
+        "walked.png": output.picture and on_form and bool(patterns),
+    }
+    return [*(file for file, wanted in asked.items() if wanted), *patterns, *drape_names(scene)]
+
+
+def _run(
+    plan: MeshPlan | GarmentPlan,
+    folder: Path,
+    *,
+    on_progress: Callable[[Progress], bool | None] | None,
+    device: str | None,
+) -> SceneResult:
+    """Flatten a garment and write its files into a folder that an `output_folder` holds; pictures and pattern beside the film.
+
+    Raises:
+        ClosedDarts: some darts of the scene's shape do not open.
+    """
+    scene, settings, output = plan.scene, plan.scene.settings, plan.scene.settings.output
+    names = [surface.name for surface in plan.surfaces]
+    vertices = sum(len(surface.vertices) for surface in plan.surfaces)
+    filmed, body = FrameSchedule(output).wanted, plan.mannequin
+    expect_files(folder, [f"{name}.obj" for name in names])
+    expect_files(folder, [MANNEQUIN] if filmed and body is not None else [])
+    expect_files(folder, [f"{name}.draped.obj" for name in names] if settings.drape is not None else [])
+    require_memory_for_run(vertices, frames=filmed)
+    others = plan.other_sizes()
+    own_size = "" if settings.mannequin is None else settings.mannequin.size_name
+
+    with ExitStack() as beside:
+        with Film(folder, output, plan.surfaces, mannequin=body) as film:
+
+            def each_step(name: str, progress: Progress) -> bool | None:
+                film.recorders[name](progress)
+                return None if on_progress is None else on_progress(progress)
+
+            garment = plan.flatten(callback=each_step, recorders=film.recorders)
+            require_open_darts(scene, [garment])
+            film.worn = garment.pieces
+            # What lies beside a seam that was found, such as a hem, is not a border that was forgotten.
+            notes = unsewn_notes(garment) if isinstance(plan, MeshPlan) and plan.found is None else []
+            fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))
+            pictures = Beside(partial(_write_pictures, plan, garment, folder), "drawing the pictures")
+            if vertices < _MANY:
+                beside.enter_context(pictures)
+            graded = dict[str, Garment]()
+            for size, other in others.items():
+                with optional_step(f"size {size} was left out"):
+                    graded[size] = other.flatten(
+                        callback=lambda _, progress: None if on_progress is None else on_progress(progress)
+                    )
+            require_open_darts(scene, graded.values())
+            sizes = {**graded, own_size: garment}
+            pattern = Beside(partial(_draft, plan, sizes, own_size, folder), "drafting the pattern")
+            # The paper tells the verdict, which a drape gives.
+            if vertices < _MANY and settings.drape is None:
+                beside.enter_context(pattern)
+
+        files = list(film.files)
+        draped: dict[str, Any] = {}
+        if settings.drape is not None:
+            measured, fit_notes, remedies, worn = fit.result()
+            garment = garment.advised(lambda part: part.with_remedies(remedies[part.surface.name]))
+            with optional_step("it was not draped", of=StepError):
+                draped, drape_files = write_drape(scene, garment, folder, device=device)
+                files = list(dict.fromkeys([*drape_files, *files]))
+                sizes[own_size] = replace(sizes[own_size], drape=draped["drape"])
+        # What is ready is packed for the review while other processes write.
+        page, reviewed = folder / "review.html", output.picture and output.review
+        packed: Mapping[str, Any] | None = None
+        shown: dict[str, str] = {}
+        if reviewed and "frames.usdc" in files:
+            with optional_file(page, [], part="the film"):
+                packed = pack_frames(folder)
+        if settings.drape is None:
+            measured, fit_notes, remedies, worn = fit.result()
+        files += pictures.result()
+        files += [*worn, "metrics.json"]
+        if reviewed:
+            with optional_file(page, []):
+                shown = pack_pictures(folder, files)
+        written = pattern.result()
+        files += written.files
+        measured |= {"sizes": {size: each.summary() for size, each in graded.items()}} if graded else {}
+        measured |= {**draped, **written.metrics}
+        if (verdict := judge(measured)) is not None:
+            measured["verdict"] = verdict.as_dict()
+        if settings.mannequin is not None:
+            table = settings.mannequin.model_dump(exclude_defaults=True)
+            measured["mannequin"] = {**measured["mannequin"], "table": table}
+        if reviewed:
+            with optional_file(page, files):
+                write_review(folder, measured, tuple(files), name=scene.name, film=lambda: packed, pictures=shown)
+
+    # The body belongs to the film.
+    known = [*files, *([MANNEQUIN] if latest_file(folder / MANNEQUIN) != folder / MANNEQUIN else [])]
+    drape = settings.drape is not None
+    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=known, drape=drape)
+    name_notes = note_on_names(garment.parts) if output.picture else ()
+    size = ""
+    if isinstance(settings.surface, FileSurface):
+        size = size_words(np.concatenate([surface.vertices for surface in plan.surfaces]), settings.surface.units)
+    return SceneResult(
+        metrics=metrics,
+        files=tuple(files),
+        notes=(*notes, *fit_notes, *written.notes, *name_notes, *manifest_notes),
+        size=size,
+    )
+
+
+def _write_pictures(plan: MeshPlan | GarmentPlan, garment: Garment, folder: Path) -> list[str]:
+    """Write the pieces and their picture, with the outlines of those that finishing and pockets add."""
+    from warpflat.garment.construction.to_pattern import pattern_of_garment
+    from warpflat.pattern.export.picture_drafted import DraftedOutline
+
+    drafted = list[DraftedOutline]()
+    if plan.scene.settings.output.picture and (garment.finishing or garment.pockets):
+        with optional_step("the picture is without what finishing and pockets add", is_needed=False):
+            pattern, _ = pattern_of_garment(
+                {"": garment}, name=garment.name, rules=plan.drawing.rules, cloth_width=plan.drawing.cloth_width
+            )
+            drafted = [
+                DraftedOutline(
+                    name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
+                    points=piece.outline,
+                )
+                for piece in pattern.pieces[""]
+                if piece.name not in garment.pieces
+            ]
+    return garment.write_files(folder, picture=plan.scene.settings.output.picture, drafted=drafted)
+
+
+def _measure_fit(
+    plan: MeshPlan | GarmentPlan, garment: Garment, folder: Path
+) -> tuple[dict[str, Any], tuple[str, ...], dict[str, tuple[Remedy, ...]], list[str]]:
+    """Measure a garment, look for cuts that would help it, and draw how it is worn, if that was asked for or its cloth is stretched.
+
+    Returns:
+        What goes into `metrics.json`, the garment's notes, by part the cuts that would help, and the names of the pictures.
+    """
+    report_activity("measuring how it fits")
+    advised, files = garment, list[str]()
+    with optional_step("no cuts that would help were looked for", is_needed=False):
+        advised = garment.advised(plan.advise)
+    settings, wearer = plan.scene.settings, advised.wearer if isinstance(advised, FormGarment) else None
+    if settings.output.picture and (settings.wear is not None or (wearer is not None and wearer.is_stretched)):
+        if not isinstance(garment, FormGarment):
+            for name, part in advised.parts.items():
+                with optional_file(file_in(folder, name, ".wear.png"), files) as path:
+                    from warpflat.pattern.export.fit_picture import write_wear_picture
+
+                    write_wear_picture(path, part)
+        else:
+            with optional_file(folder / "wear.png", files) as path:
+                from warpflat.pattern.export.fit_picture import write_wear_sheet
+
+                on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in advised.pieces]
+                write_wear_sheet(path, list(advised.pieces.values()), title=garment.name, on_body=on_body)
+    remedies = {name: part.remedies for name, part in advised.parts.items()}
+    measured = advised.metrics()
+    if isinstance(plan, MeshPlan) and plan.found is not None:
+        measured["garment"] = seams_entry(plan.found, list(advised.pieces.values()), plan.drawing.rules.seam)
+    return measured, advised.notes, remedies, files
+
+
+def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], own_size: str, folder: Path) -> WrittenPattern:
+    """Write the files of the pattern in all sizes, and the picture of a form's seams, which is among the files that are returned."""
+    scene, wanted = plan.scene, plan.scene.settings.pattern.sizes
+    if set(sizes) == set(wanted):
+        order = list(dict.fromkeys(wanted))
+    else:  # by their numbers where the scene leaves out the mannequin's own
+        order = sorted(sizes, key=lambda size: (int("".join(filter(str.isdigit, size)) or 0), size))
+    garments = {size: sizes[size] for size in order}
+    found = plan.found.seams if isinstance(plan, MeshPlan) and plan.found is not None else ()
+    pattern = garment_files(
+        garments, folder, name=scene.name, options=plan.drawing, sample_size=own_size, found_seams=found
+    )
+    if plan.mannequin is None or not (scene.settings.output.picture and pattern.walked):
+        return pattern
+    files = list(pattern.files)
+    with optional_file(folder / "walked.png", files) as path:
+        from warpflat.pattern.export.picture_walked import write_walked_picture
+
+        write_walked_picture(path, pattern.walked, title=scene.name)
+    return replace(pattern, files=tuple(files))

@@ -1,0 +1,934 @@
+"""The tables of a scene file, as pydantic models."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    create_model,
+    model_validator,
+)
+
+from warpflat.core.errors import is_number
+from warpflat.core.file_names import plain_name
+from warpflat.core.text import quote_value
+from warpflat.core.toml_file import Table
+from warpflat.flat.fabric.fabric import DEFAULT_FABRIC
+from warpflat.flat.fabric.file import FabricTable
+from warpflat.flat.solver.options import FORMER_SOLVERS, RelaxOptions, Solver
+from warpflat.flat.surface.first_shapes import PIECES
+from warpflat.garment.mannequin.table import MannequinTable
+
+__all__ = [
+    "AutoCutTable",
+    "BorderTable",
+    "ClothTable",
+    "ConstraintTable",
+    "CutTable",
+    "FileSurface",
+    "FinishingTable",
+    "LineTable",
+    "MarkerTable",
+    "OpeningTable",
+    "OutputTable",
+    "PatternTable",
+    "PocketTable",
+    "SceneTable",
+    "SeamCutTable",
+    "SeamTable",
+    "ShapeSurface",
+    "kind_of_surface",
+    "text_or_table",
+]
+
+
+# The square of a much larger coordinate overflows.
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Vertex = Annotated[int, Field(ge=0)]
+PointOrVertex = Annotated[
+    Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
+    Discriminator(lambda value: "point" if isinstance(value, list) else "vertex"),
+]
+
+
+class PlaneTable(Table):
+    """A plane by a point on it [m] and its normal (any length)."""
+
+    point: Point
+    normal: Point
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class CutPlane(PlaneTable):
+    """A plane through a point [m], as given and all through; of several curves the nearest to the point.
+
+    With `towards` only the part from the point, which then lies on the piece, in that direction to the border.
+    """
+
+    towards: Point | None = None
+
+
+class CutTable(Table):
+    """A cut, given in one of three ways. Vertices count those of the file, from 0; points are in metres.
+
+    `line` names a feature line, of which `part` takes a part by shares of its length; `from` and `to` are the ends of the
+    straightest path on the surface, `through` places on its way; `plane` cuts as a ruler lies. The faces that a path
+    between points or along a plane runs through are divided. Tables with one `name` are one cut.
+
+    On a form a cut is a dart in one `piece`, along a `line` of it, from the border to its tip. Lines of a book's darts ("bust",
+    "princess front left" and the like from the waist) need no `part`: `tip_mm` is how far before the bust point, or below
+    the waist in a skirt, the dart ends. `at` names the line on which its mouth lies, as "shoulder left". `towards` puts it
+    between two lines, `between` at that share of the way. `mouth_mm` is how wide it opens, or `like` another dart of its
+    piece; the energy that this costs is told. With `pleat_mm` it is a pleat: folded, sewn this far from its mouth, and open
+    below. It is `mirrored` unless that is false. A `part` of [0, 1] is a seam, which parts the piece; one with both shares
+    inside is a dart with two tips, and `mouth_mm` its width half-way between them. `omit` leaves out the dart that the form's
+    `shape` has there.
+    """
+
+    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
+    line: str | None = None
+    part: Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
+    from_: PointOrVertex | None = Field(default=None, alias="from")
+    to: PointOrVertex | None = None
+    through: list[PointOrVertex] = Field(default_factory=list)
+    plane: CutPlane | None = None
+    tip_back: Annotated[float, Field(ge=0.0)] = 0.0
+    """How far the tips of its darts are drawn back, [m]."""
+    piece: str | None = None
+    towards: str | None = None
+    between: Share = 0.5
+    tip_mm: Annotated[float, Field(ge=0.0, le=500.0)] | None = None
+    mouth_mm: Annotated[float, Field(ge=1.0, le=300.0)] | None = None
+    like: str | None = None
+    pleat_mm: Annotated[float, Field(ge=1.0, le=500.0)] | None = None
+    at: str | None = None
+    omit: bool = False
+    mirrored: bool = True
+
+    @property
+    def parts_piece(self) -> bool:
+        """Whether it cuts a whole line."""
+        return self.part is not None and set(self.part) == {0.0, 1.0}
+
+    def check_for_form(self, where: str) -> None:
+        """Refuse what a dart in a form does not have."""
+        if self.line is None or self.piece is None:
+            raise ValueError(
+                f"{where}: on a form a dart needs its piece and a line of it, as "
+                'piece = "front_bodice", line = "princess front left"'
+            )
+        if self.tip_back:
+            raise ValueError(f"{where}: tip_back belongs to a [surface]; on a form give tip_mm")
+        if self.part is not None and (self.tip_mm is not None or self.towards is not None or self.at is not None):
+            raise ValueError(f"{where}: give part, or tip_mm, towards and at")
+        if self.mouth_mm is not None and self.like is not None:
+            raise ValueError(f"{where}: give mouth_mm or like")
+        if self.parts_piece and (self.mouth_mm or self.like or self.pleat_mm):
+            raise ValueError(
+                f"{where}: a cut along the whole line is a seam, which has no mouth; leave out mouth_mm, like and pleat_mm"
+            )
+
+    def check_for_surface(self, where: str) -> None:
+        """Refuse what only a dart in a form has."""
+        given = self.model_fields_set & {
+            "piece",
+            "towards",
+            "between",
+            "tip_mm",
+            "mouth_mm",
+            "like",
+            "pleat_mm",
+            "at",
+            "omit",
+            "mirrored",
+        }
+        if given:
+            raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> CutTable:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("a path needs both from and to")
+        if sum(way is not None for way in (self.line, self.from_, self.plane)) != 1:
+            raise ValueError("give the cut in one way: line, from and to, or plane")
+        if self.part is not None and self.line is None:
+            raise ValueError("part takes a part of a line; give line")
+        if self.through and self.from_ is None:
+            raise ValueError("through lists places between from and to; give both")
+        return self
+
+
+class AutoCutTable(Table):
+    """Cutting by itself: the best of all candidates, again and again until it is enough (see `warpflat cuts`)."""
+
+    max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
+    """At most so many; a mirrored pair counts as one."""
+    stop_below: Annotated[float, Field(ge=0.0)] = 0.0
+    """A piece of at most this model energy needs no further cut [J]."""
+    stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
+    """A piece of which 98 % is strained by at most this share along warp and weft, as worn, needs no further cut."""
+    by: Literal["released", "per_cm"] = "released"
+    """What makes a cut the best: the energy it releases in all, or per centimetre."""
+
+
+def _as_component(value: Any) -> Any:
+    if value not in ("largest", "all") and not (is_number(value, whole=True) and value >= 0):
+        raise ValueError(f'should be "largest", "all" or a number from 0, largest first; got {quote_value(value)}')
+    return value
+
+
+Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Component = Annotated[Literal["largest", "all"] | int, BeforeValidator(_as_component)]
+
+
+def text_or_table(value: Any) -> str:
+    return "text" if isinstance(value, str) else "table"
+
+
+class FileSurface(Table):
+    """A mesh file; `file` starts in the scene's folder and may name environment variables, ${WARPFLAT_DATA}/x.obj."""
+
+    file: str = Field(min_length=1)
+    units: str | None = None
+    component: Component | None = None
+    """Which connected part of the mesh; with "all" every part of every object is a piece, and edges that meet in space are seams."""
+    prim: str | None = None
+    meet_mm: Annotated[float, Field(ge=0, le=10)] | None = None
+    """With component = "all": borders that run along each other within this distance are sewn; 1 if not given."""
+    pattern: Literal["uv"] | None = None
+    """"uv": the islands of the texture are the sewn pattern, in true size; it is taken as it is and compared with what flattening gives."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_source(cls, data: Any) -> Any:
+        if isinstance(data, dict) and {"file", "shape"} <= data.keys():
+            raise ValueError("give the surface by its file or by a shape, not both")
+        return data
+
+
+class ShapeSurface(Table):
+    """A surface by formula; its other keys are the parameters of that function of `warpflat.flat.surface.shapes`."""
+
+    model_config = ConfigDict(extra="allow")
+    shape: str
+
+
+def kind_of_surface(value: Any) -> str:
+    given = value if isinstance(value, dict) else getattr(value, "__dict__", {})
+    return "by-formula" if "shape" in given and "file" not in given else "from-file"
+
+
+class BorderTable(Table):
+    """A stretch of the border between two of its vertices, or the ones nearest to two points [m]."""
+
+    start: PointOrVertex
+    end: PointOrVertex
+    direction: Literal["shortest", "with", "against"] = "shortest"
+
+
+class LineTable(Table):
+    """A feature line, given in one of five ways. Vertices count those of the file, from 0; points are in metres.
+
+    `vertices` lists every vertex, `from` and `to` are the ends of a shortest path, `plane` cuts the piece, `border` is
+    a side (bottom, left, right, top) or a stretch, `curve` the points of a polyline or the prim path of a USD curve.
+    """
+
+    vertices: Annotated[list[Vertex], Field(min_length=2)] | None = None
+    from_: PointOrVertex | None = Field(default=None, alias="from")
+    to: PointOrVertex | None = None
+    plane: PlaneTable | None = None
+    border: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[BorderTable, Tag("table")],
+            Discriminator(text_or_table),
+        ]
+        | None
+    ) = None
+    curve: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
+            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> LineTable:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("a shortest path needs both from and to")
+        ways = [self.vertices, self.from_, self.plane, self.border, self.curve]
+        if sum(way is not None for way in ways) != 1:
+            raise ValueError("give the line in one way: vertices, from and to, plane, border, or curve")
+        return self
+
+
+class PieceTable(Table):
+    """What one piece of several has of its own: of a file with component = "all", or of a garment that is cut along seams.
+
+    Vertices count those of the piece's object in the file, from 0, or those of its own OBJ file where the garment was cut.
+    """
+
+    datum: str | None = None
+    """A line of `lines`, an edge of the piece as "to front", or a side of its border."""
+    grain_angle: Annotated[float, Field(ge=-360, le=360)] | None = None
+    """Angle from the datum to the warp, counter-clockwise; that of the scene if not given."""
+    lines: dict[str, LineTable] = Field(default_factory=dict)
+    cuts: list[CutTable] = Field(default_factory=list)
+
+
+class SeamTable(Table):
+    """A seam: on a form one of those that it has, on a [surface] two lines along its border that are sewn together.
+
+    A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
+    as "left" or "piece.left"; they may be equally long.
+
+    `fullness` is eased in near the seam (0.02 is 2 %), at a sleeve's cap above its notches only. `gather` is the ratio of the
+    lengths, and its fullness falls on through the piece. `longer` names the piece, "piece.edge" or line that is longer; the
+    seam's second side if not given.
+    """
+
+    name: str = Field(min_length=1)
+    sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+    fullness: Annotated[float, Field(ge=0, le=0.3)] | None = None
+    gather: Annotated[float, Field(ge=1, le=5)] | None = None
+    longer: str | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SeamTable:
+        given = (self.fullness is not None) + (self.gather is not None)
+        if given > 1 or (given == 0 and self.sides is None):
+            raise ValueError("give either fullness = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
+        return self
+
+
+class FindSeamsTable(Table):
+    """How the seams of a whole garment are found (see `warpflat.find_seams`); in a scene it is `[seams]`, a table, not `[[seams]]`.
+
+    With `find = "auto"` the garment is cut where a tailor would cut it, with "none" only where `[[seams_cut]]` says. Without this table
+    a garment that cannot lie flat in one piece is cut.
+    """
+
+    find: Literal["auto", "none", "file", "uv", "materials", "groups"] = "auto"
+    """What is cut: "auto" along texture islands that look like cut pieces, else where a tailor would; "none" only what is drawn; "uv",
+    "materials", "groups" along what the file has of these, "file" along the first of them that it has."""
+    up: Direction | None = None
+    front: Direction | None = None
+    no: list[str] = Field(default_factory=list)
+    """Seams that are left closed: "shoulder", or "shoulder left"; "dart" for no darts; "uv": islands of the texture are not followed."""
+    keep: list[str] = Field(default_factory=list)
+    """Seams that are made in any case: "waist", "yoke", "centre back", "side left"."""
+    smooth_mm: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Length over which wrinkles of draped or scanned cloth are smoothed before it is cut; how far the cloth moves is told."""
+    limit: Annotated[float, Field(ge=0, le=1)] = 0.02
+    """Share of the cloth that may stay beyond its strain limit before further seams and darts are looked for."""
+    most_pieces: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """At most so many pieces of one layer; as many as are usual for its kind if not given."""
+    body: str | None = None
+    """A mesh file of the body under the garment, in the same place and unit: a seam at the waist is made at the body's waist."""
+
+
+class SeamCutPlane(PlaneTable):
+    """A plane by a point on it [m] and its normal (any length); all curves in which it meets the garment are cut.
+
+    With `towards` only the half of it that lies in this direction from the point, with `nearest` only the curve that is the nearest to
+    the point.
+    """
+
+    towards: Point | None = None
+    nearest: bool = False
+
+
+class SeamCutTable(Table):
+    """A seam of a whole garment that you draw (see `warpflat.SeamCut`), in one of five ways.
+
+    `points` lists places through which it runs straight over the cloth: points [m], or vertices of the file, from 0. `line` is a polyline
+    near the cloth, which is projected onto it: points [m], or the name of a line of the file. `plane` cuts where it meets the cloth.
+    `edges` lists rows of vertices, or names a file of them: a row in each line, or JSON lists. `marked` takes all lines and creases that
+    the file has. Tables with one `name` are one seam. All are made at once, whatever their order.
+    """
+
+    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
+    points: Annotated[list[PointOrVertex], Field(min_length=2)] | None = None
+    line: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
+            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
+        ]
+        | None
+    ) = None
+    closed: bool = False
+    """Points and lines return to their first point."""
+    plane: SeamCutPlane | None = None
+    edges: (
+        Annotated[
+            Annotated[str, Tag("text")]
+            | Annotated[list[Annotated[list[Vertex], Field(min_length=2)]], Field(min_length=1), Tag("rows")],
+            Discriminator(lambda value: "text" if isinstance(value, str) else "rows"),
+        ]
+        | None
+    ) = None
+    marked: bool = False
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SeamCutTable:
+        ways = (self.points, self.line, self.plane, self.edges, self.marked or None)
+        if sum(way is not None for way in ways) != 1:
+            raise ValueError("give the seam in one way: points, line, plane, edges, or marked = true")
+        if self.closed and self.points is None and not isinstance(self.line, list):
+            raise ValueError("closed belongs to points, or to the points of a line")
+        return self
+
+
+class ConstraintTable(Table):
+    """A constraint on an edge or a feature line, in one piece or in all that have it.
+
+    `straight` lays it on a straight line: of any direction ("free"), parallel to the grain ("warp") or at right angles to it
+    ("weft"). `length_mm` keeps every mesh edge at its length on the body ("body") or at its share of a length,
+    that of the whole line, unfolded. `symmetric` makes the piece, cut whole, its own mirror image about the line.
+    """
+
+    line: str = Field(min_length=1)
+    piece: str | None = None
+    straight: Literal["free", "warp", "weft"] | None = None
+    length_mm: (
+        Annotated[
+            Annotated[Literal["body"], Tag("word")] | Annotated[float, Field(ge=1, le=20_000), Tag("number")],
+            Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+        ]
+        | None
+    ) = None
+    symmetric: bool = False
+
+    @model_validator(mode="after")
+    def _something(self) -> ConstraintTable:
+        if self.straight is None and self.length_mm is None and not self.symmetric:
+            raise ValueError('ask for something: straight = "free", length_mm = "body", or symmetric = true')
+        return self
+
+
+class WearTable(Table):
+    """The intended fit of the garment (see `warpflat.flat.model.wear.Wear`); an empty table asks how it sits, no more."""
+
+    stretch_warp: float = 0.0
+    stretch_weft: float = 0.0
+    pressure: float | None = None
+
+
+class DrapeTable(Table):
+    """The garment is sewn and put on its body (see `warpflat.drape`)."""
+
+    friction: Annotated[float, Field(ge=0, le=2)] = 0.3
+    tolerance: Annotated[float, Field(ge=1e-6, le=1)] = 5e-3
+    max_steps: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
+    hold: list[str] = Field(default_factory=list)
+    """Lines and edges that stay where they are: "piece.line", or "line" for every piece that has one."""
+    correct: bool = False
+    """Whether the pattern is corrected until the worn garment lies on the designed surface, or no nearer."""
+    correct_fabric: str | None = None
+    """Another cloth for the corrected pattern, in which it is to be worn in the same shape."""
+    usd: bool = False
+    """Whether the worn garment is written as one mesh with its pattern, `worn.usdc`, as Style3D has it."""
+
+
+class OutputTable(Table):
+    """Files written besides `metrics.json` and `NAME.obj`."""
+
+    frames: Annotated[int, Field(ge=0, le=100_000)] = 60
+    """About how many frames from the development to rest, with more for every cut; 0 for no `frames.usdc`."""
+    frame_every: Annotated[int, Field(ge=1)] | None = None
+    """A frame every so many steps instead, as they are."""
+    compact_film: bool = False
+    """Whether `frames.usdc` stores points of computed layouts only; USD interpolates those of frames between."""
+    picture: bool = True
+    review: bool = True
+    """Whether a run with a picture writes `review.html`, too."""
+
+
+class PatternTable(Table):
+    """The pattern files: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`."""
+
+    formats: list[Literal["dxf", "svg", "pdf", "json", "garmentcode", "plt"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
+    """Formats that are written; an empty list writes none."""
+    dialect: Literal["aama", "astm"] = "aama"
+    paper: Literal["A4", "Letter", "A0", "Projector"] = "A4"
+    allowance_mm: Annotated[float, Field(ge=0, le=100)] = 10.0
+    hem_mm: Annotated[float, Field(ge=0, le=200)] = 30.0
+    kinds: dict[str, Literal["seam", "hem", "fold", "cut"]] = Field(default_factory=dict)
+    """What an edge is, by its name: "front.neck", or "neck" for every piece that has one."""
+    allowances_mm: dict[str, Annotated[float, Field(ge=0, le=200)]] = Field(default_factory=dict)
+    """Allowances by edge, named as in `kinds` [mm]."""
+    units: Literal["mm", "cm", "in"] = "cm"
+    """Units of lengths in printed words."""
+    names: dict[str, Annotated[str, Field(min_length=1, max_length=60)]] = Field(default_factory=dict)
+    """What is printed instead of a piece's name: front_bodice = "Vorderteil"."""
+    language: Literal["en", "de"] = "en"
+    """Language of what is printed."""
+    words: dict[str, Annotated[str, Field(min_length=1, max_length=200)]] = Field(default_factory=dict)
+    """Other printed words, by the English phrase or name: "side" = "Seitennaht"."""
+    tolerance_mm: Annotated[float, Field(ge=0.01, le=5)] | None = None
+    """How far a drawn curve may lie from the mesh's border; 0.1 mm, or more on a ragged one, if not given."""
+    sizes: list[str] = Field(default_factory=list)
+    """More sizes of a mannequin's garment, flattened too and laid upon each other as a graded nest."""
+
+
+class OpeningTable(Table):
+    """An opening along a line of a form. A piece that runs across a centre line is parted there, with a seam below the opening.
+
+    A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit`, `vent` or `godet` from the lower one. Buttons
+    and a zip run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing. A `wrap` laps one half over
+    the other all along a centre line; its neckline runs straight from the shoulder to the waist. A `godet` is a wedge that is sewn into
+    the lower end of its seam.
+    """
+
+    kind: Literal["zip", "buttons", "wrap", "slit", "vent", "godet", "keyhole"]
+    seam: Annotated[str, Field(min_length=1, max_length=100)]
+    length_mm: Annotated[float, Field(ge=10, le=2000)] | None = None
+    length_share: Annotated[float, Field(gt=0, le=1)] | None = None
+    """Where it ends, as a share of its line, so that it suits every wearer; rounded to a length in whole centimetres."""
+    start_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    style: Literal["invisible", "lapped"] = "invisible"
+    width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
+    """Of a slit's hem (15 mm if not given), a vent's flap (40), a button stand beyond the line (20), a keyhole's round end (12), a wrap
+    beyond the line (120), a godet at its hem (250)."""
+    button_mm: Annotated[float, Field(ge=5, le=60)] = 18.0
+    spacing_mm: Annotated[float, Field(ge=20, le=300)] = 85.0
+    """About how far buttons are apart; one lies on the bust line."""
+    count: Annotated[int, Field(ge=2, le=60)] | None = None
+    """How many buttons; as many as the spacing gives, if not given."""
+    facing: Literal["grown-on", "separate"] | None = None
+    """Of a button stand; grown on if not given, and separate where the garment is lined, as a lining is sewn to its inner edge."""
+    facing_mm: Annotated[float, Field(ge=20, le=200)] = 60.0
+    tie_mm: Annotated[float, Field(ge=0, le=2000)] = 900.0
+    """Length of the ties of a wrap; 0 for none."""
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> OpeningTable:
+        if self.kind == "zip" and self.width_mm is not None:
+            raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
+        if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
+            raise ValueError(
+                "start_mm and style belong to a zip; a slit, vent or godet begins at the lower end of its seam"
+            )
+        if self.length_share is not None and (self.length_mm is not None or self.kind not in ("buttons", "zip")):
+            raise ValueError("length_share belongs to a zip or buttons without length_mm; leave one of them out")
+        if self.kind not in ("buttons", "zip", "wrap") and self.length_mm is None:
+            raise ValueError("length_mm is missing; only buttons, zips and wraps run all along their line without one")
+        if self.kind == "wrap" and (self.length_mm is not None or self.seam not in ("centre front", "centre back")):
+            raise ValueError('a wrap runs all along a centre line: seam = "centre front", without length_mm')
+        most = {"godet": 1500.0, "wrap": 400.0}.get(self.kind, 200.0)
+        if (self.width_mm or 0.0) > most:
+            raise ValueError(f"width_mm is at most {most:g} for a {self.kind}")
+        if self.kind == "godet" and (self.width_mm or 0.0) > 3.0 * (self.length_mm or 0.0):
+            raise ValueError(
+                "width_mm of a godet is at most three times its length_mm: more than half a circle is a flounce"
+            )
+        if self.kind != "wrap" and "tie_mm" in self.model_fields_set:
+            raise ValueError(f"tie_mm belongs to a wrap; leave it out for a {self.kind}")
+        own = {"button_mm", "spacing_mm", "count", "facing", "facing_mm"} & self.model_fields_set
+        if self.kind != "buttons" and own:
+            raise ValueError(f"{sorted(own)[0]} belongs to buttons; leave it out for a {self.kind}")
+        return self
+
+
+#: Keys of a finishing that belong to some kinds only.
+_OF_KINDS = {
+    "share": ("band", "waistband", "cuff", "ruffle", "collar"),
+    "overlap_mm": ("waistband", "cuff"),
+    "shaped": ("waistband",),
+    "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce", "hem"),
+    "elastic": ("casing", "band", "waistband"),
+    "placket_mm": ("cuff", "collar"),
+    "pleat_mm": ("ruffle",),
+    "turns": ("flounce",),
+    "style": ("collar",),
+    "rise_mm": ("collar",),
+    "fall_mm": ("collar",),
+    "point_mm": ("collar",),
+    "strip_mm": ("hood",),
+}
+#: And those of a collar to some styles only.
+_OF_STYLES = {
+    "share": ("turtleneck",),
+    "rise_mm": ("stand", "shirt"),
+    "fall_mm": ("shirt",),
+    "point_mm": ("shirt", "convertible"),
+    "placket_mm": ("stand", "shirt", "convertible", "flat"),
+}
+
+
+class FinishingTable(Table):
+    """Pieces that finish free edges of a form, hems too: what they are follows from the lengths of the edges that they are sewn to.
+
+    A `facing` repeats each piece. One straight strip along the whole edge is a `band` or rib, a `waistband`, a `cuff`, a `binding` or
+    a gathered `ruffle`. A `collar` and a `hood` go around the neck. A `flounce` is a part of a ring below each piece. A `casing` is
+    turned in from the edge itself, for an elastic. A `hem` has no piece: it is cut higher, by `shorten_mm`.
+    """
+
+    kind: Literal[
+        "facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing", "collar", "hood", "hem"
+    ]
+    edge: Annotated[str, Field(min_length=1, max_length=100)]
+    width_mm: Annotated[float, Field(ge=5, le=1500)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=5)] = 1.0
+    """Length of a strip over that of its edge. A band of 0.85 is stretched, what is sewn to a cuff or waistband of 0.7 is gathered, a
+    ruffle of 1.8 is gathered itself."""
+    overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
+    shaped: bool = False
+    """A waistband that is cut from the upper strip of the pieces, as curved as they are."""
+    shorten_mm: Annotated[float, Field(ge=0, le=800)] | dict[str, Annotated[float, Field(ge=0, le=800)]] = 0.0
+    """The pieces end so far before the edge, because the strip takes the place. A table says how far where lines meet the edge, as
+    `{ "side left" = 200, "side right" = 0 }` for a hem that slants; between those lines it changes smoothly."""
+    elastic: Annotated[float, Field(ge=0, le=1.5)] = 0.0
+    """Length of an elastic that is threaded through it, as a share of the body's girth there; 0 for none."""
+    placket_mm: Annotated[float, Field(ge=0, le=300)] = 0.0
+    """Length of a slit that opens the edge: behind in a sleeve, bound with a strip of its own; in the centre front below a collar, with
+    two strips that button."""
+    pleat_mm: Annotated[float, Field(ge=0, le=300)] = 0.0
+    """Visible width of a pleat of a ruffle that is laid in pleats instead of gathered; with share = 3 they touch each other inside."""
+    turns: Annotated[float, Field(ge=0.1, le=3)] = 0.5
+    """How much of a circle a flounce is: 1 for a circle skirt, 0.5 for half of one."""
+    style: Literal["stand", "shirt", "convertible", "flat", "turtleneck"] = "stand"
+    """Of a collar: a stand; a stand with a fall; one that is both in one piece; one that lies flat around the neck (Peter Pan); a
+    doubled band of a knit that is turned down."""
+    rise_mm: Annotated[float, Field(ge=0, le=60)] = 15.0
+    """By how much the front ends of a stand lie higher than its middle, so that it leans to the neck."""
+    fall_mm: Annotated[float, Field(ge=20, le=150)] = 45.0
+    """Width of a shirt collar's fall in the middle of the back; `width_mm` is that of its stand."""
+    point_mm: Annotated[float, Field(ge=20, le=200)] = 65.0
+    """Length of the front edge of a fall, from the stand to its point."""
+    strip_mm: Annotated[float, Field(ge=0, le=250)] = 0.0
+    """Width of the strip over the crown of a hood of three pieces; 0 for one of two."""
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> FinishingTable:
+        for key, kinds in _OF_KINDS.items():
+            if key in self.model_fields_set and self.kind not in kinds:
+                raise ValueError(f"{key} belongs to a {' or '.join(kinds)}; leave it out for a {self.kind}")
+        for key, styles in _OF_STYLES.items() if self.kind == "collar" else ():
+            if key in self.model_fields_set and self.style not in styles:
+                raise ValueError(
+                    f'{key} belongs to a {" or ".join(styles)} collar; leave it out for style = "{self.style}"'
+                )
+        if self.kind == "hem" and self.width_mm is not None:
+            raise ValueError("width_mm of a hem is hem_mm of [pattern]; leave it out")
+        if self.kind == "hood" and self.width_mm is not None:
+            raise ValueError("width_mm of a hood follows from the head's girth; leave it out")
+        if (self.width_mm or 0.0) > 300.0 and self.kind not in ("ruffle", "flounce"):
+            raise ValueError(f"width_mm is at most 300 for a {self.kind}")
+        if self.share > 1.0 and self.kind != "ruffle":
+            raise ValueError(f"share is at most 1 for a {self.kind}, which does not gather; take a ruffle")
+        if self.share < 1.0 and self.kind == "ruffle":
+            raise ValueError("share is at least 1 for a ruffle, which is gathered as it is sewn")
+        if self.shaped and (self.overlap_mm or self.share != 1.0 or self.elastic or self.shorten_mm):
+            raise ValueError(
+                "shaped belongs to a waistband without overlap_mm, share, elastic and shorten_mm; leave them out"
+            )
+        if (self.kind == "hem" or isinstance(self.shorten_mm, dict)) and not self.shorten_mm:
+            raise ValueError(
+                'shorten_mm is missing: how much higher it lies, as shorten_mm = { "side left" = 200, "side right" = 0 }'
+            )
+        if self.kind == "casing" and not self.elastic:
+            raise ValueError("elastic is missing: its length as a share of the body's girth there, as elastic = 0.95")
+        if self.pleat_mm and self.share < 1.5:
+            raise ValueError(
+                "a ruffle in pleats takes a share of at least 1.5; 3 for pleats that touch each other inside"
+            )
+        if self.kind == "cuff" and self.placket_mm and not self.overlap_mm:
+            raise ValueError("a cuff with a placket needs an overlap for its button, overlap_mm = 25")
+        return self
+
+
+class PocketTable(Table):
+    """A pocket on both sides of the body: a `patch` or a `welt` on a piece, its place marked, bags in a seam (`inseam`), or an opening
+    from the upper edge of a front to its seam (`hip`).
+
+    A patch or welt lies `below_mm` under a line across its piece, its inner side `from_centre_mm` from the centre line; on a leg it lies
+    in the middle. An opening in a seam begins `below_mm` under the upper end of its seam, and is `height_mm` long. That of
+    a hip pocket runs from `width_mm` beside the seam, on the upper edge, to `height_mm` below it.
+    """
+
+    kind: Literal["patch", "welt", "inseam", "hip"]
+    piece: Annotated[str, Field(max_length=100)] = ""
+    line: Annotated[str, Field(max_length=100)] = "hip"
+    seam: Annotated[str, Field(max_length=100)] = ""
+    width_mm: Annotated[float, Field(ge=30, le=400)] = 140.0
+    height_mm: Annotated[float, Field(ge=30, le=400)] = 160.0
+    below_mm: Annotated[float, Field(ge=-500, le=1000)] = 60.0
+    from_centre_mm: Annotated[float, Field(ge=0, le=500)] = 70.0
+    welt_mm: Annotated[float, Field(ge=5, le=80)] = 15.0
+    """Height of a welt."""
+    most_share: Annotated[float, Field(gt=0, le=1)] | None = None
+    """Share of `line` on its piece that a patch or welt takes at most. On a smaller wearer its width and height, and its distances from
+    line and centre line, become smaller alike."""
+
+    @model_validator(mode="after")
+    def _has_its_place(self) -> PocketTable:
+        if self.kind in ("patch", "welt") and not self.piece:
+            raise ValueError(f'a {self.kind} pocket needs its piece: piece = "front"')
+        if self.kind in ("inseam", "hip") and (not self.seam or self.below_mm < 0):
+            raise ValueError(f'a pocket of kind {self.kind} needs its seam, seam = "side left", and below_mm from 0')
+        if self.kind not in ("patch", "welt") and self.most_share is not None:
+            raise ValueError(f"most_share belongs to a patch or welt; leave it out for a pocket of kind {self.kind}")
+        if self.kind != "welt" and "welt_mm" in self.model_fields_set:
+            raise ValueError(f"welt_mm belongs to a welt; leave it out for a pocket of kind {self.kind}")
+        return self
+
+
+class ClothTable(Table):
+    """Cloth beside its fabric: what it loses in the wash, and what else the garment is cut from."""
+
+    shrinkage_warp: Annotated[float, Field(ge=0, le=0.25)] = 0.0
+    """Share of its length that the cloth loses along the warp; pieces are drawn larger by it."""
+    shrinkage_weft: Annotated[float, Field(ge=0, le=0.25)] = 0.0
+    lining: Annotated[str, Field(max_length=40)] = ""
+    """What the lining is called; with a name the shell's pieces are lined."""
+    repeat_warp_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """Repeat of stripes or checks along the warp; 0 where there is none."""
+    repeat_weft_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    match: list[str] = Field(default_factory=list)
+    """Seams at whose first notch both sides lie on the same stripe in the marker."""
+    interfacing: Annotated[str, Field(max_length=40)] = ""
+    """What the interfacing is called; with a name facings and waistbands are cut from it too."""
+    pocketing: Annotated[str, Field(max_length=40)] = ""
+    """What the cloth of pocket bags is called; with a name these are cut from it, not from the shell's cloth."""
+
+
+class MarkerTable(Table):
+    """The lay plan on a cloth (see `warpflat.Cloth`); one garment of each size. Lengths in metres."""
+
+    width: Annotated[float, Field(ge=0.1, le=10)]
+    one_way: bool = False
+    reversible: bool = False
+    gap: Annotated[float, Field(ge=0, le=0.1)] = 0.002
+    seconds: Annotated[int, Field(ge=1, le=600)] = 5
+    folded: bool = False
+    """The cloth is folded lengthwise: halves lie against its fold, pairs are cut at once."""
+
+
+def _as_solver(value: object) -> object:
+    """Read the names of earlier versions."""
+    return FORMER_SOLVERS.get(value, value) if isinstance(value, str) else value
+
+
+_RELAX_FIELDS: dict[str, Any] = {
+    field.name: (get_type_hints(RelaxOptions)[field.name] | None, None) for field in dataclasses.fields(RelaxOptions)
+}
+_RELAX_FIELDS["solver"] = (Annotated[Solver | None, BeforeValidator(_as_solver)], None)
+if TYPE_CHECKING:
+    RelaxTable = Table
+else:
+    # The fields of RelaxOptions, each optional, so that the two cannot differ.
+    RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
+
+
+#: Keys of a scene that change the pattern of a mesh.
+_CHANGES_PATTERN = (
+    "lines", "cuts", "auto_cut", "pieces", "seams", "find_seams", "seams_cut", "constraints", "datum", "start", "grain_angle", "bands",
+    "bands_shorter", "wear", "drape",
+)  # fmt: skip
+
+
+class SceneTable(Table):
+    """A scene file; `datum` names a line given here, one that the file or shape brings, or a side of the border."""
+
+    name: Annotated[str, Field(max_length=100), AfterValidator(plain_name)] | None = None
+    fabric: Annotated[
+        Annotated[str, Tag("text")] | Annotated[FabricTable, Tag("table")],
+        Discriminator(text_or_table),
+    ] = DEFAULT_FABRIC
+    fabric_files: list[str] = Field(default_factory=list)
+    shear_limit: float | None = None
+    surface: (
+        Annotated[
+            Annotated[FileSurface, Tag("from-file")] | Annotated[ShapeSurface, Tag("by-formula")],
+            Discriminator(kind_of_surface),
+        ]
+        | None
+    ) = None
+    mannequin: MannequinTable | None = None
+    form: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[dict[str, Any], Tag("table")],
+            Discriminator(text_or_table),
+        ]
+        | None
+    ) = None
+    """A form's name, or a table of your own (see `warpflat.form_from_mapping`)."""
+    half: bool = False
+    """Symmetric pieces as their left half, on the fold."""
+    shape: Literal["none", "darts", "princess", "auto"] = "none"
+    """How a form's pieces are shaped: not, by the darts of a pattern book's block, by seams along the princess lines, or by as
+    many of a book's darts as bring the strain within the cloth's limit."""
+    ease: str | dict[str, Any] | None = None
+    """Wearing ease of a form: a preset (moulage, close, semi-fitted, loose), or a table of levels [cm], with a `preset` for the others."""
+    pulled_on: bool = False
+    """A form of a knit is pulled on: its neckline, and the ease of its other edges and levels, grow until what must pass through them
+    does, stretched to the cloth's limit. Openings count. A note says what has grown."""
+    curves_mm: Annotated[float, Field(ge=0, le=20)] | None = None
+    """How far the borders of a form's pieces may move to be drawn as by hand: without wobble, and straight where a book has them
+    straight; 3 mm if not given, 0 leaves them as the cloth rests."""
+    lines: dict[str, LineTable] = Field(default_factory=dict)
+    cuts: list[CutTable] = Field(default_factory=list)
+    auto_cut: AutoCutTable | None = None
+    pieces: dict[str, PieceTable] = Field(default_factory=dict)
+    seams: list[SeamTable] = Field(default_factory=list)
+    find_seams: FindSeamsTable | None = None
+    seams_cut: list[SeamCutTable] = Field(default_factory=list)
+    constraints: list[ConstraintTable] = Field(default_factory=list)
+    datum: str | None = None
+    start: str | None = None
+    """An OBJ file of the same mesh, from whose texture coordinates the piece is relaxed."""
+    grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    bands: Literal["auto", "straight", "as worn"] = "auto"
+    """Long strips of even width that are cut straight and stretched as they are sewn, as long as their shorter side is worn: "auto" slender
+    rings that are sewn along one side, as a neck band, "straight" all, "as worn" none."""
+    bands_shorter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Share by which straight bands are cut shorter still, as rib is."""
+    model: Literal["auto", "springs", "membrane"] = "auto"
+    wear: WearTable | None = None
+    drape: DrapeTable | None = None
+    device: str | None = None
+    relax: RelaxTable = Field(default_factory=RelaxTable)
+    output: OutputTable = Field(default_factory=OutputTable)
+    pattern: PatternTable = Field(default_factory=PatternTable)
+    marker: MarkerTable | None = None
+    cloth: ClothTable | None = None
+    openings: list[OpeningTable] = Field(default_factory=list)
+    finishing: list[FinishingTable] = Field(default_factory=list)
+    pockets: list[PocketTable] = Field(default_factory=list)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _found_seams(cls, data: Any) -> Any:
+        """Read a table `[seams]` as that of seams to be found; a list `[[seams]]` names seams."""
+        if isinstance(data, dict) and isinstance(data.get("seams"), dict):
+            if "find_seams" in data:
+                raise ValueError("give [seams] or [find_seams], which are one table")
+            data = {**data, "find_seams": data["seams"]}
+            del data["seams"]
+        return data
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SceneTable:
+        if (self.surface is None) == (self.mannequin is None):
+            raise ValueError("a scene needs either a [surface] table or a [mannequin] table with a form")
+        if (self.mannequin is None) != (self.form is None):
+            raise ValueError('a mannequin and a form go together: [mannequin] size = "EU 38" and form = "basic_block"')
+        if self.mannequin is None:
+            # Refuse what belongs to the form on a mannequin.
+            if self.shape != "none":
+                raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
+            for key in ("openings", "finishing", "pockets"):
+                if getattr(self, key):
+                    raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
+            if self.curves_mm is not None:
+                raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
+            if self.pulled_on:
+                raise ValueError("pulled_on belongs to a form; a [surface] is as large as its mesh")
+            if self.ease is not None:
+                raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
+            if isinstance(self.surface, FileSurface) and self.surface.pattern is not None:
+                for key in _CHANGES_PATTERN:
+                    if getattr(self, key) != type(self).model_fields[key].get_default(call_default_factory=True):
+                        name = {"find_seams": "seams"}.get(key, key)
+                        raise ValueError(
+                            f'{name} belongs to pieces that are flattened; with surface.pattern = "uv" the pattern is taken as it is: '
+                            "leave one of them out"
+                        )
+                if self.surface.component is not None:
+                    raise ValueError('surface.component: pattern = "uv" takes all islands of the texture; leave it out')
+            found = None if self.find_seams is None or self.find_seams.find == "none" else self.find_seams.find
+            whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
+            if whole and not isinstance(self.surface, FileSurface):
+                raise ValueError(f"{whole} takes a garment from a file")
+            if (
+                isinstance(self.surface, FileSurface)
+                and self.surface.meet_mm is not None
+                and self.surface.component != "all"
+            ):
+                raise ValueError('surface.meet_mm is for component = "all"; leave it out')
+            if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or whole):
+                if self.surface.component == "all" and self.seams_cut:
+                    raise ValueError('[[seams_cut]] cuts a whole garment; with component = "all" leave it out')
+                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "drape"):
+                    if getattr(self, key):
+                        why = whole or 'component = "all"'
+                        own = f", or give it to a piece: [pieces.NAME] {key}" if key in PieceTable.model_fields else ""
+                        raise ValueError(f"{key} belongs to one piece; with {why} leave it out{own}")
+            elif isinstance(self.surface, ShapeSurface) and self.surface.shape in PIECES:
+                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "drape", "constraints"):
+                    if getattr(self, key):
+                        raise ValueError(
+                            f'{key} belongs to one surface; shape = "{self.surface.shape}" has several pieces: leave it out'
+                        )
+            elif self.pieces and (self.find_seams is None or self.find_seams.find == "none"):
+                raise ValueError('[pieces] is for several pieces: of component = "all", or along seams that are found')
+            for where, cuts in (
+                ("", self.cuts),
+                *((f"pieces.{name}.", piece.cuts) for name, piece in self.pieces.items()),
+            ):
+                for number, cut in enumerate(cuts):
+                    cut.check_for_surface(f"{where}cuts[{number}]")
+            if self.half:
+                raise ValueError(
+                    "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
+                    'kinds = { left = "fold" }'
+                )
+            for number, seam in enumerate(self.seams):
+                if seam.sides is None:
+                    raise ValueError(
+                        f"seams[{number}]: on a [surface] give the two lines that are sewn, "
+                        'sides = ["left", "right"]; both sides of its cuts are equally long anyway'
+                    )
+        else:
+            # Refuse what belongs to a surface.
+            if self.bands != "auto" or self.bands_shorter:
+                raise ValueError(
+                    "bands and bands_shorter are for pieces of a [surface]; a form's bands are its [[finishing]]"
+                )
+            if self.find_seams is not None or self.seams_cut:
+                raise ValueError(
+                    f"{'[seams]' if self.find_seams else '[[seams_cut]]'} is for a garment from a file; a form has its own "
+                    "seams, and [[seams]] change them"
+                )
+            if self.pieces:
+                raise ValueError("pieces is for pieces from a file; on a form give [[cuts]] with their piece")
+            if self.lines or self.datum:
+                raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
+            if self.auto_cut and self.shape == "auto":
+                raise ValueError('give [auto_cut] or shape = "auto"')
+            for number, cut in enumerate(self.cuts):
+                cut.check_for_form(f"cuts[{number}]")
+            for number, seam in enumerate(self.seams):
+                if seam.sides is not None:
+                    raise ValueError(
+                        f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
+                    )
+        if self.pulled_on and self.wear is not None:
+            raise ValueError(
+                "pulled_on makes a garment as wide as it must be, and [wear] as tight as is asked; give one of them"
+            )
+        # Refuse sizes of a pattern that no size table can give.
+        if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
+            raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
+        if self.pattern.sizes and self.mannequin is not None and self.mannequin.measurements:
+            raise ValueError(
+                "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _whole_drape(self) -> SceneTable:
+        if self.drape is not None and self.half:
+            raise ValueError("a drape needs the whole garment: leave out half, or [drape]")
+        return self

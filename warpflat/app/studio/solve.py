@@ -1,0 +1,169 @@
+"""A scene is solved for the studio; what an edit leaves as it was is kept from the solution before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+
+import numpy as np
+
+from warpflat.app.scene.cuts import CutSequence
+from warpflat.app.scene.form import scene_form
+from warpflat.app.scene.form_shaping import settle_shape, without_closed_darts
+from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_relax_options
+from warpflat.app.scene.plan import GarmentPlan, plan_garment, plan_mesh, scene_cuts
+from warpflat.app.scene.surface import scene_surface
+from warpflat.flat.cutting.cut_piece import cut
+from warpflat.flat.cutting.cut_plan import CutPlan
+from warpflat.flat.flattening.applied_cut import measure_cut
+from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.flattening.verdict import Verdict, judge
+from warpflat.flat.surface.mesh import Surface
+from warpflat.garment.construction.darts import measure_darts
+from warpflat.garment.construction.form_garment import FormGarment
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.table import mannequin_from_table
+
+__all__ = ["Solution", "solve"]
+
+# What the surface, the body and the form of a scene are made from.
+_OF_SURFACE = ("name", "surface", "lines", "datum", "constraints", "seams")
+_OF_BODY = ("mannequin",)
+_OF_FORM = ("form", "half", "shape", "ease", "cuts", "auto_cut", "openings")
+# What may differ while one cut more is made in a piece that lies there already.
+_CUTS_ONLY = ("cuts", "output", "pattern", "marker")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solution:
+    """A scene that has been flattened, cut and sewn.
+
+    Attributes:
+        scene: as it was asked for.
+        pieces: by name.
+        bare: the surface of the scene before its cuts; None of a form.
+        plan, garment: of a form; None of a surface.
+        notes: what was chosen on the way.
+    """
+
+    scene: Scene
+    pieces: Mapping[str, Flattening]
+    bare: Surface | None = None
+    plan: GarmentPlan | None = None
+    garment: FormGarment | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def strain_energy(self) -> float:
+        """The strain energy of all pieces [J]."""
+        return sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
+
+    @cached_property
+    def verdict(self) -> Verdict | None:
+        """Whether it fits, and why not; None where no cloth is judged."""
+        if self.garment is not None:
+            return judge(self.garment.metrics())
+        return judge({"pieces": {name: piece.measures for name, piece in self.pieces.items()}})
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether every piece is."""
+        return all(piece.converged for piece in self.pieces.values())
+
+    @property
+    def openings(self) -> dict[str, float]:
+        """How wide each cut or dart opens, by "piece.name" [m]."""
+        form = None if self.garment is None else self.garment.form
+        if form is not None:
+            return {
+                f"{name}.{dart['name']}": float(dart["intake_m"])
+                for name, piece in self.pieces.items()
+                for dart in measure_darts(form, name, piece.positions)
+            }
+        found = {}
+        for name, piece in self.pieces.items():
+            for made in piece.cuts:
+                seams = measure_cut(piece.network.surface, piece.positions, made)["seams"]
+                found[f"{name}.{made.name}"] = max((float(seam["opening_m"]) for seam in seams), default=0.0)
+        return found
+
+
+def solve(
+    scene: Scene, before: Solution | None = None, *, callback: Callable[[str, Progress], bool | None] | None = None
+) -> Solution:
+    """Flatten, cut and sew a scene.
+
+    Args:
+        scene: what to solve.
+        before: the solution of a scene that may have much in common with it.
+        callback: called with a piece's name and its progress; True stops the relaxation, and the result is kept.
+
+    Raises:
+        InputError: as :func:`warpflat.run_scene`.
+    """
+    if scene.settings.mannequin is None:
+        known = before is not None and before.bare is not None and _alike(scene, before.scene, _OF_SURFACE)
+        bare = before.bare if known and before is not None and before.bare is not None else scene_surface(scene)
+        sequence = scene_cuts(scene, surface=bare)
+        slit = None if before is None else _one_more_cut(scene, before, sequence)
+        if before is not None and slit is not None:
+            with errors_named(scene.where):
+                step = None if callback is None else partial(callback, scene.name)
+                result = cut(before.pieces[scene.name], slit, relax=scene_relax_options(scene), callback=step)
+        else:
+            result = plan_mesh(scene, cuts=sequence).flatten(callback=callback).pieces[scene.name]
+        return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*sequence.notes, *result.messages))
+    settled, notes = settle_shape(scene)
+    plan = None if before is None else before.plan
+    mannequin = plan.mannequin if plan is not None and _alike(scene, plan.scene, _OF_BODY) else _body(scene)
+    if plan is not None and mannequin is plan.mannequin and _alike(settled, plan.scene, _OF_FORM):
+        form = plan.form
+    else:
+        form = scene_form(settled, mannequin, before=None if plan is None else plan.form)[1]
+    plan = plan_garment(settled, built=(mannequin, form))
+    garment = plan.flatten(callback=callback, known=_known(plan, before))
+    while (opened := without_closed_darts(settled, [garment]))[1]:
+        settled, notes = opened[0], (*notes, *opened[1])
+        plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin, before=plan.form)[1]))
+        garment = plan.flatten(callback=callback, known=_known(plan, before))
+    return Solution(scene=scene, pieces=garment.pieces, plan=plan, garment=garment, notes=(*notes, *garment.notes))
+
+
+def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutPlan | None:
+    """Return the one cut by which a scene differs from another, if it can be made in the other's piece as that lies there."""
+    piece = before.pieces.get(scene.name)
+    if piece is None or piece.unsewn is not None or sequence.auto is not None:
+        return None
+    others = [key for key in type(scene.settings).model_fields if key not in _CUTS_ONLY]
+    made, faces = len(piece.cuts), piece.surface.faces
+    if (
+        not _alike(scene, before.scene, others)
+        or scene.settings.cuts[:-1] != before.scene.settings.cuts
+        or len(sequence.plans) != made + 1
+        # A path between points has divided faces, and all cuts are made again.
+        or not np.array_equal(sequence.surface.faces, faces)
+    ):
+        return None
+    return sequence.plans[-1]
+
+
+def _known(plan: GarmentPlan, before: Solution | None) -> dict[str, Flattening]:
+    """Return the pieces of another solution as they lay at rest before they were sewn, if they were flattened as the plan asks."""
+    if before is None or before.plan is None or before.plan.settings != plan.settings:
+        return {}
+    unsewn = {name: piece.unsewn for name, piece in before.pieces.items() if name in plan.form.pieces}
+    return {name: piece for name, piece in unsewn.items() if piece is not None and piece.converged}
+
+
+def _body(scene: Scene) -> Mannequin:
+    table = scene.settings.mannequin
+    assert table is not None  # the scene has a form
+    with errors_named(f"{scene.where}: mannequin"):
+        return mannequin_from_table(table, path_of=lambda file: scene.folder / expand_variables(file))
+
+
+def _alike(one: Scene, other: Scene, keys: tuple[str, ...] | list[str]) -> bool:
+    """Return whether some tables of two scenes are the same."""
+    return all(getattr(one.settings, key) == getattr(other.settings, key) for key in keys)

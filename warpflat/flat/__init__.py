@@ -1,0 +1,1 @@
+"""The paper: from a surface to a flat layout, and its cuts."""

@@ -1,0 +1,131 @@
+"""The progress of a relaxation, and the stages of its history."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.text import energy_words, format_count
+from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.model.strain import WornStrain, worn_strain
+from warpflat.flat.solver.steps import Relaxation
+from warpflat.flat.solver.stop import Remainder
+from warpflat.flat.surface.mesh import Surface
+
+__all__ = ["CONTACT", "STEPS", "Progress", "Stage", "relaxation_words"]
+
+#: Name of the stage in which a piece that would lie over itself is kept from it.
+CONTACT = "contact"
+#: Name of the stage of the paper's steps with which a relaxation begins.
+STEPS = "steps"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """An entry of a piece's history: its energies at the end of a stage, and what the stage took.
+
+    Attributes:
+        name: "develop", "steps" (the paper's, with which a relaxation begins), "relax", "contact", "cut:NAME" and so on.
+        model_energy_j: what is minimised: springs and guard, or membrane and guard [J].
+        guard_energy_j: the part of it that keeps faces unfolded [J].
+        strain_energy_j: strain energy of the cloth as worn, eq. (3) of the paper [J].
+        steps: approximate implicit steps, or iterations of L-BFGS.
+        work_units: all work, in approximate implicit steps over all vertices.
+        seconds: wall time.
+        converged: False if it ended at its step limit.
+        residual: largest force on a vertex over the mean spring force; None if there was no relaxation to the end.
+        left: the estimate of what was still to be relaxed; None where there is none.
+    """
+
+    name: str
+    model_energy_j: float
+    guard_energy_j: float
+    strain_energy_j: float
+    steps: int
+    work_units: float
+    seconds: float
+    converged: bool
+    residual: float | None
+    left: Remainder | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of `stages` in `metrics.json`."""
+        return self.__dict__ | {"left": None if self.left is None else dict(self.left.__dict__)}
+
+
+def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:
+    """Return how many of the paper's steps and how many iterations of L-BFGS relaxed pieces first, and what energy each released.
+
+    Args:
+        pieces: for each the entries of its history, as `Stage.as_dict` has them.
+
+    Returns:
+        Such as "36 steps released 2.3 J, 301 iterations 120 mJ"; empty where nothing was relaxed.
+    """
+    counts: dict[str, int] = {}
+    released: dict[str, float] = {}
+    for stages in pieces:
+        for before, stage in pairwise(stages):
+            if before["name"] not in ("develop", STEPS) or stage["name"] not in (STEPS, "relax"):
+                break
+            # A step is a unit of work, an iteration several.
+            unit = "step" if stage["work_units"] <= stage["steps"] else "iteration"
+            counts[unit] = counts.get(unit, 0) + stage["steps"]
+            # The energy of crushed faces is beyond all numbers.
+            if None not in (before["model_energy_j"], stage["model_energy_j"]):
+                released[unit] = released.get(unit, 0.0) + before["model_energy_j"] - stage["model_energy_j"]
+    return ", ".join(
+        f"{format_count(counts[unit], unit)} released {energy_words(released.get(unit, 0.0))}"
+        for unit in ("step", "iteration")
+        if counts.get(unit)
+    )
+
+
+class Progress:
+    """The progress of a relaxation, which a callback gets after every step and every iteration of L-BFGS.
+
+    Attributes:
+        stage: "develop", before the first step, "steps" during the paper's steps, then "relax"; "cut:NAME" and "close:NAME" where darts
+            open and close, "fabric:NAME" and "surface:NAME" after a change of these, "refine" on a mesh with a path drawn for a cut.
+        step: approximate implicit steps and iterations of L-BFGS so far.
+        work_units: all work so far, in such steps.
+        max_steps: at most so many.
+        model_energy_j: springs and guard, or membrane and guard, at the last convergence check (see `RelaxOptions.check_every`) [J].
+        guard_energy_j: the part of it that keeps faces unfolded [J].
+        residual: largest force over mean spring force, at the same check.
+    """
+
+    def __init__(self, stage: str, state: Relaxation, *, max_steps: int) -> None:
+        """Refer to the running relaxation; its layout is copied when it is asked for."""
+        self.stage = stage
+        self.step = state.steps
+        self.work_units = state.work_units
+        self.max_steps = max_steps
+        self.model_energy_j = state.status.energies.potential
+        self.guard_energy_j = state.status.energies.guard
+        self.residual = state.status.residual
+        self._state = state
+
+    @property
+    def surface(self) -> Surface:
+        """The surface in its present topology: after a cut its vertices are doubled."""
+        return self._network.surface
+
+    def positions(self) -> FloatArray:
+        """Return a copy of the layout, #V by 2 [m]."""
+        return self._state.positions()
+
+    def worn_strain(self) -> WornStrain:
+        """Return worn strain, stress and strain energy per face."""
+        return worn_strain(self._network, self.positions())
+
+    def face_energy_density(self) -> FloatArray:
+        """Return the strain energy per flat area of each face, #F [J/m2]."""
+        return self.worn_strain().energy_density
+
+    @property
+    def _network(self) -> SpringNetwork:
+        return self._state.network

@@ -1,0 +1,99 @@
+"""The options of a relaxation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from warpflat.core.errors import InputError, expect, is_number, nearest
+
+__all__ = ["FORMER_SOLVERS", "SOLVERS", "RelaxOptions", "Solver", "given_options"]
+
+Solver = Literal["auto", "paper"]
+SOLVERS: tuple[Solver, ...] = ("auto", "paper")
+#: Names of earlier versions, and what they are read as.
+FORMER_SOLVERS: dict[str, Solver] = {"multilevel": "auto", "plain": "paper"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelaxOptions:
+    """Options of a relaxation: the time step, the tolerances, the solver, the gap.
+
+    Attributes:
+        time_step: h of eqs. (4) to (10) [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
+        first_steps_gain: a relaxation begins with the paper's steps. They end once a step changes the energy by no more than this share,
+            epsilon of eq. (11). With 1 there are none.
+        energy_left, outline_left_mm: L-BFGS, with or without contact, ends when by estimate
+            (`warpflat.flat.solver.stop`) at most this share of the energy is still to be released, and no point of the outline will move by
+            more than so many millimetres. With 0, or where one of the tolerances below is stricter than its default, it ends by the
+            tolerances alone.
+        energy_tolerance: eq. (11): relative change of the energy per step.
+        residual_tolerance: largest force on a vertex over the mean force of the springs.
+        max_steps: a state that has taken so many steps is not stepped further, and reports `converged = False`. An iteration of L-BFGS
+            counts by its work, in steps.
+        check_every: steps between two convergence checks.
+        kinetic_damping: set velocities to zero when the forces begin to brake the motion.
+        solver: "auto", the paper's steps while they gain, then L-BFGS over one factor, from coarse to fine on meshes too large to factor;
+            or "paper", the paper's steps alone.
+        gap_mm: a flat piece that would lie over itself is parted by contact (`warpflat.flat.solver.contact`), which acts where its border
+            comes nearer to itself than this [mm]; 0 leaves the piece as it lies.
+        contact_share: where contact costs more than this share of the model energy, it also starts from its layout swirled, and a note
+            names the cut that would restore it.
+    """
+
+    time_step: float = 0.01
+    first_steps_gain: float = 0.05
+    energy_left: float = 1e-3
+    outline_left_mm: float = 0.2
+    energy_tolerance: float = 1e-6
+    residual_tolerance: float = 5e-3
+    max_steps: int = 20_000
+    check_every: int = 10
+    kinetic_damping: bool = True
+    solver: Solver = "auto"
+    gap_mm: float = 0.5
+    contact_share: float = 0.05
+
+    def __post_init__(self) -> None:
+        if isinstance(self.solver, str):
+            object.__setattr__(self, "solver", FORMER_SOLVERS.get(self.solver, self.solver))
+
+    def validate(self) -> None:
+        """Raise InputError, with its name, for a value out of its bounds."""
+        for key, low, high in (
+            ("time_step", 1e-9, 1e9),
+            ("first_steps_gain", 0.0, 1.0),
+            ("energy_left", 0.0, 1.0),
+            ("outline_left_mm", 0.0, 1e3),
+            ("energy_tolerance", 0.0, 1.0),
+            ("residual_tolerance", 1e-12, 1e3),
+            ("max_steps", 1, 10**9),
+            ("check_every", 1, 10**6),
+            ("gap_mm", 0.0, 1e3),
+            ("contact_share", 0.0, 1e6),
+        ):
+            value = getattr(self, key)
+            if not (is_number(value) and math.isfinite(value)):
+                raise InputError(f"relax: {key} = {value!r} is not a number")
+            if not low <= value <= high:
+                raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
+            if key in ("max_steps", "check_every") and not is_number(value, whole=True):
+                raise InputError(f"relax: {key} = {value!r} is not a whole number")
+        if not isinstance(self.kinetic_damping, bool):
+            raise InputError(f"relax: kinetic_damping = {self.kinetic_damping!r} is neither True nor False")
+        if self.solver not in SOLVERS:
+            raise InputError(f"relax: solver {self.solver!r} is unknown; {nearest(str(self.solver), SOLVERS)}")
+
+
+def given_options(options: RelaxOptions | None) -> RelaxOptions:
+    """Return valid options: those given, or the defaults.
+
+    Raises:
+        InputError: they are no RelaxOptions, or a value is out of its bounds.
+    """
+    if options is None:
+        return RelaxOptions()
+    expect(options, RelaxOptions, "relax", "a RelaxOptions, such as RelaxOptions(max_steps=5000)")
+    options.validate()
+    return options

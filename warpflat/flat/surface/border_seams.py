@@ -1,0 +1,162 @@
+"""Seams between two named lines on the border of one surface: found, checked and matched vertex by vertex.
+
+The vertices of the two sides need not agree. Sides with equal numbers of vertices at equal shares of their length are sewn edge
+by edge. Otherwise each vertex of the side with fewer is matched by arc length to the nearest of the other side, and between
+two such joints both sides stretch evenly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import arc_lengths, project_on_segments
+from warpflat.flat.surface.connectivity import border_loops
+from warpflat.flat.surface.mesh import Surface
+
+__all__ = ["SAME_PLACE", "BorderSeam", "SurfaceSeam", "surface_seams"]
+
+
+#: Points nearer to each other than this [m] are at one place in space.
+SAME_PLACE = 1e-5
+#: Sides that keep this near [m] to each other in space are one curve.
+_SHARED = 1e-3
+#: Other sides differ in length by no more than these shares: any, and those with as many vertices.
+_ALIKE, _AS_MANY = 0.01, 0.05
+#: Vertices that agree in their share of the length within this part of an edge are sewn edge by edge.
+_SAME_SHARE = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class BorderSeam:
+    """A wish that two lines along the border of a surface be sewn together.
+
+    Attributes:
+        name: of the seam.
+        sides: the two lines, by name.
+        factor: length of the longer side over that of the other: 1.02 for an ease of 2 %.
+        gathered: true if the fullness continues through the piece; false if it is eased in near the seam.
+        longer: the side that is longer, 0 or 1.
+    """
+
+    name: str
+    sides: tuple[str, str]
+    factor: float = 1.0
+    gathered: bool = False
+    longer: int = 1
+
+    @property
+    def ease(self) -> float:
+        """The surplus length of the second side, as a share of the first."""
+        return self.factor - 1.0 if self.longer == 1 else 1.0 / self.factor - 1.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SurfaceSeam:
+    """A named seam on a mesh.
+
+    Attributes:
+        named: the wish.
+        vertices: of both sides, in corresponding order.
+        joints: #J by 2, positions in the two rows that are sewn to each other; None if all are, one to one.
+    """
+
+    named: BorderSeam
+    vertices: tuple[IntArray, IntArray]
+    joints: IntArray | None
+
+
+def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> tuple[SurfaceSeam, ...]:
+    """Find named seams on a surface.
+
+    Args:
+        surface: whole or cut, with the lines that the seams name.
+        named: the seams.
+
+    Raises:
+        InputError: a line is unknown (names the nearest), closed, parted by a cut or not on the border, or the two do not
+            fit: they share no curve in space and differ in length.
+    """
+    if not named:
+        return ()
+    loops = border_loops(surface.faces)
+    along = {edge for loop in loops for edge in pairwise([*loop.tolist(), int(loop[0])])}
+    found = []
+    for seam in named:
+        try:
+            sides = [_side(surface, along, line) for line in seam.sides]
+            first, second = sides
+            if len(np.intersect1d(first, second)) > 1:
+                raise InputError(
+                    f"lines {seam.sides[0]!r} and {seam.sides[1]!r} overlap; a side is sewn to another one"
+                )
+            one, other = surface.vertices[first], surface.vertices[second]
+            # Two stretches of one border meet running against each other.
+            second, other = second[::-1].copy(), other[::-1]
+            shared = max(_largest_distance(one, other), _largest_distance(other, one)) <= _SHARED
+            if shared and np.linalg.norm(one[0] - other[-1]) < np.linalg.norm(one[0] - other[0]):
+                raise InputError(
+                    f"{seam.sides[0]!r} and {seam.sides[1]!r} lie on each other the same way round, face to back; sides meet face to face"
+                )
+            arcs = [arc_lengths(points) for points in (one, other)]
+            lengths = [float(arc[-1]) for arc in arcs]
+            unlike = abs(lengths[0] - lengths[1]) / max(lengths)
+            if not shared and unlike > (_AS_MANY if len(first) == len(second) else _ALIKE):
+                raise InputError(
+                    f"{seam.sides[0]!r} is {1e3 * lengths[0]:.1f} mm long and {seam.sides[1]!r} {1e3 * lengths[1]:.1f} mm, and they are "
+                    f"not one curve in space; sides agree within {_ALIKE:.0%}, or {_AS_MANY:.0%} with as many vertices each"
+                )
+            found.append(
+                SurfaceSeam(
+                    named=seam, vertices=(first, second), joints=_joints(arcs[0] / lengths[0], arcs[1] / lengths[1])
+                )
+            )
+        except InputError as error:
+            raise InputError(f"seam {seam.name!r}: {error}") from None
+    return tuple(found)
+
+
+def _side(surface: Surface, along: set[tuple[int, int]], line: str) -> IntArray:
+    """Return the line's vertices in the direction of the border, with the surface to its left."""
+    if line not in surface.lines:
+        raise InputError(f"unknown line {line!r}; {nearest(line, surface.lines)}")
+    ids = np.asarray(surface.lines[line], dtype=np.int32)
+    if ids[0] == ids[-1]:
+        raise InputError(f"line {line!r} is closed; a side runs from one place of the border to another")
+    for run in (ids, ids[::-1]):
+        if all(edge in along for edge in pairwise(run.tolist())):
+            return np.ascontiguousarray(run)
+    a, b = next(edge for edge in pairwise(ids.tolist()) if edge not in along)
+    raise InputError(
+        f"line {line!r} leaves the border between vertices {a} and {b}; a side is one stretch of border that no cut parts"
+    )
+
+
+def _joints(first: FloatArray, second: FloatArray) -> IntArray | None:
+    """Match two rows of vertices by their shares of the length (#P each).
+
+    Returns:
+        #J by 2, positions in both rows that are sewn to each other; None if all are, one to one.
+    """
+    if len(first) == len(second) and np.abs(first - second).max() <= _SAME_SHARE * np.diff(first).min():
+        return None
+    swapped = len(first) > len(second)
+    coarse, fine = (second, first) if swapped else (first, second)
+    place = np.abs(fine[None, :] - coarse[:, None]).argmin(axis=1)
+    place[0], place[-1] = 0, len(fine) - 1
+    keep = np.append(np.diff(place) > 0, True)
+    keep[0] = True
+    pairs = np.column_stack([np.flatnonzero(keep), place[keep]])
+    # The first joint is kept for good: one that falls onto it again goes.
+    pairs = pairs[np.append(True, np.diff(pairs[:, 1]) > 0)]
+    return np.asarray(pairs[:, ::-1] if swapped else pairs, dtype=np.int32)
+
+
+def _largest_distance(points: FloatArray, line: FloatArray) -> float:
+    """Return the largest distance [m] of some points from a polyline."""
+    return float(project_on_segments(points[:, None], line[:-1], line[1:])[1].min(axis=1).max())

@@ -1,0 +1,1 @@
+"""A form becomes pieces that sew up: sewing, ease, fullness, constraints, pattern."""

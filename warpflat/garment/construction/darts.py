@@ -1,0 +1,146 @@
+"""Darts of a form's pieces: their legs as seams, the widths of their mouths, and what they measure in the pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import arc_lengths, nearest_on_polyline, polyline_length
+from warpflat.flat.surface.cut.dart_legs import open_length
+from warpflat.flat.surface.overlap import OVERLAP
+from warpflat.garment.construction.closed_cuts import CLOSED
+from warpflat.garment.construction.constraints import DartMouth
+from warpflat.garment.construction.sewn import Stitching
+
+if TYPE_CHECKING:
+    from warpflat.garment.mannequin.darts import FormDart
+    from warpflat.garment.mannequin.forms import FormResult
+
+__all__ = [
+    "NEAR_ARMHOLE",
+    "closed_darts",
+    "crowded_darts",
+    "dart_constraints",
+    "dart_pairs",
+    "measure_darts",
+    "pleat_depths",
+]
+
+
+# A mouth narrower than this [m] is no dart that anybody would sew.
+_NARROW = 3e-3
+#: A dart that comes nearer to the armhole [m] is no dart that anybody would sew: the strip between them curls.
+NEAR_ARMHOLE = 0.03
+
+
+def dart_pairs(form: FormResult) -> list[Stitching]:
+    """Return the legs of every dart, to be sewn to each other; those of a pleat as far as it is sewn."""
+    pleats = pleat_depths(form)
+    found = []
+    for name, piece in form.pieces.items():
+        for dart, legs in piece.legs().items():
+            along = arc_lengths(piece.surface.vertices[legs[0]])
+            # One edge of the mesh at least.
+            count = max(2, int(np.searchsorted(along, pleats.get((name, dart), along[-1]) + 1e-9, "right")))
+            found.append(
+                Stitching(name=f"{name}.{dart}", pieces=(name, name), vertices=(legs[0][:count], legs[1][:count]))
+            )
+    return found
+
+
+def pleat_depths(form: FormResult) -> dict[tuple[str, str], float]:
+    """Return how far from its mouth every pleat is sewn [m], by piece and dart."""
+    return {
+        (dart.piece, dart.name): 1e-3 * dart.asked.pleat_mm for dart in form.darts if dart.asked.pleat_mm is not None
+    }
+
+
+def dart_constraints(form: FormResult) -> list[DartMouth]:
+    """Return the widths of mouths that the form asks for."""
+    found = []
+    legs = form.legs()
+    for dart in form.darts:
+        if (dart.piece, dart.name) not in legs:
+            continue
+        if dart.asked.mouth_mm is not None:
+            found.append(DartMouth(piece=dart.piece, dart=dart.name, width=1e-3 * dart.asked.mouth_mm))
+        elif dart.asked.like is not None:
+            side = dart.name.removeprefix(dart.asked.name)
+            found.append(DartMouth(piece=dart.piece, dart=dart.name, like=f"{dart.asked.like}{side}"))
+    return found
+
+
+def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[FormDart]:
+    """Return the darts that do not open on one side of the body at least: their mouth is narrower than 3 mm, or their legs overlap.
+
+    Args:
+        form: whose darts they are.
+        positions: by piece, #V by 2, its pattern [m].
+    """
+    found = []
+    legs = form.legs()
+    for dart in form.darts:
+        if (dart.piece, dart.name) not in legs or dart.asked in found:
+            continue
+        left, right = (positions[dart.piece][leg] for leg in legs[dart.piece, dart.name])
+        # The tips of a fish-eye dart may close a little.
+        overlap = open_length(left, right)[1]
+        most = OVERLAP if dart.name in form.pieces[dart.piece].fisheyes else CLOSED
+        if overlap > most or np.linalg.norm(left - right, axis=1).max() < _NARROW:
+            found.append(dart.asked)
+    return found
+
+
+def crowded_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[FormDart]:
+    """Return the darts from the border that come within 30 mm of their piece's armhole on one side of the body at least.
+
+    Args and darts as of :func:`closed_darts`; one whose mouth lies on the armhole itself is none of them.
+    """
+    found = []
+    legs = form.legs()
+    for dart in form.darts:
+        if (dart.piece, dart.name) not in legs or dart.asked in found:
+            continue
+        piece, flat = form.pieces[dart.piece], positions[dart.piece]
+        armholes = [ids for edge, ids in piece.edges.items() if piece.parts.get(edge, edge).startswith("armhole")]
+        if dart.name in piece.fisheyes or any(np.isin(legs[dart.piece, dart.name], ids).any() for ids in armholes):
+            continue
+        away = [
+            np.linalg.norm(nearest_on_polyline(point, flat[ids]) - point)
+            for ids in armholes for leg in legs[dart.piece, dart.name] for point in flat[leg]
+        ]  # fmt: skip
+        if min(away, default=np.inf) < NEAR_ARMHOLE:
+            found.append(dart.asked)
+    return found
+
+
+def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[dict[str, Any]]:
+    """Return the entry `darts` of a piece in `metrics.json`.
+
+    Args:
+        form: whose piece it is.
+        name: of the piece.
+        positions: #V by 2, its pattern [m].
+    """
+    piece = form.pieces[name]
+    placed = {dart.name: dart for dart in form.darts if dart.piece == name}
+    pleats = pleat_depths(form)
+    found = []
+    for dart, ids in piece.legs().items():
+        legs = [positions[leg] for leg in ids]
+        # A fish-eye dart is widest inside.
+        width = np.linalg.norm(legs[0] - legs[1], axis=1)
+        found.append(
+            {
+                "name": dart,
+                "line": placed[dart].asked.line,
+                "intake_m": float(width.max() if dart in piece.fisheyes else width[0]),
+                "legs_m": [polyline_length(leg) for leg in legs],
+                "tip_to_point_m": placed[dart].to_point,
+                **({"pleat_m": pleats[name, dart]} if (name, dart) in pleats else {}),
+            }
+        )
+    return found

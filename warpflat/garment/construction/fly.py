@@ -1,0 +1,108 @@
+"""Flies: the facing and the shield of a lapped zip that opens trousers in front, below a waistband."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import part_between
+from warpflat.core.text import find_unused_name
+from warpflat.garment.construction.strips import Strip, strip_edges, swept
+from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+
+__all__ = ["with_flies"]
+
+# Width of the facing and, where the waistband has no underlap, of the finished shield; how far both reach below the zip [m].
+_WIDE, _BELOW = 0.040, 0.020
+# What lies this near to a line lies on it [m].
+_ON = 1e-6
+
+
+def with_flies(pattern: Pattern) -> Pattern:
+    """Return a pattern with the facing and the shield of each lapped zip that begins at a waistband in front.
+
+    The facing repeats the upper part of the front beside the zip and ends in a curve; the shield is a folded strip, as wide as the
+    underlap of the waistband. Both are cut once: the facing for the half that lies above.
+    """
+    for seam in pattern.seams:
+        zips = [each for each in seam.openings if each.kind == "zip" and each.style == "lapped" and not each.begin]
+        sides = [side for row in seam.sides for side in row]
+        in_front = all("front" in re.split("[ _]", side.piece) for side in sides)
+        bands = _bands_above(pattern, sides[0])
+        if zips and len(sides) == 2 and in_front and bands:
+            pattern = _with_fly(pattern, seam, zips[0].length + _BELOW, bands[0])
+    return pattern
+
+
+def _upper(piece: Piece, side: SeamSide) -> tuple[FloatArray, str]:
+    """Return the points of an edge from its upper end, and the name of the edge above it."""
+    edge, order = piece.edge(side.edge), [each.name for each in piece.edges]
+    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
+    down = bool((edge.points[-1] - edge.points[0]) @ grain < 0.0)
+    at = order.index(side.edge)
+    return (edge.points, order[at - 1]) if down else (edge.points[::-1], order[(at + 1) % len(order)])
+
+
+def _bands_above(pattern: Pattern, side: SeamSide) -> list[str]:
+    """Return the waistbands that are sewn to the edge above another one."""
+    above = _upper(pattern.piece(side.piece, pattern.sample), side)[1]
+    return [
+        other.piece
+        for seam in pattern.seams
+        for own, others in (seam.sides, seam.sides[::-1])
+        if any((each.piece, each.edge) == (side.piece, above) for each in own)
+        for other in others
+        if pattern.piece(other.piece, pattern.sample).role == "waistband"
+    ]
+
+
+def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern:
+    import shapely
+
+    side, pieces = seam.sides[1][0], {}
+    taken = {piece.name for piece in pattern.pieces[pattern.sample]}
+    names = [find_unused_name(name, taken) for name in ("fly_facing", "fly_shield")]
+    for size, row in pattern.pieces.items():
+        piece = pattern.piece(side.piece, size)
+        points, above = _upper(piece, side)
+        centre, waist = shapely.LineString(points), shapely.LineString(piece.edge(above).points)
+        # As far as the facing's lower end turns to the edge in a quarter of a circle.
+        along = shapely.LineString(part_between(points, 0.0, length - _WIDE))
+        region = shapely.Polygon(piece.outline).intersection(along.buffer(_WIDE))
+        if region.geom_type != "Polygon" or length > centre.length:
+            raise InputError(f"a fly of {1e3 * length:.0f} mm finds no room along {side.piece}.{side.edge}")
+        ring = np.asarray(shapely.orient_polygons(region).exterior.coords)[:-1]
+        on = [shapely.distance(line, shapely.points(ring)) < _ON for line in (waist, centre)]
+        kinds = np.where(on[0] & np.roll(on[0], -1), 0, np.where(on[1] & np.roll(on[1], -1), 1, 2))
+        first = next(k for k in range(len(ring)) if kinds[k] != kinds[k - 1])
+        kinds, ring = np.roll(kinds, -first), np.roll(ring, -first, axis=0)
+        ends = [k for k in range(len(ring)) if kinds[k] != kinds[k - 1]] + [len(ring)]
+        closed = np.vstack([ring, ring[:1]])
+        called = ("waist", "centre", "inner edge")
+        edges = [
+            Edge(name=called[kinds[a]], points=closed[a : b + 1], kind="cut", allowance=piece.edge(side.edge).width)
+            for a, b in pairwise(ends)
+        ]
+        wide = next((edge.length for edge in pattern.piece(band, size).edges if edge.name == "overlap"), _WIDE)
+        outline = strip_edges(
+            *swept(Strip(length=length, height=2.0 * wide)),
+            kinds=dict.fromkeys(("lower", "right end", "upper", "left end"), "cut"),
+            allowance=dict.fromkeys(("lower", "right end", "upper", "left end"), 0.010),
+        )
+        grain = np.array([[0.2 * length, 0.5 * wide], [0.8 * length, 0.5 * wide]])
+        fold = np.array([[0.0, wide], [length, wide]])
+        made = [
+            Piece(name=names[0], size=size, fabric=piece.fabric, edges=edges, role="fly", paired=False, grain=piece.grain),
+            Piece(
+                name=names[1], size=size, fabric=piece.fabric, edges=outline, role="fly", paired=False, grain=grain,
+                internal_lines={"fold line": fold},
+            ),
+        ]  # fmt: skip
+        pieces[size] = (*row, *made)
+    return replace(pattern, pieces=pieces)

@@ -1,0 +1,303 @@
+"""Free edges of a pattern, and the chains that they form once its seams are sewn."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
+from warpflat.core.text import find_unused_name, other_side, without_side
+from warpflat.pattern.drafting.fitting import drawn_length
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+
+__all__ = [
+    "OFF_END",
+    "Break",
+    "FreeChain",
+    "chain_length",
+    "free_chain",
+    "free_chains",
+    "free_edges",
+    "joined_line",
+    "marks_of",
+    "neighbour",
+    "split_edge",
+]
+
+#: A corner: piece, edge, whether it is of the copy that is turned over, and the end of the edge (0 or 1).
+_Corner = tuple[str, str, bool, int]
+#: Where chains end though the cloth goes on, as at a slit: piece, edge, and the end of the edge (0 or 1).
+Break = tuple[str, str, int]
+
+# Chains of both sides of the body whose lengths differ by no more [m] get one piece, cut twice.
+_ALIKE = 5e-4
+# A line ends on an edge within this distance [m].
+_ON_EDGE = 1e-3
+#: A line meets an edge inside it, not at its ends, beyond this distance [m].
+OFF_END = 2e-3
+# Directions at the ends of edges are those of their first or last so much [m].
+_NEAR_END = 0.004
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeChain:
+    """Free edges that follow each other across seams, folds and darts.
+
+    Attributes:
+        sides: the edges in order, as a seam's side.
+        closed: whether the last one ends where the first one begins.
+    """
+
+    sides: tuple[SeamSide, ...]
+    closed: bool
+
+
+def free_edges(pattern: Pattern) -> list[tuple[str, str]]:
+    """Return piece and edge of every edge with a seam's allowance that is in no seam."""
+    sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
+    pieces = pattern.pieces[pattern.sample]
+    return [
+        (piece.name, edge.name)
+        for piece in pieces
+        for edge in piece.edges
+        if edge.kind == "seam" and (piece.name, edge.name) not in sewn
+    ]
+
+
+def free_chain(
+    pattern: Pattern,
+    places: Sequence[tuple[str, str]],
+    gaps: Collection[str] = (),
+    breaks: Collection[Break] = (),
+) -> FreeChain:
+    """Return the chain of free edges that the first of some places is part of.
+
+    Args:
+        pattern: its sample size tells which edges meet.
+        places: pieces and edges that the chain may have.
+        gaps: names of seams at which it ends.
+        breaks: ends of edges at which it ends.
+    """
+    start = (*places[0], False, 0)
+    here, seen = start, set[tuple[str, str, bool]]()
+    # First back to where the chain begins, then along it.
+    while here[:3] not in seen:
+        seen.add(here[:3])
+        before = _next(pattern, here, places, gaps, breaks)
+        if before is None:
+            break
+        here = _other_end(before)
+    sides, seen = [], set()
+    corner: _Corner | None = here
+    while corner is not None and corner[:3] not in seen:
+        seen.add(corner[:3])
+        piece, edge, mirrored, end = corner
+        sides.append(SeamSide(piece=piece, edge=edge, mirrored=mirrored, reversed=end == 1))
+        corner = _next(pattern, _other_end(corner), places, gaps, breaks)
+    return FreeChain(sides=tuple(sides), closed=corner is not None)
+
+
+def free_chains(
+    pattern: Pattern,
+    places: Sequence[tuple[str, str]],
+    gaps: Collection[str] = (),
+    breaks: Collection[Break] = (),
+) -> list[tuple[FreeChain, int]]:
+    """Return the chains of free edges, each with how often the garment has it; see :func:`free_chain`.
+
+    A chain of one side of the body, as an armhole, stands for that of the other side too, where both are equally long.
+    """
+    left, chains = list(places), list[FreeChain]()
+    while left:
+        chain = free_chain(pattern, [left[0], *places], gaps, breaks)
+        chains.append(chain)
+        left = [place for place in left if place not in {(side.piece, side.edge) for side in chain.sides}]
+    found, drawn_for_both = list[tuple[FreeChain, int]](), list[FreeChain]()
+    for chain in chains:
+        own = {(side.piece, side.edge) for side in chain.sides}
+        mirrored = {(other_side(piece), other_side(edge)) for piece, edge in own}
+        sided = any(without_side(edge) != edge for _, edge in own)
+        twin = next(
+            (each for each in chains if each is not chain and mirrored & {(s.piece, s.edge) for s in each.sides}), None
+        )
+        if not sided or (twin is not None and abs(chain_length(pattern, chain) - chain_length(pattern, twin)) > _ALIKE):
+            found.append((chain, 1))
+        elif twin not in drawn_for_both:
+            found.append((chain, 2))
+            drawn_for_both.append(chain)
+    return found
+
+
+def chain_length(pattern: Pattern, chain: FreeChain, size: str | None = None) -> float:
+    """Return the length of a chain in a size, or in the sample size, along the curves as which its edges are drawn [m]."""
+    size = pattern.sample if size is None else size
+    return sum(drawn_length(pattern.piece(side.piece, size).edge(side.edge).points) for side in chain.sides)
+
+
+def _other_end(corner: _Corner) -> _Corner:
+    return (*corner[:3], 1 - corner[3])
+
+
+def _next(
+    pattern: Pattern,
+    corner: _Corner,
+    places: Sequence[tuple[str, str]],
+    gaps: Collection[str],
+    breaks: Collection[Break],
+) -> _Corner | None:
+    """Return the corner of the free edge that goes on where another one ends; None where the chain ends."""
+    piece, edge, mirrored, end = corner
+    if (piece, edge, end) in breaks:
+        return None
+    name, at = neighbour(pattern.piece(piece, pattern.sample), edge, end)
+    beside = pattern.piece(piece, pattern.sample).edge(name)
+    if beside.kind == "fold":
+        return piece, edge, not mirrored, end
+    if (piece, name) in places:
+        return None if (piece, name, at) in breaks else (piece, name, mirrored, at)
+    if beside.kind == "dart":
+        # The other leg follows, and beyond it the other part of the edge.
+        leg, _ = neighbour(pattern.piece(piece, pattern.sample), name, end)
+        other, at = neighbour(pattern.piece(piece, pattern.sample), leg, end)
+        return (piece, other, mirrored, at) if (piece, other) in places else None
+    across = _across(pattern, (piece, name, mirrored, at), gaps)
+    if across is None:
+        return None
+    piece, edge, mirrored, end = across
+    name, at = neighbour(pattern.piece(piece, pattern.sample), edge, end)
+    return (piece, name, mirrored, at) if (piece, name) in places else None
+
+
+def neighbour(piece: Piece, edge: str, end: int) -> tuple[str, int]:
+    """Return the edge that meets another one at its end, and which end of that it is."""
+    names = [each.name for each in piece.edges]
+    at = names.index(edge)
+    return (names[(at + 1) % len(names)], 0) if end == 1 else (names[at - 1], 1)
+
+
+def _across(pattern: Pattern, corner: _Corner, gaps: Collection[str]) -> _Corner | None:
+    """Return the corner that a seam sews to another one; None in a gap, or where no seam begins or ends."""
+    piece, edge, mirrored, end = corner
+    for turned in (False, True):
+        for seam in pattern.seams:
+            for number, row in enumerate(seam.sides):
+                for at_start in (True, False):
+                    side, other = row[0 if at_start else -1], seam.sides[1 - number][0 if at_start else -1]
+                    reached = (side.piece, side.edge, side.mirrored != turned)
+                    if reached != (piece, edge, mirrored) or (end == 0) == (at_start == side.reversed):
+                        continue
+                    # Halves that meet in the centre are one edge twice. Of a half's other seams the list has the left one.
+                    centre = (side.piece, side.edge) == (other.piece, other.edge)
+                    if seam.name in gaps and (centre or not turned) and _is_open_at(pattern, seam, side, at_start):
+                        return None
+                    turned_over = not mirrored if centre else other.mirrored != turned
+                    return other.piece, other.edge, turned_over, int(at_start == other.reversed)
+    return None
+
+
+def _is_open_at(pattern: Pattern, seam: Seam, side: SeamSide, at_start: bool) -> bool:
+    """Return whether a seam whose upper end is open is so at an end of one of its sides: at the lower one if all of it opens."""
+    piece = pattern.piece(side.piece, pattern.sample)
+    points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
+    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
+    upwards = bool((points[-1] - points[0]) @ grain > 0.0)
+    return at_start != upwards or any(opening.whole for opening in seam.openings)
+
+
+def split_edge(pattern: Pattern, place: tuple[str, str], at: Mapping[str, float]) -> tuple[Pattern, Break]:
+    """Return a pattern with an edge in two, and the end of the first part at which a chain is to be broken.
+
+    Args:
+        pattern: whose seams do not have the edge.
+        place: piece and edge. The longer part keeps its name.
+        at: by size, where along the edge it is parted [m].
+    """
+    name, edge = place
+    sample = pattern.piece(name, pattern.sample)
+    new = find_unused_name(edge, {each.name for each in sample.edges})
+    names = (edge, new) if at[pattern.sample] > 0.5 * sample.edge(edge).length else (new, edge)
+    pieces = {}
+    for size, row in pattern.pieces.items():
+        made = []
+        for piece in row:
+            if piece.name == name:
+                whole = piece.edge(edge)
+                lengths, corner = arc_lengths(whole.points), points_at_lengths(whole.points, [at[size]])
+                parts = (
+                    np.vstack([whole.points[lengths < at[size] - 1e-7], corner]),
+                    np.vstack([corner, whole.points[lengths > at[size] + 1e-7]]),
+                )
+                halves = [replace(whole, name=n, points=p, vertices=None) for n, p in zip(names, parts, strict=True)]
+                edges = [half for each in piece.edges for half in (halves if each.name == edge else [each])]
+                piece = replace(piece, edges=edges)
+            made.append(piece)
+        pieces[size] = made
+    return replace(pattern, pieces=pieces), (name, names[0], 1)
+
+
+def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[float]:
+    """Return where along a chain a line of its pieces, inside or on their border, meets it [m]."""
+    import shapely
+
+    found, before = list[float](), 0.0
+    for side in chain.sides:
+        piece = pattern.piece(side.piece, size)
+        points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
+        drawn = shapely.LineString(points)
+        known = {**piece.internal_lines, **{each.name: each.points for each in piece.edges if each.name != side.edge}}
+        lines = [each for name, each in known.items() if name.rstrip(" 0123456789") == line]
+        for end in (shapely.Point(each[k]) for each in lines for k in (0, -1)):
+            at = before + float(drawn.project(end))
+            if drawn.distance(end) < _ON_EDGE and all(abs(at - other) > OFF_END for other in found):
+                found.append(at)
+        before += polyline_length(points)
+    return sorted(found)
+
+
+def joined_line(pattern: Pattern, chain: FreeChain, size: str, *, lapped: float = 0.0) -> FloatArray:
+    """Return a chain as one line in the plane, its pieces laid against each other along their seams (#P by 2 [m]).
+
+    The cloth lies to the left of the line.
+
+    Args:
+        pattern: with the chain.
+        chain: free edges that follow each other.
+        size: of the pieces.
+        lapped: by how much pieces are turned over each other at the seams [rad], as for a collar that is to roll.
+    """
+    lines, corners = list[FloatArray](), list[tuple[str, float, float]]()
+    for side in chain.sides:
+        piece = pattern.piece(side.piece, size)
+        points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
+        # The corners of the edge: its neighbours there, and the angles of the cloth.
+        angles = []
+        for end in (0, 1):
+            name, at = neighbour(piece, side.edge, end)
+            beside = piece.edge(name).points[:: -1 if at else 1]
+            own = piece.edge(side.edge).points[:: -1 if end else 1]
+            (x, y), (u, v) = _direction(own), _direction(beside)
+            angles.append((name, abs(float(np.arctan2(x * v - y * u, x * u + y * v)))))
+        angles = angles[::-1] if side.reversed else angles
+        corners.append((angles[1][0], angles[0][1], angles[1][1]))
+        # Walked against its own direction, an edge has the cloth to its right; so has a copy that is turned over, walked along it.
+        lines.append(points * [1.0, -1.0] if side.reversed else points)
+    line = lines[0]
+    for number, points in enumerate(lines[1:], start=1):
+        ahead, first = -_direction(line[::-1]), _direction(points)
+        name, _, leaving = corners[number - 1]
+        before, side = chain.sides[number - 1], chain.sides[number]
+        on_one_piece = (before.piece, before.mirrored, name) == (side.piece, side.mirrored, side.edge)
+        turn = np.pi - leaving - (0.0 if on_one_piece else corners[number][1] - lapped)
+        by = turn + float(np.arctan2(ahead[1], ahead[0]) - np.arctan2(first[1], first[0]))
+        rotation = np.array([[np.cos(by), np.sin(by)], [-np.sin(by), np.cos(by)]])
+        line = np.vstack([line, line[-1] + (points[1:] - points[0]) @ rotation])
+    return line
+
+
+def _direction(points: FloatArray) -> FloatArray:
+    """Return the direction in which a line begins."""
+    ahead = points_at_lengths(points, [_NEAR_END])[0] - points[0]
+    return np.asarray(ahead / np.linalg.norm(ahead))

@@ -1,0 +1,108 @@
+"""Girths: what a tape reads around the body, around the form, and along the pattern with its darts and seams closed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.text import without_side
+from warpflat.garment.construction.constraints import KeptGirth
+from warpflat.garment.construction.tapes import PieceEdges, stretch_tape
+from warpflat.garment.construction.wearer import body_rows
+from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
+from warpflat.garment.mannequin.profiles import convex_girth
+
+if TYPE_CHECKING:
+    from warpflat.garment.mannequin.forms import FormResult
+    from warpflat.garment.mannequin.layout import Layout
+    from warpflat.garment.mannequin.mannequin import Mannequin
+
+__all__ = ["girth_constraints", "pattern_girths"]
+
+
+def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
+    """Return constraints that give every level of the trunk the ease that a form asks for.
+
+    Cloth at rest loses some of it to strain, or has more elsewhere.
+
+    Args:
+        mannequin: the body.
+        form: on it.
+        positions: by piece, #V by 2, at rest without these constraints [m].
+    """
+    found, piece_edges = [], PieceEdges(mannequin.layout, form)
+    for level, girth in pattern_girths(mannequin, form, positions).items():
+        if "ease_wanted_m" not in girth or level not in RING_LEVELS:
+            continue
+        factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
+        edges = piece_edges.along(_row(mannequin.layout, level))
+        assert edges is not None
+        found.append(
+            KeptGirth(
+                level=level,
+                edges=edges.ends,
+                shares=edges.shares,
+                lengths={
+                    name: factor * np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
+                    for name, ends in edges.ends.items()
+                },
+            )
+        )
+    return found
+
+
+def pattern_girths(
+    mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
+) -> dict[str, dict[str, float]]:
+    """Return the entry `girths` of `metrics.json` for every closed level of trunk, arms and legs that the pieces go around.
+
+    The pattern's girth is the length of the level's line in the pieces: a dart on the way adds nothing, nor does a seam. Where
+    two pieces meet along the level it is the mean of both. A half piece counts twice. Where the line slopes on the form, as at
+    the bust under a lowered armhole, each of its edges counts by its level share, as the tapes around body and form are level.
+
+    Args:
+        mannequin: the body.
+        form: on it.
+        positions: by piece, #V by 2 [m].
+    """
+    layout = mannequin.layout
+    piece_edges = PieceEdges(layout, form)
+    found: dict[str, dict[str, float]] = {}
+    for level in reversed(RING_LEVELS):
+        row = _row(layout, level)
+        edges = piece_edges.along(row)
+        if edges is None:
+            continue
+        pattern = float(edges.lengths(positions, len(row)).sum())
+        body = convex_girth(mannequin.vertices[row])
+        found[level] = {
+            "body_m": body,
+            "form_m": convex_girth(form.vertices[row]),
+            "pattern_m": pattern,
+            "ease_m": pattern - body,
+        }
+        if level in form.ease:
+            found[level]["ease_wanted_m"] = 0.01 * form.ease[level]
+    # Of limbs what the recipe asks for, but between ruled levels, where cloth hangs.
+    limbs, asked = [*ARM_LEVELS, *LEG_LEVELS], form.recipe.ease
+    spans = [sorted(map(limbs.index, pair)) for pair in form.recipe.ruled if set(pair) <= set(limbs)]
+    for (name, _), row, _, axis in body_rows(mannequin):
+        limb = without_side(name)
+        edges = piece_edges.along(row, axis) if limb != name else None
+        if edges is None:
+            continue
+        pattern = float(edges.lengths(positions, len(row)).sum())
+        body, designed = (stretch_tape(points[row], axis).girth for points in (mannequin.vertices, form.vertices))
+        found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
+        level = limb if limb in ARM_LEVELS else f"leg_{limb}"
+        if level in asked and not any(low < limbs.index(level) < high for low, high in spans):
+            found[name]["ease_wanted_m"] = 0.01 * asked[level]
+    return found
+
+
+def _row(layout: Layout, level: str) -> IntArray:
+    """Return the grid's vertices around a level."""
+    return np.asarray(layout.rings[layout.level_row[level]])

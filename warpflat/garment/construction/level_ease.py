@@ -1,0 +1,89 @@
+"""The ease of a worn garment by level: its girth around the trunk over the body's; and a garment made wider or narrower there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.flat.surface.normals import vertex_normals
+from warpflat.garment.construction.carry import skin_under
+from warpflat.garment.mannequin.body_landmarks import model_places
+from warpflat.garment.mannequin.body_model import finer_body
+from warpflat.garment.mannequin.common_body import CommonBody, skin_triangles
+from warpflat.garment.mannequin.profiles import convex_girth
+from warpflat.garment.mannequin.slicer import Slicer
+
+__all__ = ["EASE_LEVELS", "level_ease", "widened"]
+
+#: Levels at which ease is measured, from the top down.
+EASE_LEVELS = ("bust", "underbust", "waist", "hip")
+# Above the bust what is asked there fades out, up to here.
+_TOP = "front_neck"
+_UP = np.array([0.0, 1.0, 0.0])
+
+
+def level_ease(
+    body: CommonBody, layers: Sequence[tuple[FloatArray, NDArray[np.int64]]]
+) -> dict[str, tuple[float, float]]:
+    """Return by level the girths of the garment and of the body [m]; without levels at which it is open, or that it does not cover.
+
+    Args:
+        body: on which it is worn.
+        layers: of the garment, vertices (#V by 3 [m]) and triangles (#T by 3).
+    """
+    skin = Slicer(body.vertices, finer_body()[1])
+    slicers = [Slicer(vertices, triangles) for vertices, triangles in layers]
+    found = {}
+    for name in EASE_LEVELS:
+        height = body.level(name)
+        parts = [part.points[:, [0, 2]] for part in skin.cut(_UP, height)]
+        trunk = max(parts, key=lambda points: float(np.ptp(points, axis=0).prod()))
+        middle = 0.5 * (trunk.min(axis=0) + trunk.max(axis=0))
+        rings = [
+            part.length
+            for slicer in slicers
+            for part in slicer.cut(_UP, height)
+            if part.closed
+            and (part.points[:, [0, 2]].min(axis=0) < middle).all()
+            and (part.points[:, [0, 2]].max(axis=0) > middle).all()
+        ]
+        if rings:
+            found[name] = max(rings), convex_girth(trunk)
+    return found
+
+
+def widened(
+    body: CommonBody, layers: Sequence[tuple[FloatArray, NDArray[np.int64]]], wished: Mapping[str, float]
+) -> list[FloatArray]:
+    """Return the vertices of a garment's layers [m], moved to or off the trunk until its ease is as wished.
+
+    A level that is not wished keeps its ease; between levels it changes evenly, below the last one as there.
+
+    Args:
+        body: on which it is worn.
+        layers: as :func:`level_ease` takes them.
+        wished: ease by level [m].
+    """
+    has = level_ease(body, layers)
+    more = {name: wished.get(name, girths[0] - girths[1]) - (girths[0] - girths[1]) for name, girths in has.items()}
+    if not more:
+        return [vertices for vertices, _ in layers]
+    order = sorted(more, key=body.level)
+    heights = [*(body.level(name) for name in order), max(body.level(_TOP), body.level(order[-1]) + 0.05)]
+    # A tape that lies so much farther off is longer by a whole turn's share.
+    off = [*(more[name] / (2.0 * np.pi) for name in order), 0.0]
+    skin = vertex_normals(body.vertices, finer_body()[1])
+    places = model_places()
+    arm = (places.strips["arm left"] | places.strips["arm right"]).astype(float)
+    out = []
+    for vertices, triangles in layers:
+        near, weight, _ = skin_under(vertices, vertex_normals(vertices, triangles), body.vertices, skin_triangles())
+        way = np.einsum("pk,pka->pa", weight, skin[near])
+        way[:, 1] = 0.0
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        here = np.interp(vertices[:, 1], heights, off) * (1.0 - np.einsum("pk,pk->p", weight, arm[near]))
+        out.append(vertices + here[:, None] * way)
+    return out

@@ -1,0 +1,228 @@
+"""Rings: closed ways around a garment, compared with what of the body must pass through them to put it on.
+
+A ring is an edge that is closed once the seams are sewn (neck, waist, hem, sleeve hem), or a level of the trunk within the
+pieces. A garment with a neck or armholes goes on over the head, so every ring of its trunk passes what the body has above
+it; any other one, and a suit that has legs, is stepped into, and its rings pass what the body has below them. A sleeve passes
+the hand and the arm below its hem, a leg the foot and the leg below its hem. The arms are raised on the way, so the bust stands
+for the shoulders.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.text import find_unused_name
+from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS
+
+if TYPE_CHECKING:
+    from warpflat.garment.mannequin.forms import FormResult
+    from warpflat.garment.mannequin.mannequin import Level, Mannequin
+
+__all__ = ["GarmentRing", "find_rings", "measure_rings", "ring_line", "rings_line"]
+
+# What is rounded up to this [mm] is easy to measure off, and needs no more precision.
+_ROUNDED_MM = 5.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class GarmentRing:
+    """A closed way around a garment.
+
+    Attributes:
+        name: of its line, as "neck" or "biceps left".
+        edge: whether it is an edge of the cloth; otherwise a level within it.
+        length: in the pattern, without what seams and darts take [m].
+        stretched: the same at the cloth's strain limit [m].
+        over: what must pass through it: a part of the body.
+        girth: of that [m]; None if it is not known.
+        source: of that girth.
+        opened: what openings add to the ring [m].
+    """
+
+    name: str
+    edge: bool
+    length: float
+    stretched: float
+    over: str
+    girth: float | None
+    source: str
+    opened: float = 0.0
+
+    @property
+    def passes(self) -> bool | None:
+        """Whether the ring passes at the cloth's limit, openings open; None if the girth is not known."""
+        return None if self.girth is None else bool(self.stretched + self.opened >= self.girth)
+
+    @property
+    def opening_needed_mm(self) -> float:
+        """Depth of the opening through this ring [mm], rounded up to 5 mm; 0 where none is needed.
+
+        The cloth counts as it lies: an edge that is faced or has a zip hardly stretches. A depth d adds 2 d.
+        """
+        if self.girth is None or self.stretched >= self.girth:
+            return 0.0
+        return _ROUNDED_MM * math.ceil(500.0 * (self.girth - self.length) / _ROUNDED_MM)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of `metrics.json`."""
+        return {
+            "name": self.name,
+            "edge": self.edge,
+            "length_mm": 1e3 * self.length,
+            "stretched_mm": 1e3 * self.stretched,
+            "over": self.over,
+            "girth_mm": None if self.girth is None else 1e3 * self.girth,
+            "source": self.source,
+            "opened_mm": 1e3 * self.opened,
+            "passes": self.passes,
+            "opening_needed_mm": self.opening_needed_mm,
+        }
+
+
+def measure_rings(
+    mannequin: Mannequin,
+    form: FormResult,
+    positions: Mapping[str, FloatArray],
+    *,
+    strain_limit: float,
+    girths: Mapping[str, Mapping[str, float]],
+    opened: Mapping[str, float] | None = None,
+) -> list[GarmentRing]:
+    """Compare every ring of a garment with what it passes over, from the neck down.
+
+    Args:
+        mannequin: the body.
+        form: on it.
+        positions: by piece, #V by 2 [m].
+        strain_limit: of the cloth.
+        girths: of the levels within the pieces (:func:`warpflat.garment.construction.girths.pattern_girths`).
+        opened: by ring, what openings add [m].
+    """
+    opened, levels = opened or {}, mannequin.levels()
+    edges: dict[str, float] = {}
+    for ring, length in find_rings(mannequin, form, positions):
+        name = ring_line(mannequin, ring)
+        # Two edges at one line are told apart: the first is the longer one.
+        edges[find_unused_name(name, edges)] = length
+    lengths = {name: girth["pattern_m"] for name, girth in girths.items()} | edges
+    limbs = {_line_of(name).partition(" ")[0] for name in edges if " " in _line_of(name)}
+    over_head = any(_line_of(name).startswith(("neck", "armhole")) for name in edges) and not limbs & set(
+        LEG_LINES.values()
+    )
+    found = []
+    for name, length in lengths.items():
+        over, girth, source = _passes_over(mannequin, levels, _line_of(name), over_head=over_head)
+        found.append(
+            GarmentRing(
+                name=name, edge=name in edges, length=length, stretched=length * (1.0 + strain_limit), over=over,
+                girth=girth, source=source, opened=opened.get(name, 0.0),
+            )
+        )  # fmt: skip
+    return sorted(found, key=lambda ring: -levels[_line_of(ring.name)].height)
+
+
+def find_rings(
+    mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
+) -> list[tuple[IntArray, float]]:
+    """Return the closed edges of the sewn garment, the longest first: vertices on the mannequin, and length [m].
+
+    An edge of the mannequin is free where just one piece has it on its border, and once: seams and legs of darts have
+    it twice. The mirror images of half pieces count, and the fold does not.
+    """
+    # The lengths [m] of the mannequin's edges on the borders of pieces, one per piece and side, folds left out.
+    image, used = mannequin.layout.mirror, np.concatenate([piece.grid_vertices for piece in form.pieces.values()])
+    # A half garment has the body's left alone; the middle is its own mirror image.
+    half = not np.isin(image[used], used).all()
+    border: dict[tuple[int, int], list[float]] = {}
+    for name, piece in form.pieces.items():
+        for edge, ids in piece.edges.items():
+            if edge == piece.fold:
+                continue
+            lengths = np.linalg.norm(np.diff(positions[name][ids], axis=0), axis=1).tolist()
+            grid = piece.grid_vertices[ids]
+            for row in (grid, image[grid]) if half else (grid,):
+                for (a, b), length in zip(itertools.pairwise(row.tolist()), lengths, strict=True):
+                    border.setdefault((min(a, b), max(a, b)), []).append(length)
+    free = {ends: lengths[0] for ends, lengths in border.items() if len(lengths) == 1}
+    neighbours: dict[int, list[int]] = {}
+    for a, b in free:
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    rings, seen = [], set[int]()
+    for start in sorted(neighbours):
+        walk, here = [start], start
+        while start not in seen and len(neighbours[here]) == 2:
+            onward = [vertex for vertex in neighbours[here] if vertex not in walk[-2:]]
+            if not onward or onward[0] == start:
+                break
+            here = onward[0]
+            walk.append(here)
+            if here in seen:
+                break
+        seen.update(walk)
+        ends = [tuple(sorted(pair)) for pair in itertools.pairwise([*walk, start])]
+        if len(walk) > 2 and all(pair in free for pair in ends):
+            rings.append((np.array(walk, dtype=np.int32), sum(free[a, b] for a, b in ends)))
+    return sorted(rings, key=lambda ring: -ring[1])
+
+
+def ring_line(mannequin: Mannequin, ring: IntArray) -> str:
+    """Return the closed line of the mannequin that a ring lies on, or the one whose middle is nearest to the ring's."""
+    limbs = (*ARM_LEVELS, *LEG_LINES.values())
+    names = ["neck", *RING_LEVELS, *(f"{level} {side}" for level in limbs for side in ("left", "right"))]
+    middle = mannequin.vertices[ring].mean(axis=0)
+    middles = {name: mannequin.line(name)[:-1].mean(axis=0) for name in names}
+    return min(names, key=lambda name: float(np.linalg.norm(middles[name] - middle)))
+
+
+def rings_line(rings: Sequence[Mapping[str, Any]]) -> str:
+    """Return the console's line about the entry `rings` of `metrics.json`."""
+    shut = [
+        f"{ring['name']} {ring['opening_needed_mm']:.0f} mm ({ring['length_mm']:.0f} < {ring['over']} {ring['girth_mm']:.0f})"
+        for ring in rings
+        if ring["passes"] is False
+    ]
+    unknown = [ring["name"] for ring in rings if ring["passes"] is None]
+    parts = [f"need an opening: {', '.join(shut)}"] if shut else []
+    parts += [f"not known: {', '.join(unknown)}"] if unknown else []
+    return f"rings: {'; '.join(parts) or f'all {len(rings)} pass'}"
+
+
+def _line_of(name: str) -> str:
+    """Return the line of a ring's name: a second ring at "hip" is "hip 2"."""
+    head, _, tail = name.rpartition(" ")
+    return head if tail.isdigit() else name
+
+
+def _passes_over(
+    mannequin: Mannequin, levels: Mapping[str, Level], name: str, *, over_head: bool
+) -> tuple[str, float | None, str]:
+    """Return the widest part of the body that must pass through a ring at a line, its girth [m] and the source."""
+    limb, _, side = name.partition(" ")
+    if name == "neck":
+        # A suit with legs is stepped into through its neck.
+        ends, between = ("head", []) if over_head else ("", list(RING_LEVELS[: RING_LEVELS.index("waist")]))
+    elif limb in ARM_LEVELS:
+        ends, between = f"hand {side}", [f"{level} {side}" for level in ARM_LEVELS[ARM_LEVELS.index(limb) + 1 :]]
+    elif side and limb in LEG_LINES.values():
+        lines = list(LEG_LINES.values())
+        ends, between = f"foot {side}", [f"{line} {side}" for line in lines[lines.index(limb) + 1 :]]
+    elif over_head:
+        ends, between = "head", list(RING_LEVELS[RING_LEVELS.index(name) + 1 :])
+    else:
+        ends, between = "", list(RING_LEVELS[: RING_LEVELS.index(name)])
+    girths = {level: levels[level].girth for level in between}
+    tape = mannequin.extremity(ends)
+    if tape is not None:
+        girths[ends] = tape
+    if not girths or (ends and tape is None and not between):
+        return ends or "nothing", None if ends else 0.0, "not measured" if ends else "nothing lies below it"
+    widest = max(girths, key=lambda part: girths[part])
+    return widest, girths[widest], mannequin.source

@@ -1,0 +1,823 @@
+"""From a flattened garment to its pattern: the edges of its pieces with their kinds, its darts and seams, its labels.
+
+Of a form the edges follow from the form alone (:func:`plan_form`), so that a wrong name in a scene is found before anything is
+relaxed; the flat layouts give the shapes. Of a mesh the border is split at its corners in the plane, and named by the lines along it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.output import optional_step
+from warpflat.core.polyline import polyline_length
+from warpflat.core.text import find_unused_name, quote_value
+from warpflat.flat.cutting.separate_pieces import separate
+from warpflat.flat.flattening.applied_cut import seam_kind
+from warpflat.flat.surface.border_seams import SAME_PLACE
+from warpflat.flat.surface.connectivity import border_loops, join_labels
+from warpflat.flat.surface.cut.dart import fish_eye_measure
+from warpflat.flat.surface.cut.dart_legs import are_curved, open_length, pull_back, pull_back_eye
+from warpflat.flat.surface.mirror import mirror_plane
+from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
+from warpflat.garment.construction.darts import pleat_depths
+from warpflat.garment.construction.ease import measure_ease
+from warpflat.garment.construction.edge_rules import EdgeRules
+from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
+from warpflat.garment.construction.facings import STAND, Stand
+from warpflat.garment.construction.finishing import finish_edges, hem_rises
+from warpflat.garment.construction.fly import with_flies
+from warpflat.garment.construction.form_garment import FormGarment
+from warpflat.garment.construction.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
+from warpflat.garment.construction.line_drawing import describe_worn
+from warpflat.garment.construction.mark_openings import mark_openings
+from warpflat.garment.construction.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.construction.openings import one_sided, place_opening
+from warpflat.garment.construction.pockets import add_pockets
+from warpflat.garment.construction.strips import CLOTH_WIDTH
+from warpflat.garment.mannequin.seam_names import name_seams
+from warpflat.pattern.drafting.curves import curve_through
+from warpflat.pattern.drafting.from_mesh import MeshFeatures, inner_stretches, line_labels, piece_from_mesh
+from warpflat.pattern.drafting.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart, Edge, Hole
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.placement import default_grain
+from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
+from warpflat.pattern.drafting.seam_words import joint_words
+
+if TYPE_CHECKING:
+    from warpflat.flat.flattening.result import Flattening
+    from warpflat.flat.surface.border_seams import BorderSeam
+    from warpflat.flat.surface.cut.cut_mesh import Crack
+    from warpflat.flat.surface.mesh import Surface
+    from warpflat.garment.construction.garment import Garment
+    from warpflat.garment.construction.sewn import Stitching
+    from warpflat.garment.mannequin.pieces import FormPiece
+
+__all__ = ["LACKING", "check_edge_names", "grain_of", "pattern_of_garment", "pattern_of_surface"]
+
+
+#: A datum that strays from the grain by no more than this [m] carries the grain line.
+ON_DATUM = 1e-3
+# Decimals [m] of the layouts to which curves are fitted: of two that differ by rounding errors the same pattern is drawn.
+_DECIMALS = 6
+#: Least distance [m] of the grain line from darts and holes, and the steps [m] in which it is moved aside.
+GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
+#: A side of a seam is a row of at most so many edges, parted by corners in the plane.
+_MOST_EDGES = 8
+#: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
+BESIDE, ALIGNED = 0.05, 1e-3
+#: How a note on a seam of a mesh begins that its pattern lacks; shorter stretches [m] are not told.
+LACKING, _LACKING = "not sewn in the pattern:", 1e-3
+# How a note on a pattern begins that does not show how it is worn.
+_NO_DRAWING = "the guide has no line drawing of the garment"
+# What lines along a border are called that nobody has named, with the numbers of their stretches.
+_UNNAMED = re.compile(r"(to .+|edge|seam)(_\d+)?( \d+)*")
+# A plane of symmetry whose normal has this cosine to x at least is that between left and right.
+_UPRIGHT = 0.8
+
+
+def pattern_of_garment(
+    garments: Mapping[str, Garment],
+    *,
+    name: str,
+    rules: EdgeRules | None = None,
+    sample_size: str | None = None,
+    twice: bool = True,
+    cloth_width: float = CLOTH_WIDTH,
+) -> tuple[Pattern, tuple[str, ...]]:
+    """Make the pattern of a garment; of one on a form in one or more sizes. For a mesh see :func:`pattern_of_surface`.
+
+    Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece
+    whose centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a seam in the
+    centre. Notes say so.
+
+    Args:
+        garments: flattened, by size; "" where there is none.
+        name: of the pattern.
+        rules: exceptions for edges.
+        sample_size: see :class:`Pattern`.
+        twice: whether of two mirror images of a mesh one is drawn, to be cut twice.
+        cloth_width: usable width of the cloth [m], to which strips and flounces are parted.
+
+    Returns:
+        The pattern, and what was chosen on the way, one sentence each.
+
+    Raises:
+        InputError: the rules name an edge that does not exist, the grain is oblique to a fold, a piece's outline
+            crosses itself, or the sizes differ in their edges.
+    """
+    rules, sample = rules or EdgeRules(), next(iter(garments.values()))
+    if not isinstance(sample, FormGarment):
+        pattern, notes = pattern_of_surface(
+            list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams
+        )
+        lacking = _lacking_seams(sample, pattern)
+        if lacking:
+            # A seam that ends within an edge of one side alone: that edge is parted there.
+            ends: dict[str, set[int]] = {}
+            for pair, run in lacking:
+                for each, along in zip(pair.pieces, pair.vertices, strict=True):
+                    ends.setdefault(each, set()).update(along[[run[0], run[-1] + 1]].tolist())
+            pattern, notes = pattern_of_surface(
+                list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, ends=ends
+            )
+            lacking = _lacking_seams(sample, pattern)
+        for pair, run in lacking:
+            chain, flat = pair.vertices[0][run[0] : run[-1] + 2], sample.pieces[pair.pieces[0]]
+            place = ", ".join(f"{100 * x:.0f}" for x in flat.network.surface.vertices[chain[len(chain) // 2]] + 0.0)
+            notes += (
+                f"{LACKING} {1e3 * polyline_length(flat.positions[chain]):.0f} mm of the seam of "
+                f"{' and '.join(dict.fromkeys(pair.pieces))} about ({place}) cm: no edges of them fit each other there",
+            )
+        # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
+        as_laid = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
+        stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
+        pattern = replace(
+            pattern,
+            seams=[
+                replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in as_laid) for seam in pattern.seams
+            ],
+        )
+        if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
+            pattern = _named_by_pieces(pattern)
+            return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
+        with optional_step(_NO_DRAWING, is_needed=False):
+            pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
+        pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
+        if pairs:
+            pattern = _hung_upright(pattern, sample, pairs)
+        drawn, more = _drawn_once(pattern.pieces, pairs)
+        pattern = replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs))
+        pattern, equal = draw_equal_pieces_once(pattern)
+        pattern = _named_by_pieces(pattern)
+        pattern = pattern if sample.as_cut is None else _through_vertices(pattern)
+        return pattern, (*notes, *more, *equal)
+    forms = {size: garment.form for size, garment in garments.items() if isinstance(garment, FormGarment)}
+    form = sample.form
+    if sample.wished is not None:
+        ease, eased = measure_ease(form, sample.wished, sample.positions)
+        rules = replace(rules, ease={**ease, **rules.ease, **{seam: ease[seam] for seam in eased}}, eased=eased)
+    plans = {size: plan_form(each, rules) for size, each in forms.items()}
+    plan = next(iter(plans.values()))
+    # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
+    laid = {}
+    for size, garment in garments.items():
+        moved = {}
+        for piece, flat in garment.pieces.items():
+            there = sample.pieces[piece]
+            offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
+            moved[piece] = replace(flat, positions=np.round(flat.positions + offset, _DECIMALS))
+        laid[size] = replace(garment, pieces=moved)
+    garments, sample = laid, next(iter(laid.values()))
+    # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
+    bent: dict[str, float] = {}
+    for size, garment in garments.items():
+        for piece, flat in garment.pieces.items():
+            edge = forms[size].pieces[piece].fold
+            if edge is None:
+                continue
+            points = flat.positions[forms[size].pieces[piece].edges[edge]]
+            span, away = points[-1] - points[0], points - points[0]
+            length = max(float(np.linalg.norm(span)), 1e-12)
+            stray = float(np.abs(away[:, 0] * span[1] - away[:, 1] * span[0]).max()) / length
+            if stray > max(FOLD_STRAIGHT, bent.get(piece, 0.0)):
+                bent[piece] = stray
+    folds = {piece: edge for piece, edge in find_fold_lines(form, plan).items() if piece not in bent}
+    opened = {piece: each.fold for piece, each in form.pieces.items() if each.fold and piece not in folds}
+    for flat in (garment.pieces[piece] for garment in garments.values() for piece in folds):
+        check_fold_grain(folds, flat.grain_angle)
+    pieces: dict[str, tuple[Piece, ...]] = {}
+    for size, garment in garments.items():
+        pleats = pleat_depths(forms[size])
+        pieces[size] = tuple(
+            _form_piece(
+                flat,
+                forms[size].pieces[piece],
+                plans[size].edges[piece],
+                rules=rules,
+                size=size,
+                quantity=2 if piece in opened else plan.quantities[piece],
+                open_fold=piece in opened,
+                pleats={dart: depth for (own, dart), depth in pleats.items() if own == piece},
+            )
+            for piece, flat in garment.pieces.items()
+        )
+    # A piece that is cut twice instead of on the fold has a seam in its centre.
+    seams = plan.seams
+    for title, (piece, edge) in zip(
+        name_seams(list(opened.values()), [(piece, piece) for piece in opened]), opened.items(), strict=True
+    ):
+        side = (SeamSide(piece=piece, edge=edge),)
+        seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
+    # One pattern cannot serve for both sides where just one of them has an opening, or a hem slants to one side.
+    apart = one_sided(sample.openings) or any(wish.is_one_sided for wish in sample.finishing)
+    pairs = () if apart else find_mirror_pairs(garments, pieces, seams)
+    drawn, notes = _drawn_once(pieces, pairs)
+    notes += tuple(
+        f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
+        for piece, stray in bent.items()
+    )
+    pattern = Pattern(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
+    placed = {
+        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
+        for size, garment in garments.items()
+    }
+    pattern = mark_openings(pattern, sample.openings, placed)
+    zips = [
+        row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top
+    ]
+    stands = [
+        Stand(
+            piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
+            grown_on=opening.buttons.facing == "grown-on",
+        )
+        for opening in sample.openings
+        if opening.buttons is not None
+        for piece in pattern.pieces[pattern.sample]
+        for edge in piece.edges
+        if edge.name == f"{opening.line} {STAND}"
+    ]  # fmt: skip
+    girths = {}
+    if any(wish.elastic or wish.kind == "hood" for wish in sample.finishing):
+        for size, garment in garments.items():
+            assert isinstance(garment, FormGarment)
+            girths[size] = {level: each.girth for level, each in garment.mannequin.levels().items()}
+            head = garment.mannequin.extremity("head")
+            girths[size] |= {} if head is None else {"head": head}
+    rises = hem_rises(pattern, sample.finishing)
+    with optional_step("the pattern has no finishing"):
+        pattern = finish_edges(
+            pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width
+        )
+    with optional_step("the pattern has no pockets"):
+        pattern = with_flies(add_pockets(pattern, sample.pockets))
+    if not rises:
+        # Godets of one size are equal, unless a slanted hem cuts them.
+        pattern, equal = draw_equal_pieces_once(pattern, called="godet")
+        notes += equal
+    with optional_step(_NO_DRAWING, is_needed=False):
+        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises))
+    return pattern, notes
+
+
+def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair]) -> Pattern:
+    """Return the pattern with its pieces where they hang about x = 0, the plane at which those that are cut turned over are mirrored.
+
+    A mesh may stand beside that plane, and lean. One that faces sideways is left as it is.
+    """
+    from scipy.spatial.transform import Rotation
+
+    points, images = list[FloatArray](), list[FloatArray]()
+    for pair in pairs:
+        partners = garment.mirror_vertices(pair.of, pair.name)
+        assert partners is not None  # find_mirror_pairs has found them
+        points.append(garment.pieces[pair.of].network.surface.vertices)
+        images.append(garment.pieces[pair.name].network.surface.vertices[partners])
+    normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
+    if normal[0] < _UPRIGHT:
+        return pattern
+    turn = Rotation.align_vectors([1.0, 0.0, 0.0], normal)[0].as_matrix()
+
+    def hung(piece: Piece) -> Piece:
+        if piece.placement is None:
+            return piece
+        return replace(piece, placement=turn @ piece.placement - np.outer([off, 0.0, 0.0], [0.0, 0.0, 1.0]))
+
+    return replace(pattern, pieces={size: [hung(piece) for piece in row] for size, row in pattern.pieces.items()})
+
+
+def _named_by_pieces(pattern: Pattern) -> Pattern:
+    """Return a pattern of meshes whose seams along lines without a name of the user's are called by the pieces that they join."""
+    seams, taken = list[Seam](), {seam.name for seam in pattern.seams if not _UNNAMED.fullmatch(seam.name)}
+    for seam in pattern.seams:
+        if _UNNAMED.fullmatch(seam.name):
+            seam = replace(seam, name=find_unused_name(joint_words(seam), taken))
+            taken.add(seam.name)
+        seams.append(seam)
+    return replace(pattern, seams=seams)
+
+
+def _pieces_of(seam: Seam) -> frozenset[str]:
+    """Return the names of the pieces that a seam joins."""
+    return frozenset(side.piece for row in seam.sides for side in row)
+
+
+def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
+    """Return a seam of pieces that are stretched to each other with its longer side last, eased to the other."""
+    if _pieces_of(seam) not in stretched:
+        return seam
+    first, second = sorted(
+        seam.sides,
+        key=lambda row: sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row),
+    )
+    one, other = (
+        sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row) for row in (first, second)
+    )
+    return replace(seam, sides=(first, second), ease=other / one - 1.0) if other - one > SEAM_TOLERANCE else seam
+
+
+def _drawn_once(
+    pieces: Mapping[str, Sequence[Piece]], pairs: Sequence[MirrorPair]
+) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:
+    """Return the pieces that are drawn, in each size, of each pair one that is cut twice; and a note on each pair."""
+    twice, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
+    drawn = {
+        size: tuple(
+            replace(piece, quantity=2 * piece.quantity) if piece.name in twice else piece
+            for piece in row
+            if piece.name not in left_out
+        )
+        for size, row in pieces.items()
+    }
+    return drawn, tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
+
+
+def _form_piece(
+    flat: Flattening,
+    piece: FormPiece,
+    plan: Sequence[EdgePlan],
+    *,
+    rules: EdgeRules,
+    size: str,
+    quantity: int,
+    open_fold: bool,
+    pleats: Mapping[str, float],
+) -> Piece:
+    """Return one piece of a garment with its edges, internal lines and grain."""
+    name = piece.surface.name
+    edges = []
+    for part in plan:
+        vertices = np.asarray(piece.edges[part.source])[part.first : part.last + 1]
+        kind = "seam" if open_fold and part.kind == "fold" else part.kind
+        # A leg's allowance is for a dart that is cut away, not folded.
+        of_kind = "seam" if kind == "dart" else kind
+        allowance = rules.allowance(name, part.name, of_kind, whole=part.whole)
+        points = flat.positions[vertices]
+        edges.append(Edge(name=part.name, points=points, kind=kind, allowance=allowance, vertices=vertices))
+    edges = _clear_legs(edges, piece.darts, name)
+    legs = {edge.name: edge.points for edge in edges if edge.kind == "dart"}
+    darts = [
+        Dart(
+            name=dart,
+            left=left,
+            right=right,
+            cut=are_curved(legs[left], legs[right]),
+            pleat=pleats.get(dart),
+        )
+        for dart, (left, right) in piece.darts.items()
+    ]
+    holes = [
+        Hole(name=dart, points=np.vstack([flat.positions[left], flat.positions[right[-2:0:-1]]])[::-1], kind="dart")
+        for dart, (left, right) in piece.fisheyes.items()
+    ]
+    border = [*piece.edges.values(), *(leg for legs in piece.fisheyes.values() for leg in legs)]
+    along = _inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
+    drawn = Piece(
+        name=name,
+        size=size,
+        fabric=flat.fabric.name,
+        quantity=quantity,
+        edges=edges,
+        darts=darts,
+        holes=holes,
+        internal_lines=_inner_lines(piece.surface.lines, border, flat.positions),
+        grain=grain_of(
+            np.concatenate([edge.points[:-1] for edge in edges]),
+            flat,
+            max(along.values(), key=len, default=None),
+        ),
+    )
+    return replace(drawn, placement=_placement(drawn, flat))
+
+
+def _through_vertices(pattern: Pattern) -> Pattern:
+    """Return the pattern with edges that run through their vertices as curves: what was cut is as long as these, not as their chords."""
+
+    def drawn(edge: Edge) -> Edge:
+        points = edge.points if edge.kind == "fold" else curve_through(edge.points)
+        return edge if len(points) == len(edge.points) else replace(edge, points=points, vertices=None)
+
+    return replace(
+        pattern,
+        pieces={
+            size: [replace(piece, edges=[drawn(edge) for edge in piece.edges]) for piece in row]
+            for size, row in pattern.pieces.items()
+        },
+    )
+
+
+def _placement(piece: Piece, flat: Flattening) -> FloatArray | None:
+    """Return where a flat piece hangs: as its border lies in space, as rigidly as that goes (Kabsch 1976), and in front of its surface.
+
+    None without a border that is known in space, or one along which the piece lies every way as well.
+    """
+    edges = [edge for edge in piece.edges if edge.vertices is not None]
+    if not edges:
+        return None
+    plane = np.concatenate([edge.points for edge in edges])
+    space = flat.surface.vertices[flat.vertex_origin[np.concatenate([edge.vertices for edge in edges])]]
+    middle = space.mean(axis=0)
+    left, sizes, right = np.linalg.svd((space - middle).T @ (plane - plane.mean(axis=0)), full_matrices=False)
+    if sizes[1] < ALIGNED * sizes[0]:
+        return None
+    turn = left @ right
+    outward = np.cross(turn[:, 0], turn[:, 1])
+    away = float(((flat.surface.vertices - middle) @ outward).max()) + BESIDE
+    return np.column_stack([turn, middle + away * outward - turn @ plane.mean(axis=0)])
+
+
+def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], piece: str) -> list[Edge]:
+    """Move the tip of a dart whose legs overlap by less than `CLOSED` short of it back to where they meet.
+
+    Raises:
+        InputError: the legs of a dart overlap from the border on, or by more.
+    """
+    by_name = {edge.name: edge for edge in edges}
+    for dart, names in darts.items():
+        left, right = (by_name[name] for name in names)
+        count, overlap = open_length(left.points, right.points[::-1])
+        if count == 0:
+            raise InputError(
+                f"piece {piece!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
+                "it a width, mouth_mm = 10"
+            )
+        if overlap > CLOSED:
+            raise InputError(
+                f"piece {piece!r}: the legs of dart {dart!r} overlap by {1e3 * overlap:.2g} mm: let it open wider, mouth_mm = 15, "
+                "or make it shorter"
+            )
+        if count == len(left.points):
+            continue
+        kept = slice(0, count)
+        tip = 0.5 * (left.points[count] + right.points[::-1][count])
+        for leg, turn in ((left, 1), (right, -1)):
+            points = np.vstack([leg.points[::turn][kept], tip])[::turn]
+            ids = (
+                None
+                if leg.vertices is None
+                else np.append(leg.vertices[::turn][kept], leg.vertices[::turn][-1])[::turn]
+            )
+            by_name[leg.name] = replace(leg, points=points, vertices=ids)
+    return list(by_name.values())
+
+
+def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: FloatArray) -> dict[str, FloatArray]:
+    """Return the stretches of feature lines inside a piece, #P by 2 [m]; a second stretch of a line is "NAME 2".
+
+    Args:
+        lines: vertex indices by name.
+        border: vertex indices along every edge, both ends included.
+        flat: #V by 2 [m].
+    """
+    edges = {(min(a, b), max(a, b)) for ids in border for a, b in pairwise(np.asarray(ids).tolist())}
+    found: dict[str, FloatArray] = {}
+    for name, line in lines.items():
+        for stretch in inner_stretches(np.asarray(line), edges):
+            found[find_unused_name(name, found)] = flat[stretch]
+    return found
+
+
+def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = None) -> FloatArray:
+    """Return the grain line along the warp (2 by 2 [m]), on the datum where that is straight.
+
+    Elsewhere it runs through the widest place.
+
+    Args:
+        outline: #P by 2 [m].
+        flat: the piece.
+        datum: #P by 2 [m]; None if it does not lie inside the piece.
+    """
+    from warpflat.flat.fabric.fabric import grain_axes
+
+    x, y = grain_axes(flat.grain_angle)[0]
+    turn = np.array([[y, -x], [x, y]])
+    if datum is not None:
+        along = datum @ turn.T
+        if np.ptp(along[:, 0]) <= ON_DATUM:
+            low, high = float(along[:, 1].min()), float(along[:, 1].max())
+            ends = np.array([low + (high - low) / 6, high - (high - low) / 6])
+            return np.column_stack([np.full(2, along[:, 0].mean()), ends]) @ turn
+    return default_grain(outline @ turn.T) @ turn
+
+
+def pattern_of_surface(
+    results: Sequence[Flattening],
+    *,
+    name: str,
+    rules: EdgeRules | None = None,
+    size: str = "",
+    seams: Sequence[BorderSeam] = (),
+    ends: Mapping[str, Collection[int]] | None = None,
+) -> tuple[Pattern, tuple[str, ...]]:
+    """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
+
+    A cut with one tip inside becomes a dart of its name, one with two tips a fish-eye dart; their tips are moved back
+    as the cut asks for. A cut that parts the surface is a seam between the two pieces.
+
+    Args:
+        results: pieces of different names.
+        name: of the pattern.
+        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are
+            called "edge_1" and so on, counter-clockwise.
+        size: for the label.
+        seams: of the border, by the lines that are sewn to each other.
+        ends: by piece the vertices at which its border is parted into edges, beside its corners and the ends of lines.
+
+    Returns:
+        The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
+
+    Raises:
+        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip is moved back too
+            far, or a named seam's side is no edge.
+    """
+    rules = rules or EdgeRules()
+    ends = ends or {}
+    results = [replace(result, positions=np.round(result.positions, _DECIMALS)) for result in results]
+    drawn = dict[str, Piece]()
+    for result in results:
+        with optional_step(f"{result.surface.name} was left out of the pattern") if len(results) > 1 else nullcontext():
+            drawn[result.surface.name] = _mesh_piece(result, size, ends.get(result.surface.name, ()))
+    if not drawn:
+        raise InputError("none of the pieces can be drawn")
+    results, pieces = [result for result in results if result.surface.name in drawn], list(drawn.values())
+    named = []
+    for seam in seams:
+        with optional_step(f"seam {seam.name!r} was left out of the pattern"):
+            first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+            back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
+            named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
+    names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
+    rules, notes = rules.known(names)
+    notes += tuple(
+        f"cut {quote_value(title)} opens by less than {1e3 * CLOSED:g} mm: the pattern is whole there, with a line"
+        for result in results
+        for title in _closed_cuts(result)
+    )
+    rules.check(names)
+    ruled = []
+    for piece in pieces:
+        edges, holes = [], []
+        for edge in piece.edges:
+            # The allowance of a dart's leg is for one that is cut away, not folded.
+            kind = "seam" if edge.kind == "dart" else rules.kind(piece.name, edge.name, edge.kind)
+            width = rules.allowance(piece.name, edge.name, kind)
+            edges.append(replace(edge, kind="dart" if edge.kind == "dart" else kind, allowance=width))
+        for hole in piece.holes:
+            if hole.kind != "dart":
+                kind = rules.kind(piece.name, hole.name, "seam")
+                if kind not in ("seam", "hem", "cut"):
+                    raise InputError(
+                        f"kinds.{hole.name}: a hole cannot be of kind {kind!r}; give it 'seam', 'hem' or 'cut'"
+                    )
+                width = rules.allowance(piece.name, hole.name, kind)
+                hole = replace(hole, allowance=DEFAULT_ALLOWANCE[kind] if width is None else width)
+            holes.append(hole)
+        ruled.append(replace(piece, edges=edges, holes=holes))
+    return Pattern(name=name, pieces={size: ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
+
+
+def _mesh_piece(result: Flattening, size: str, ends: Collection[int] = ()) -> Piece:
+    """Return one piece with its cuts as darts, and its grain."""
+    darts: dict[str, tuple[int, int, int]] = {}
+    fisheyes: dict[str, Crack] = {}
+    tip_back = {title: cut.tip_back for title, cut, _ in seams_of_cuts(result)}
+    closed = _closed_cuts(result)
+    faces, lines = result.faces, dict(result.network.surface.lines)
+    if closed:
+        faces, lines = close_cuts(faces, lines, closed, count=len(result.positions))
+    loops = border_loops(faces)
+    for title, _, seam in seams_of_cuts(result):
+        kind = seam_kind(seam)
+        if title in closed:
+            continue
+        if kind == "fish-eye":
+            fisheyes[title] = seam
+        elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
+            darts[title] = places
+    piece = piece_from_mesh(
+        faces,
+        result.positions,
+        name=result.surface.name,
+        features=MeshFeatures(
+            lines=lines,
+            darts=darts,
+            fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in fisheyes.items()},
+            ends=ends,
+        ),
+        size=size,
+        fabric=result.fabric.name,
+    )
+    # The tip of a dart lies short of the end of its cut, both tips of a fish-eye dart short of both ends.
+    for title in [title for title in (*darts, *fisheyes) if tip_back[title] > 0]:
+        try:
+            if title in darts:
+                left, right = piece.edge(f"{title}.left"), piece.edge(f"{title}.right")
+                legs = pull_back(left.points, right.points[::-1], tip_back[title])
+                moved = {left.name: legs[0], right.name: legs[1][::-1]}
+                edges = [replace(edge, points=moved.get(edge.name, edge.points)) for edge in piece.edges]
+                piece = replace(piece, edges=edges)
+            else:
+                at, sides = result.positions, (fisheyes[title].left, fisheyes[title].right)
+                station = fish_eye_measure(at, *sides).station
+                one, other = pull_back_eye(at[sides[0]], at[sides[1]], station, tip_back[title])
+                ring = np.concatenate([other[:-1], one[:0:-1]])
+                holes = [replace(hole, points=ring) if hole.name == title else hole for hole in piece.holes]
+                piece = replace(piece, holes=holes)
+        except InputError as reason:
+            raise InputError(f"piece {piece.name!r}: dart {title!r}: {reason}") from None
+    drawn = [
+        replace(dart, cut=are_curved(piece.edge(dart.left).points, piece.edge(dart.right).points))
+        for dart in piece.darts
+    ]
+    on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
+    datum = None if on_border else result.positions[result.datum]
+    grain = _clear_of_holes(grain_of(piece.outline, result, datum), piece)
+    return replace(piece, darts=drawn, grain=grain, placement=_placement(piece, result))
+
+
+def _closed_cuts(result: Flattening) -> dict[str, Crack]:
+    return {title: seam for title, _, seam in seams_of_cuts(result) if are_closed(result.positions, seam)}
+
+
+def _dart_places(loops: Sequence[IntArray], cut: Crack) -> tuple[int, int, int] | None:
+    """Return left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
+    at_end = cut.left[-1] == cut.right[-1]
+    tip = int(cut.left[-1] if at_end else cut.left[0])
+    mouths = [int(side[0] if at_end else side[-1]) for side in (cut.left, cut.right)]
+    for loop in loops:
+        where = {vertex: place for place, vertex in enumerate(loop.tolist())}
+        if all(vertex in where for vertex in (tip, *mouths)):
+            first, second = sorted(mouths, key=lambda v: (where[tip] - where[v]) % len(loop))
+            return first, tip, second
+    return None
+
+
+def _clear_of_holes(grain: FloatArray, piece: Piece) -> FloatArray:
+    """Move the grain line aside as far as it takes to keep off holes and fish-eye darts."""
+    import shapely
+
+    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+    across = np.array([along[1], -along[0]])
+    free = shapely.Polygon(piece.outline, [hole.points for hole in piece.holes]).buffer(-GRAIN_CLEAR)
+    for step in range(31):
+        for side in (1, -1):
+            moved = grain + side * step * GRAIN_STEP * across
+            if free.contains(shapely.LineString(moved)):
+                return moved
+    return grain
+
+
+def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piece]) -> tuple[SeamSide, ...]:
+    """Return the edges along a line, in order, as the border runs."""
+    for result, piece in zip(results, pieces, strict=True):
+        ids = result.network.surface.lines.get(line)
+        if ids is None:
+            continue
+        along = [
+            e for e in piece.edges if e.vertices is not None and e.kind != "dart" and np.isin(e.vertices, ids).all()
+        ]
+        if sum(len(edge.points) - 1 for edge in along) != len(ids) - 1:
+            continue
+        ends = {int(edge.vertices[-1]) for edge in along if edge.vertices is not None}
+        start = next((k for k, e in enumerate(along) if e.vertices is not None and int(e.vertices[0]) not in ends), 0)
+        return tuple(SeamSide(piece=piece.name, edge=edge.name) for edge in along[start:] + along[:start])
+    raise InputError(f"line {line!r} is no whole stretch of a piece's border; a cut or another line parts it")
+
+
+def _mesh_seams(
+    results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
+) -> tuple[Seam, ...]:
+    """Return the seams: those that are named, and pairs of rows of edges that are one curve in space.
+
+    A corner in the plane parts the edge of one side alone: its other side is then sewn to a row of edges.
+    """
+    from scipy.spatial import cKDTree
+
+    seams: list[Seam] = [*named]
+    done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
+    rows: list[tuple[tuple[SeamSide, ...], FloatArray]] = []
+    for result, piece in zip(results, pieces, strict=True):
+        vertices, count = result.network.surface.vertices, len(piece.edges)
+        for start in range(count):
+            ids: list[int] = []
+            for length in range(1, min(count, _MOST_EDGES) + 1):
+                edge = piece.edges[(start + length - 1) % count]
+                if edge.kind not in ("seam", "cut") or edge.vertices is None or (piece.name, edge.name) in done:
+                    break
+                if ids and (ids[-1] != edge.vertices[0] or ids[0] == ids[-1]):
+                    break
+                ids = [*ids[:-1], *edge.vertices.tolist()]
+                sides = [piece.edges[(start + k) % count].name for k in range(length)]
+                rows.append((tuple(SeamSide(piece=piece.name, edge=name) for name in sides), vertices[ids]))
+    if not rows:
+        return tuple(seams)
+    # Only rows whose ends lie at the same two places can be one curve.
+    ends = np.array([curve[[0, -1]] for _, curve in rows]).reshape(-1, 3)
+    place = join_labels(len(ends), *cKDTree(ends).query_pairs(SAME_PLACE, output_type="ndarray").T)
+    groups: dict[tuple[int, ...], list[tuple[tuple[SeamSide, ...], FloatArray]]] = {}
+    for row, here in zip(rows, np.sort(place.reshape(-1, 2), axis=1).tolist(), strict=True):
+        groups.setdefault(tuple(here), []).append(row)
+
+    def are_one(curve: FloatArray, other: FloatArray) -> bool:
+        return len(curve) == len(other) and bool(np.linalg.norm(curve - other, axis=1).max() < SAME_PLACE)
+
+    # Those of fewest edges first, in the order of the pieces.
+    order = {row: number for number, (row, _) in enumerate(rows)}
+    pairs = [pair for group in groups.values() for pair in combinations(group, 2)]
+    for (first, curve), (second, other) in sorted(
+        pairs, key=lambda pair: (len(pair[0][0]) + len(pair[1][0]), order[pair[0][0]])
+    ):
+        taken = [(side.piece, side.edge) for side in (*first, *second)]
+        if len(set(taken)) < len(taken) or not done.isdisjoint(taken):
+            continue
+        against = not are_one(curve, other)
+        if not are_one(curve, other[::-1] if against else other):
+            continue
+        done.update(taken)
+        name = first[0].edge.removesuffix(".left").removesuffix(".right")
+        name = find_unused_name(name, {seam.name for seam in seams})
+        beside = tuple(replace(side, reversed=against) for side in (second[::-1] if against else second))
+        seams.append(Seam(name=name, sides=(first, beside), ease=rules.ease.get(name, 0.0)))
+    return tuple(seams)
+
+
+def _lacking_seams(garment: Garment, pattern: Pattern) -> list[tuple[Stitching, IntArray]]:
+    """Return each stretch of a seam of meshes, longer than 1 mm, that is in no seam of the pattern, with the places of its edges.
+
+    What the user has given another kind than that of a seam, and cuts that are darts or have closed, are none.
+    """
+    (pieces,) = pattern.pieces.values()
+    of_part = {
+        part.surface.name: name
+        for name, piece in garment.pieces.items()
+        for part in (separate(piece) if piece.cuts else (piece,))
+    }
+    seam_of = {
+        (side.piece, side.edge): number
+        for number, seam in enumerate(pattern.seams)
+        for row in seam.sides
+        for side in row
+    }
+    # Each mesh edge of an outline, by its piece and its ends in the layout: the number of its seam, -1 for none; None if it is meant to
+    # be in none.
+    sewn: dict[tuple[str, frozenset[bytes]], int | None] = {}
+    for drawn in pieces:
+        layout = garment.parts[drawn.name].positions
+        for edge in drawn.edges:
+            number = seam_of.get((drawn.name, edge.name), -1 if edge.kind in ("seam", "cut") else None)
+            for a, b in pairwise([] if edge.vertices is None else edge.vertices.tolist()):
+                sewn[of_part[drawn.name], frozenset((layout[a].tobytes(), layout[b].tobytes()))] = number
+    found = []
+    for pair in garment.stitching:
+        if pair.joints is not None:
+            # Named by lines that are whole edges.
+            continue
+        # A cut that has closed, or lies inside a piece, is no edge; nor is the border of a hole, to which nothing can be sewn.
+        first = garment.pieces[pair.pieces[0]]
+        missing = None if pair.name in [title for title, *_ in seams_of_cuts(first)] else -1
+        numbers, layouts = list[list[int | None]](), [garment.pieces[name].positions for name in pair.pieces]
+        for name, layout, row in zip(pair.pieces, layouts, pair.vertices, strict=True):
+            ends = [layout[vertex].tobytes() for vertex in row.tolist()]
+            numbers.append([sewn.get((name, frozenset(both)), missing) for both in pairwise(ends)])
+        lost = [None not in (one, other) and (one != other or one == -1) for one, other in zip(*numbers, strict=True)]
+        length = np.linalg.norm(np.diff(layouts[0][pair.vertices[0]], axis=0), axis=1)
+        for run in np.split(np.arange(len(lost)), np.flatnonzero(np.diff(lost)) + 1):
+            if lost[run[0]] and length[run].sum() > _LACKING:
+                found.append((pair, run.astype(np.int32)))
+    return found
+
+
+def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:
+    """Check that every name in the rules can be an edge's, before anything is flattened.
+
+    Lines along the border name the edges, holes are numbered. Where corners split them shows only in the plane.
+    Therefore "bottom_2" passes if there is a bottom, and "edge_7" if there is a stretch of border without a line.
+
+    Args:
+        surfaces: with their lines, cut as they are going to be.
+        rules: as of :func:`pattern_of_surface`.
+        cuts: names of the cuts, for the legs of their darts.
+
+    Raises:
+        InputError: a name that no piece can have (gives the nearest).
+    """
+    legs = "|".join(map(re.escape, ["dart", *cuts]))
+    edges: dict[str, list[str]] = {}
+    for surface in surfaces:
+        loops = border_loops(surface.faces)
+        lines = {label for loop in loops for label in line_labels(loop, surface.lines)}
+        names = {line or "edge" for line in lines}
+        later = re.compile(rf"({'|'.join(map(re.escape, sorted(names)))})_\d+|({legs})(_\d+)?\.(left|right)")
+        asked = {name.removeprefix(f"{surface.name}.") for name in (*rules.kinds, *rules.allowances)}
+        known = {line or "edge_1" for line in lines} | {name for name in asked if later.fullmatch(name)}
+        known |= {f"hole_{number}" for number in range(1, len(loops))}
+        edges.setdefault(surface.name, []).extend(sorted(known))
+    rules.check(edges)

@@ -1,0 +1,363 @@
+"""The pattern corrected: the flat pieces are changed until the worn cloth lies where it should.
+
+A round compares the metric of the worn cloth with that of the shape that is wanted. Where the worn cloth is longer along a thread, the
+pattern is too long there by as much. All cells together are flat, so the pattern moves by the displacement u that is nearest to what
+the cells ask for, in the cloth's own stiffness: the minimum over u of
+
+    sum of area * (K_warp (e_warp - t_warp)^2 + K_weft (e_weft - t_weft)^2 + G (gamma - t_gamma)^2),
+
+where e and gamma are the strains of u and t is half the difference of the squared lengths. Both sides of a seam change their lengths
+equally. Cloth is stiff: its worn lengths follow those of the pattern nearly one to one, so that a round leaves a small share of
+what the plane allows (the fixed point has t = 0, or a t that no flat piece can follow).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
+from warpflat.core.sparse import factor_symmetric
+from warpflat.core.sums import weighted_percentiles
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.surface.triangles import corner_triangles
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.drape_garment import held_vertices
+from warpflat.garment.draping.moved_pattern import (
+    edge_lengths,
+    largest_share,
+    pieces_of,
+    seam_edges,
+    seam_rows,
+    with_pattern,
+)
+from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.result import Drape
+from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.pattern.export.geometry import outline_edges
+
+__all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
+
+# Shear counts at least as this share of the threads' stiffness: a pattern that shears freely gets a ragged outline.
+_LEAST_SHEAR = 0.05
+# Weight of equal changes on both sides of a seam, over the threads' stiffness; and of what holds a piece as a whole.
+_SEAM, _HOLD = 1e3, 1e-8
+# A round that lowers the misfit by less than this share is the last; a step that does not lower it is halved so often.
+_LEAST_GAIN, _HALVINGS = 0.02, 2
+# Cloth that is stretched too far is let out to this share of its limit.
+_EASED = 0.7
+# So much more of the area may be strained beyond the cloth's limit.
+_MORE_STRAINED = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """Misfit after a round: mean and 95th percentile over the area [m], the share of the area that is strained beyond the limit, and
+    the share of the step that was taken."""
+
+    misfit: float
+    misfit_p95: float
+    strained: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Correction:
+    """A pattern before and after its correction.
+
+    Attributes:
+        before, after: the drapes of both patterns.
+        rounds: the misfit before the first round, and after each.
+        reason: why it ended.
+    """
+
+    __repr__ = short_repr
+
+    before: Drape
+    after: Drape
+    rounds: tuple[Round, ...]
+    reason: str
+
+    def moved(self) -> dict[str, FloatArray]:
+        """Return how far each vertex of each piece (#P) has moved across the old outline, outwards [m]; 0 inside."""
+        old, new = self.before.cloth, self.after.cloth
+        # Each edge of the outline in the direction in which its face, wound counter-clockwise, has it.
+        edges, faces = outline_edges(old.flat_faces), old.flat_faces
+        sides = []
+        for size, part in ((4, faces[faces[:, 3] >= 0]), (3, faces[faces[:, 3] < 0])):
+            sides += [part[:, [side, (side + 1) % size]] for side in range(size)]
+        stride = int(faces.max()) + 1
+        of_edge, of_side = (p[:, 0].astype(np.int64) * stride + p[:, 1] for p in (edges, np.concatenate(sides)))
+        edges = np.where(np.isin(of_edge, of_side)[:, None], edges, edges[:, ::-1])
+        along = old.flat[edges[:, 1]] - old.flat[edges[:, 0]]
+        outwards = np.zeros_like(old.flat)
+        for end in range(2):
+            np.add.at(outwards, edges[:, end], np.column_stack([along[:, 1], -along[:, 0]]))
+        length = np.linalg.norm(outwards, axis=1, keepdims=True)
+        across = np.einsum("ij,ij->i", new.flat - old.flat, outwards / np.maximum(length, 1e-30))
+        return {name: across[rows] for name, rows in old.piece_vertices.items()}
+
+    def edges(self, garment: Garment | Flattening) -> dict[str, dict[str, float]]:
+        """Return by "piece.edge" how far the outline moves outwards [m], on the mean and at most, and how much longer it becomes [m]."""
+        old, new, moved = self.before.cloth, self.after.cloth, self.moved()
+        found = {}
+        for name, piece in pieces_of(garment).items():
+            begin = old.piece_vertices[name].start
+            on_outline = set(np.unique(outline_edges(piece.faces)).tolist())
+            for edge, ids in piece.network.surface.lines.items():
+                if len(ids) < 2 or not on_outline.issuperset(ids.tolist()):
+                    continue
+                across = moved[name][ids]
+                longer = _length(new.flat[ids + begin]) - _length(old.flat[ids + begin])
+                found[f"{name}.{edge}"] = {
+                    "mean_m": float(across.mean()), "max_m": float(across[np.abs(across).argmax()]), "longer_m": longer,
+                }  # fmt: skip
+        return found
+
+    def seam_difference(self) -> float:
+        """Return by how much the two sides of any edge of a seam differ more in length than before [m]."""
+        old, new = self.before.cloth, self.after.cloth
+        seams = seam_edges(old)
+        if not len(seams):
+            return 0.0
+        before, after = (
+            edge_lengths(each.flat, seams[:, 0]) - edge_lengths(each.flat, seams[:, 1]) for each in (old, new)
+        )
+        return float(np.abs(after - before).max())
+
+    def apply(self, garment: Garment | Flattening) -> Garment | Flattening:
+        """Return the garment, or the piece, with the corrected pattern."""
+        return with_pattern(garment, self.after.cloth)
+
+    def measures(self, garment: Garment | Flattening) -> dict[str, object]:
+        """Return the entry `correction` of `metrics.json`."""
+        rows = [
+            {
+                "misfit_m": each.misfit,
+                "misfit_p95_m": each.misfit_p95,
+                "beyond_limit": each.strained,
+                "share": each.share,
+            }
+            for each in self.rounds
+        ]
+        return {
+            "reason": self.reason, "fabric": self.after.cloth.fabric.name, "rounds": rows,
+            "seam_difference_m": self.seam_difference(), "edges": self.edges(garment),
+        }  # fmt: skip
+
+
+def correct_pattern(
+    drape: Drape,
+    *,
+    hold: Sequence[str] = (),
+    fabric: Fabric | None = None,
+    worn_shape: bool = False,
+    rounds: int = 6,
+    wanted: float = 0.0,
+    callback: Callable[[int, Round], None] | None = None,
+) -> Correction:
+    """Change the flat pieces until the worn garment lies on the designed surface, or no nearer.
+
+    Cloth that bridges a hollow is not asked to follow it, unless the shape that is wanted is one that cloth has taken.
+
+    Args:
+        drape: of the pattern as it is.
+        hold: lines that stay where they are, as in :func:`warpflat.drape`.
+        fabric: another cloth for the corrected pattern; that of the drape if not given.
+        worn_shape: whether the shape as it is worn in `drape` is wanted, rather than the designed one.
+        rounds: the most.
+        wanted: misfit on the mean at which it ends [m].
+        callback: called with the number of each round and its misfit.
+
+    Raises:
+        InputError: the drape is not at rest.
+    """
+    if not drape.converged:
+        raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
+    bridging, device, held = not worn_shape, drape.body.device, held_vertices(drape.cloth, hold)
+    shape = drape.positions if worn_shape else drape.cloth.designed
+    cloth = replace(drape.cloth, designed=shape, fabric=fabric or drape.cloth.fabric)
+    designed = Body(shape, cloth.faces, device=device) if worn_shape else drape.designed
+
+    def wear(pattern: SewnCloth) -> Drape:
+        worn = relax_drape(pattern, drape.body, options=drape.options, held=held)
+        return replace(drape, cloth=pattern, worn=worn, designed=designed)
+
+    if worn_shape or fabric is not None:
+        drape = wear(cloth)
+    before = drape
+    seams = seam_edges(cloth)
+    difference = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
+    history, reason = [_round(drape, 0.0, bridging)], f"{rounds} rounds"
+    for number in range(1, rounds + 1):
+        if history[-1].misfit <= wanted:
+            reason = "the misfit is as wanted"
+            break
+        mend, step = _gauss_newton_step(drape, seams, difference, bridging)
+        best, share = None, largest_share(drape.cloth, mend + step)
+        for _ in range(_HALVINGS + 1):
+            trial = wear(replace(drape.cloth, flat=drape.cloth.flat + mend + share * step))
+            now = _round(trial, share, bridging)
+            if (
+                trial.converged
+                and now.misfit < history[-1].misfit
+                and now.strained <= history[0].strained + _MORE_STRAINED
+            ):
+                best = trial
+                break
+            share *= 0.5
+        if best is None:
+            reason = "no step lowers the misfit"
+            break
+        drape, gain = best, 1.0 - now.misfit / history[-1].misfit
+        history.append(now)
+        if callback is not None:
+            callback(number, now)
+        if gain < _LEAST_GAIN:
+            reason = "the misfit hardly falls any more"
+            break
+    return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
+
+
+def _round(drape: Drape, share: float, bridging: bool) -> Round:
+    strained = float(drape.face_areas[drape.demand.held].sum() / drape.face_areas.sum())
+    off = drape.misfit if bridging else drape.distance
+    mean = float((off * drape.areas).sum() / drape.areas.sum())
+    return Round(
+        misfit=mean, misfit_p95=weighted_percentiles(off, drape.areas, [0.95])[0], strained=strained, share=share
+    )
+
+
+def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) -> Correction:
+    """Let the flat pieces out where the worn cloth is stretched beyond its limit, until it is not, or no less of it.
+
+    That is what can be asked of a pattern without a designed surface: a garment may hang as far off the body as its maker wants, but
+    not be stretched more than its cloth allows. The rounds tell the share of the cloth that is stretched beyond the limit as `strained`.
+
+    Args:
+        drape: of the pattern as it is, on a body.
+        hold: as :func:`correct_pattern` takes it.
+        rounds: the most.
+
+    Raises:
+        InputError: the drape is not at rest.
+    """
+    if not drape.converged:
+        raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
+    held, limit = held_vertices(drape.cloth, hold), drape.cloth.fabric.strain_limit
+    seams = seam_edges(drape.cloth)
+    difference = edge_lengths(drape.cloth.flat, seams[:, 0]) - edge_lengths(drape.cloth.flat, seams[:, 1])
+
+    def told(worn: Drape, share: float) -> Round:
+        strained = worn.demand.held_by_way[:, :2].any(axis=1)
+        stretched = float(worn.face_areas[strained].sum() / worn.face_areas.sum())
+        return replace(_round(worn, share, True), strained=stretched)
+
+    before, history, reason = drape, [told(drape, 0.0)], f"{rounds} rounds"
+    for _ in range(rounds):
+        if history[-1].strained == 0.0:
+            reason = "no cloth is stretched beyond its limit"
+            break
+        corner, _, gradient, _ = drape.cloth.cells()
+        # Half the squared length of a thread over that of one at its limit.
+        over = _lengths(drape.positions[corner], gradient)
+        over -= 0.5 * (1.0 + _EASED * limit) ** 2
+        mend, step = _follow(drape.cloth, np.maximum(over, 0.0) * [1.0, 1.0, 0.0], seams, difference)
+        share = largest_share(drape.cloth, mend + step)
+        cloth = replace(drape.cloth, flat=drape.cloth.flat + mend + share * step, designed=drape.positions)
+        worn = relax_drape(cloth, drape.body, options=drape.options, held=held)
+        cloth = replace(cloth, designed=drape.body.nearest(worn.positions)[0])
+        trial = replace(drape, cloth=cloth, worn=worn)
+        now = told(trial, share)
+        if not trial.converged or now.strained >= (1.0 - _LEAST_GAIN) * history[-1].strained:
+            reason = "no step leaves less of it stretched"
+            break
+        drape = trial
+        history.append(now)
+    return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
+
+
+def _gauss_newton_step(
+    drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return the displacements of the flat vertices (#P by 2 [m]) that mend the seams, and that follow best what the cells ask for.
+
+    Args:
+        drape: of the present pattern.
+        seams: #S by 2 by 2, the edges of the outline that are sewn together.
+        difference: #S, the wanted difference of their lengths [m].
+        bridging: whether what bridges a hollow is as it should be.
+    """
+    cloth = drape.cloth
+    corner, _, gradient, _ = cloth.cells()
+    wanted = _lengths(cloth.designed[corner], gradient) - _lengths(drape.positions[corner], gradient)
+    if bridging:
+        share = drape.misfit / np.maximum(drape.distance, 1e-9)
+        wanted *= share[corner].mean(axis=1)[:, None]
+    return _follow(cloth, wanted, seams, difference)
+
+
+def _follow(
+    cloth: SewnCloth, wanted: FloatArray, seams: IntArray, difference: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return two displacements of the flat vertices, #P by 2 [m] each.
+
+    The first gives the sides of seams their wanted difference; whatever share of the second is taken, it is taken in full. The second
+    is nearest to what cells want to be longer along warp and weft, and sheared, and leaves the seams alone.
+
+    Args:
+        cloth: with the present pattern.
+        wanted: #C by 3, strains.
+        seams, difference: as :func:`_gauss_newton_step` takes them.
+    """
+    corner, face, gradient, area = cloth.cells()
+    corner_flat, _, _ = corner_triangles(cloth.flat_faces)
+    fabric = cloth.fabric
+    threads = 0.5 * (fabric.stiffness_warp + fabric.stiffness_weft)
+    shear = max(fabric.shear_stiffness, _LEAST_SHEAR * threads)
+    along = np.stack([-(gradient[:, :2] + gradient[:, 2:]), gradient[:, :2], gradient[:, 2:]], axis=1)
+    warp, weft = cloth.warp[face][:, None, :], cloth.weft[face][:, None, :]
+    by_warp, by_weft = along[:, :, :1], along[:, :, 1:]
+    # #C by 3 corners by 2 coordinates, for the strain along warp, along weft and in shear.
+    rows = [warp * by_warp, weft * by_weft, warp * by_weft + weft * by_warp]
+    count, cells = 2 * len(cloth.flat), len(corner)
+    columns = (2 * corner_flat[:, :, None] + np.arange(2)).reshape(cells, 6)
+    matrix = csc_array((count, count))
+    right, mending = np.zeros(count), np.zeros(count)
+    for values, target, stiffness in zip(
+        rows, wanted.T, (fabric.stiffness_warp, fabric.stiffness_weft, shear), strict=True
+    ):
+        places = (np.repeat(np.arange(cells), 6), columns.ravel())
+        b = coo_array((values.reshape(-1), places), shape=(cells, count)).tocsr()
+        weighted = diags_array(stiffness * area) @ b
+        matrix = matrix + b.T @ weighted
+        right += weighted.T @ target
+    if len(seams):
+        b = seam_rows(cloth.flat, seams)
+        now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
+        weight = _SEAM * threads
+        matrix = matrix + weight * (b.T @ b)
+        mending = weight * (b.T @ (difference - now))
+    matrix = csc_array(matrix + diags_array(np.full(count, _HOLD * threads)))
+    solve = factor_symmetric(matrix)
+    return solve(mending).reshape(-1, 2), solve(right).reshape(-1, 2)
+
+
+def _lengths(x: FloatArray, gradient: FloatArray) -> FloatArray:
+    """Return half the squared lengths of the threads and the product of both, of cells in space (#C by 3 by 3): #C by 3."""
+    d1, d2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    warp = d1 * gradient[:, :1] + d2 * gradient[:, 2:3]
+    weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
+    products = [0.5 * (warp * warp).sum(axis=1), 0.5 * (weft * weft).sum(axis=1), (warp * weft).sum(axis=1)]
+    return np.stack(products, axis=1)
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -1,0 +1,140 @@
+"""A garment is sewn, put on a body, and comes to rest there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import BoolArray
+from warpflat.core.compile import start_warp
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.text import without_side
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.surface.mesh import Surface
+from warpflat.garment.construction.form_garment import FormGarment
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.result import Drape
+from warpflat.garment.draping.sewn_cloth import SewnCloth, sew_cloth
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.pattern.drafting.whole_pieces import MIRRORED
+
+__all__ = ["drape", "held_vertices", "hip_level", "thread_elastics"]
+
+# So often is what an elastic draws in moved towards the body, level.
+_LEVELLED = 20
+
+
+def drape(
+    garment: Garment | Flattening | Sequence[Flattening],
+    body: Mannequin | Surface | None = None,
+    *,
+    hold: Sequence[str] = (),
+    elastics: Sequence[str] = (),
+    options: DrapeOptions | None = None,
+    callback: Callable[[int, float], None] | None = None,
+    device: str | None = None,
+) -> Drape:
+    """Sew flat pieces, put them on a body and let them come to rest under gravity, contact and friction.
+
+    The cloth starts at the designed surface; its rest state is the flat pattern in its own thread directions.
+
+    Args:
+        garment: of :func:`warpflat.flatten_form`, or pieces whose cuts are closed.
+        body: a mannequin or a surface, such as a scan's; a garment's own mannequin, or a piece's own surface, if not given.
+        hold: lines and edges that stay where they are, as "piece.line", or "line" for every piece that has one: those that
+            would be sewn to what is not there.
+        elastics: edges that an elastic draws to the body and holds there, such as "waist".
+        options: friction, tolerance and limits.
+        callback: called with the number of steps and the residual now and then.
+        device: Warp device.
+
+    Returns:
+        the drape; `converged` is False if it met the step limit before it was at rest.
+
+    Raises:
+        InputError: no piece, pieces of different cloths, half pieces, mirrored faces, an unknown line, or nothing holds the garment.
+    """
+    cloth = sew_cloth(garment)
+    start_warp()
+    where = wp.get_device(device)
+    if body is None:
+        body = garment.mannequin if isinstance(garment, FormGarment) else None
+    surface = body.surface() if isinstance(body, Mannequin) else body
+    gripped: list[str] = []
+    if surface is None:
+        solid = designed = Body(cloth.designed, cloth.faces, device=where)
+    else:
+        solid = Body(surface.vertices, surface.faces, device=where)
+        cloth, gripped = thread_elastics(cloth, elastics, solid)
+        designed = Body(cloth.designed, cloth.faces, device=where)
+    options = options or DrapeOptions()
+    held, frames = held_vertices(cloth, [*hold, *gripped]), list[NDArray[np.float32]]()
+    worn = relax_drape(
+        cloth, solid, options=options, held=held, callback=callback,
+        observer=lambda places: frames.append(places.astype(np.float32)),
+    )  # fmt: skip
+    worn.check_held()
+    sources = tuple(source for piece in _pieces(garment) for source in piece.surface.sources)
+    # A cut that `warpflat.advise` has found on one side stands for that on the other side of the body, too.
+    cuts = {}
+    for piece in _pieces(garment):
+        paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
+        cuts[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
+    return Drape(
+        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
+        hangs_below=hip_level(garment.mannequin if isinstance(garment, FormGarment) else None), cuts=cuts, threaded=gripped,
+    )  # fmt: skip
+
+
+def _pieces(garment: Garment | Flattening | Sequence[Flattening]) -> list[Flattening]:
+    if isinstance(garment, Garment):
+        return list(garment.pieces.values())
+    return [garment] if isinstance(garment, Flattening) else list(garment)
+
+
+def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:
+    """Return which vertices (#V) lie on lines that are held, each "piece.line", or "line" of every piece that has one.
+
+    Raises:
+        InputError: an unknown line.
+    """
+    held = np.zeros(len(cloth.designed), dtype=bool)
+    for name in hold:
+        lines = [line for line in cloth.lines if name in (line, line.partition(".")[2])]
+        if not lines:
+            known = [*cloth.lines, *(line.partition(".")[2] for line in cloth.lines)]
+            raise InputError(f"drape: hold: line {name!r} is unknown: {nearest(name, known)}")
+        for line in lines:
+            held[cloth.lines[line]] = True
+    return held
+
+
+def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple[SewnCloth, list[str]]:
+    """Return the cloth with edges drawn to the body at their height, as an elastic does, and the lines along them that it holds.
+
+    Args:
+        cloth: the sewn cloth.
+        edges: what an elastic is threaded through, on whatever piece and side.
+        body: what it draws them to.
+    """
+    called = {line: line.partition(".")[2].removesuffix(MIRRORED).rstrip(" 0123456789") for line in cloth.lines}
+    gripped = [line for line, edge in called.items() if {edge, without_side(edge)} & set(edges)]
+    drawn = cloth.designed.copy()
+    if gripped:
+        rows = np.unique(np.concatenate([cloth.lines[line] for line in gripped]))
+        # By alternating projections on the body and on the level of each vertex.
+        for _ in range(_LEVELLED):
+            drawn[rows] = np.where([True, False, True], body.nearest(drawn[rows])[0], drawn[rows])
+    return replace(cloth, designed=drawn), gripped
+
+
+def hip_level(body: Mannequin | None) -> float:
+    """Return the height of a mannequin's hip, below which cloth hangs freely [m]; that of no body lies below everything."""
+    return -np.inf if body is None else float(body.vertices[body.layout.lines["hip"], 1].mean())

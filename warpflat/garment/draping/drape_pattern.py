@@ -1,0 +1,376 @@
+"""A pattern from outside is meshed, put around a body by its seams, and draped there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.compile import start_warp
+from warpflat.core.errors import InputError
+from warpflat.core.short_repr import short_repr
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.surface.mirror import mirror_plane
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.check_sewn import check_sewn
+from warpflat.garment.draping.drape_garment import held_vertices, hip_level, thread_elastics
+from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
+from warpflat.garment.draping.limbs import around_legs, inside_arms, limb_lines, on_arm
+from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces, sewn_places, welded_vertices
+from warpflat.garment.draping.openings import find_openings, limbs_of
+from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.result import Drape
+from warpflat.garment.draping.sew_around import sew_around
+from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
+from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
+from warpflat.garment.draping.wrap_pieces import UNITS, continue_pieces, find_roles, hood_beside_head, wrap_pieces
+from warpflat.garment.mannequin.head import head_of
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
+from warpflat.pattern.drafting.whole_pieces import MIRRORED, whole_pieces
+
+__all__ = ["Placement", "drape_pattern", "place_pieces"]
+
+# The largest piece of a garment is between so short and so long [m].
+_SIZES = (0.05, 10.0)
+# A designed surface does not belong to a body where more than this share of it lies so deep [m] within.
+_WITHIN, _DEEP = 0.05, 0.01
+# Nor where its top, from this share of its vertices on, lies so far [m] off, or less than this share of it looks as the skin does.
+_TOP, _OFF, _ALIKE = 0.9, 0.05, 0.75
+# Pieces are sewn on a mesh of this spacing at least [m]. Cloth that starts so far above the neck's base [m] is worn around a head.
+_COARSE, _OVER_NECK = 0.02, 0.1
+# The halves of a hood start this far beside the head [m].
+_BESIDE_HEAD = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """Where the pieces of a pattern go, and how they are meshed.
+
+    Attributes:
+        top: a level of the body or a height [m] for the highest point of what does not hang from the shoulders.
+        lifts: by piece the map to its designed surface, where there is one; it must be there for all of them or for none.
+        size: of the pattern; its sample size if not given.
+        spacing: wished edge of the mesh [m].
+        hold: edges that stay where they are, as "piece.edge", or "edge" for every piece that has one.
+    """
+
+    __repr__ = short_repr
+
+    top: str | float | None = None
+    lifts: Mapping[str, Lift] = field(default_factory=dict)
+    size: str | None = None
+    spacing: float = 0.01
+    hold: Sequence[str] = ()
+
+
+def drape_pattern(
+    pattern: Pattern,
+    body: Mannequin | None,
+    *,
+    fabric: Fabric,
+    placement: Placement | None = None,
+    options: DrapeOptions | None = None,
+    callback: Callable[[int, float], None] | None = None,
+    device: str | None = None,
+) -> tuple[Drape, list[str]]:
+    """Sew a pattern of outlines, put it on a body, and let it come to rest there.
+
+    Without a designed surface the worn cloth is compared with the body.
+
+    Args:
+        pattern: pieces and their seams.
+        body: a mannequin, of a size or on a scan; None for the designed surface itself.
+        fabric: of all pieces.
+        placement: where the pieces go, and how finely they are meshed.
+        options: friction, tolerance and limits.
+        callback: called with the number of steps and the residual now and then.
+        device: Warp device.
+
+    Returns:
+        The drape, and notes.
+
+    Raises:
+        InputError: the pattern has no seams, no such size or wrong units, a piece cannot be meshed or placed, an edge is unknown,
+            or nothing holds the garment.
+    """
+    placement, options = placement or Placement(), options or DrapeOptions()
+    chosen = pattern.sample if placement.size is None else placement.size
+    pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
+    pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
+    pieces, seams, layers = in_one_layer(pieces, seams, placement.lifts)
+    pieces, seams, turned = right_side_out(pieces, seams, placement.lifts)
+    notes += layers
+    if not pattern.seams:
+        raise InputError(
+            f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
+        )
+    # A garment of an impossible size comes from a file whose units are wrong.
+    sizes = {
+        name: np.ptp(np.concatenate([edge.points for edge in piece.edges]), axis=0) for name, piece in pieces.items()
+    }
+    name = max(sizes, key=lambda each: float(sizes[each].max()))
+    wide, high = sizes[name]
+    if not _SIZES[0] <= max(wide, high) <= _SIZES[1]:
+        raise InputError(
+            f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
+            f"and {1e3 * _SIZES[1]:.0f} mm long: {UNITS}"
+        )
+    meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
+    start_warp()
+    where = wp.get_device(device)
+    lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
+    hood = {name for name, piece in pieces.items() if piece.role == "hood"}
+    solid = None if body is None else _worn_body(body, head=bool(hood), device=where)
+    # On another body than that of its designed surface a garment starts as one that has none, if it can.
+    placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
+    lifted = len(placed) == len(meshes) or bool(placed and body is not None)
+    if lifted:
+        placed = _mirrored_in_place(placed, welds)
+    elsewhere = _elsewhere(placed, meshes, solid) if lifted and solid is not None else ""
+    if not lifted and body is None:
+        raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
+    if body is not None and (not lifted or elsewhere):
+        try:
+            solid, lifts = _sew(pieces, seams, body, placement, fabric, turned, where)
+        except InputError:
+            if not lifted:
+                raise
+        else:
+            if lifted:
+                notes.append(f"{elsewhere}: the pieces are placed by their seams")
+            lifted, placed = False, {name: lifts[name](mesh.points) for name, mesh in meshes.items()}
+    drafted = [name for name in meshes if name not in placed]
+    placed = _continued(placed, pieces, meshes, welds, body)
+    cloth = _cloth(pieces, meshes, welds, placed, fabric, turned)
+    designed = Body(cloth.designed, cloth.faces, device=where)
+    solid = designed if solid is None else solid
+    if not lifted or drafted:
+        stays = np.zeros(len(cloth.designed), dtype=bool)
+        for name in set(meshes) - set(drafted) if lifted else ():
+            stays[cloth.welded[cloth.piece_vertices[name]]] = True
+        cloth = replace(cloth, designed=sew_around(cloth, cloth.designed, solid, fixed=stays))
+    threaded = sorted({elastic.edge for elastic in pattern.elastics})
+    cloth, gripped = thread_elastics(cloth, threaded, solid)
+    if gripped:
+        notes.append(f"held by an elastic: {', '.join(threaded)}")
+    held, frames = held_vertices(cloth, [*placement.hold, *gripped]), list[NDArray[np.float32]]()
+    worn = relax_drape(
+        cloth, solid, options=options, held=held, callback=callback,
+        observer=lambda places: frames.append(places.astype(np.float32)),
+    )  # fmt: skip
+    worn.check_held()
+    if not lifted:
+        # What it should lie on is the body below it.
+        cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
+    return Drape(
+        cloth=cloth,
+        worn=worn,
+        body=solid,
+        designed=designed,
+        options=options,
+        frames=tuple(frames),
+        drafted=drafted,
+        hangs_below=hip_level(body),
+        threaded=gripped,
+    ), notes
+
+
+def _worn_body(body: Mannequin, *, head: bool, device: wp.Device) -> Body:
+    """Return the body that a pattern is worn on: its limbs run on beyond their ends, with a head if asked for and known."""
+    surface = body.surface()
+    vertices, faces = draw_out_limbs(surface.vertices, surface.faces)
+    above = head_of(body) if head else None
+    if above is not None:
+        triangles = np.column_stack([above[1] + len(vertices), np.full(len(above[1]), -1)])
+        vertices, faces = np.concatenate([vertices, above[0]]), np.concatenate([faces, triangles])
+    return Body(vertices, faces.astype(np.int32), device=device)
+
+
+def _sew(
+    pieces: Mapping[str, Piece],
+    seams: Sequence[Seam],
+    body: Mannequin,
+    placement: Placement,
+    fabric: Fabric,
+    turned: frozenset[str],
+    device: wp.Device,
+) -> tuple[Body, dict[str, Lift]]:
+    """Sew pieces around a body on a coarse mesh; return the body, and by piece the map to where it lies.
+
+    Raises:
+        InputError: a piece cannot be meshed or placed, or was sewn beside its limb.
+    """
+    spacing = max(placement.spacing, _COARSE)
+    try:
+        meshes, welds = mesh_pieces(pieces, seams, spacing, closures(pieces))
+    except InputError:
+        meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
+    openings = find_openings(meshes, welds)
+    sleeves, hood = find_roles(meshes, welds, {name: piece.at for name, piece in pieces.items()}, openings)
+    # A hood hangs where its file says, or is worn up.
+    if any(piece.placement is None for piece in pieces.values()) and head_of(body) is not None:
+        pieces = {name: replace(piece, role="hood") if name in hood else piece for name, piece in pieces.items()}
+        laid = {name: mesh for name, mesh in meshes.items() if name not in hood}
+    else:
+        laid = meshes
+    placed = place_pieces(pieces, laid, welds, body, top=placement.top)
+    placed = _continued(placed, pieces, meshes, welds, body)
+    cloth, lines = _cloth(pieces, meshes, welds, placed, fabric, turned), limb_lines(body)
+    start = cloth.designed
+    high = max(float(points[:, 1].max()) for points in placed.values())
+    hooded = high > body.line("collar")[:, 1].max() + _OVER_NECK or any(each.role == "hood" for each in pieces.values())
+    solid = _worn_body(body, head=hooded, device=device)
+    # The trunk starts inside the arms, and what begins below them passes through.
+    on_arms = set[str]().union(*sleeves)
+    armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
+    sleeved, below = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
+    for name, rows in cloth.piece_vertices.items():
+        sleeved[cloth.welded[rows]] |= name in on_arms
+        below[cloth.welded[rows]] |= placed[name][:, 1].max() < armpit
+    limbs = limbs_of(openings, start, on_arms)
+    hems = [each.vertices for each, limb in zip(openings, limbs, strict=True) if limb.endswith("leg")]
+    start = around_legs(start, cloth.faces, hems, lines) if len(hems) == 2 else start
+    start = np.where(sleeved[:, None], start, inside_arms(start, lines))
+    thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
+    sewn = sew_around(cloth, start, thin)
+    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(closures(pieces)))
+    lifts = {
+        name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
+        for name, mesh in meshes.items()
+    }
+    return solid, lifts
+
+
+def _continued(
+    placed: Mapping[str, FloatArray],
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    body: Mannequin | None,
+) -> dict[str, FloatArray]:
+    """Return the places of all pieces: a hood is worn up, beside a head; what else does not lie goes on from what it is sewn to."""
+    hood = {name for name, piece in pieces.items() if piece.role == "hood"}
+    head = head_of(body) if body is not None and hood else None
+    found = dict(placed)
+    if head is not None:
+        halves = hood_beside_head(placed, meshes, welds, hood, float(np.abs(head[0][:, 0]).max()) + _BESIDE_HEAD)
+        found = {name: points for name, points in placed.items() if name not in hood} | halves
+    return continue_pieces(found, meshes, welds, turned_down(pieces))
+
+
+def _cloth(
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    placed: Mapping[str, FloatArray],
+    fabric: Fabric,
+    turned: frozenset[str],
+) -> SewnCloth:
+    """Join meshes along their seams; vertices that become one start in the middle of their places."""
+    welded, begins = welded_vertices(meshes, welds)
+    flat_faces = np.concatenate(
+        [np.column_stack([m.triangles + begins[n], np.full(len(m.triangles), -1)]) for n, m in meshes.items()]
+    ).astype(np.int32)
+    cells = [len(mesh.triangles) for mesh in meshes.values()]
+    places = np.cumsum([0, *cells]).tolist()
+    grains = [pieces[name].grain for name in meshes]
+    along = [np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0] for grain in grains]
+    warps = np.repeat([line / np.linalg.norm(line) for line in along], cells, axis=0)
+    lines = {
+        f"{name}.{line}": welded[row + begins[name]]
+        for name, m in meshes.items()
+        for line, row in [*m.lines.items(), *m.edges.items()]
+    }
+    return SewnCloth(
+        fabric=fabric,
+        designed=sewn_places(placed, begins, welded),
+        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
+        flat_faces=flat_faces,
+        flat=np.concatenate([mesh.points for mesh in meshes.values()]),
+        welded=welded,
+        warp=warps,
+        weft=np.column_stack([warps[:, 1], -warps[:, 0]]),
+        piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
+        piece_vertices={name: slice(begins[name], begins[name] + len(m.points)) for name, m in meshes.items()},
+        lines=lines,
+        turned=turned,
+    )
+
+
+def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequence[Weld]]) -> dict[str, FloatArray]:
+    """Return places (#P by 3 [m] by piece) with what is cut turned over on the other side of the garment's own plane of symmetry.
+
+    A garment may stand beside x = 0 and lean: its plane is that in which pieces turned over come to the seams of the others.
+    """
+    across = np.array([-1.0, 1.0, 1.0])
+    met = [
+        (placed[turned][i] * across, placed[other][j])
+        for seam in welds
+        for joint in seam
+        for turned, i in joint
+        for other, j in joint
+        if turned.endswith(MIRRORED) and not other.endswith(MIRRORED) and {turned, other} <= placed.keys()
+    ]
+    if not met:
+        return dict(placed)
+    normal, off = mirror_plane(*np.array(met).transpose(1, 0, 2))
+    return {
+        name: points * across - 2.0 * np.outer((points * across) @ normal - off, normal)
+        if name.endswith(MIRRORED)
+        else points
+        for name, points in placed.items()
+    }
+
+
+def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh], body: Body) -> str:
+    """Return in words why a designed surface (#P by 3 [m] by piece) is not worn by a body; "" if it may be.
+
+    What is worn lies outside, looks as the skin below it does, and touches where it hangs, at its top.
+    """
+    points = np.concatenate(list(placed.values()))
+    gap = body.gaps(points)
+    deep = float((gap < -_DEEP).mean())
+    if deep > _WITHIN:
+        return f"{100 * deep:.0f} % of the designed surface lies in this body"
+    off = float(np.median(gap[points[:, 1] >= np.quantile(points[:, 1], _TOP)]))
+    corner = np.concatenate([points[meshes[name].triangles] for name, points in placed.items()])
+    vector = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    facing = np.einsum("ta,ta->t", vector, body.nearest(corner.mean(axis=1))[1])
+    alike = float(np.linalg.norm(vector[facing > 0.0], axis=1).sum() / np.linalg.norm(vector, axis=1).sum())
+    if off > _OFF or max(alike, 1.0 - alike) < _ALIKE:
+        return f"the designed surface lies beside this body, its top {100 * off:.0f} cm off"
+    return ""
+
+
+def place_pieces(
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    body: Mannequin,
+    *,
+    top: str | float | None = None,
+) -> dict[str, FloatArray]:
+    """Return where the points of pieces start around a body (#P by 3 [m] each): see `wrap_pieces`.
+
+    Raises:
+        InputError: as there.
+    """
+    hung = {
+        name: np.column_stack([mesh.points, np.ones(len(mesh.points))]) @ place.T
+        for name, mesh in meshes.items()
+        if (place := pieces[name].placement) is not None
+    }
+    levels = {
+        name: (level, float(np.mean([points[meshes[name].edges[edge], 1].mean() for edge in pieces[name].levels])))
+        for name, points in hung.items()
+        for level in pieces[name].levels.values()
+    }
+    at = {name: piece.at for name, piece in pieces.items() if piece.at}
+    return wrap_pieces(meshes, welds, body, at=at, hung=hung, levels=levels, top=top)

@@ -1,0 +1,119 @@
+"""From a pattern in the plane to the surface that it was made of, by a run's `NAME.obj`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.input_files import FARTHEST, reading
+from warpflat.pattern.drafting.pieces import Piece
+from warpflat.pattern.drafting.whole_pieces import MIRRORED
+
+__all__ = ["Lift", "moved_lift", "read_lift", "surface_lift", "whole_lifts"]
+
+#: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]).
+Lift = Callable[[FloatArray], FloatArray]
+
+# Triangles around a point that are tried.
+_TRIED = 16
+
+
+def read_lift(path: Path) -> Lift:
+    """Return the map from a pattern to its surface in an OBJ file with the surface as `v` and the pattern as `vt`.
+
+    A point beside the pattern, where an edge was smoothed, belongs to the triangle next to it.
+
+    Raises:
+        InputError: the file cannot be read, or has no pattern.
+    """
+    space, flat, faces = [], [], []
+    with reading(path, "piece") as place:
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            place.at = f"line {number}"
+            key, *words = line.split()[:5] or [""]
+            if key == "v":
+                space.append([float(word) for word in words[:3]])
+            elif key == "vt":
+                flat.append([float(word) for word in words[:2]])
+            elif key == "f":
+                corners = [[int(part) - 1 for part in word.split("/")[:2]] for word in words]
+                faces += [[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)]
+        place.at = ""
+        if not faces:
+            raise InputError("has no faces 'f v/vt'; run the scene again")
+        triangles = np.array(faces, dtype=np.int64).reshape(-1, 3, 2)
+        # A run writes no negative numbers, which NumPy would count from the end.
+        if triangles.min() < 0:
+            raise InputError("refers to a vertex before its first; run the scene again")
+        surface, pattern = np.array(space)[triangles[:, :, 0]], np.array(flat)[triangles[:, :, 1]]
+        if not (np.abs(surface).max() < FARTHEST and np.abs(pattern).max() < FARTHEST):
+            raise InputError(f"a vertex lies farther than {FARTHEST:g} m off; run the scene again")
+        return _lift(surface, pattern)
+
+
+def surface_lift(space: FloatArray, flat: FloatArray, triangles: IntArray) -> Lift:
+    """Return the map from a pattern to its surface.
+
+    Args:
+        space: #V by 3, the surface [m].
+        flat: #V by 2, the pattern [m].
+        triangles: #T by 3, of both.
+    """
+    return _lift(space[triangles], flat[triangles])
+
+
+def moved_lift(lift: Lift, turn: FloatArray, shift: FloatArray) -> Lift:
+    """Return the map to a surface that was moved: its points @ turn (3 by 3) + shift [m]."""
+    return lambda points: lift(points) @ turn + shift
+
+
+def _lift(surface: FloatArray, pattern: FloatArray) -> Lift:
+    """Return the map of triangles in the pattern (#T by 3 by 2) to those in space (#T by 3 by 3)."""
+    inverse = np.linalg.pinv(np.stack([pattern[:, 1] - pattern[:, 0], pattern[:, 2] - pattern[:, 0]], axis=-1))
+    tree = cKDTree(pattern.mean(axis=1))
+
+    def lift(points: FloatArray) -> FloatArray:
+        near = np.asarray(tree.query(points, k=min(_TRIED, len(pattern)))[1]).reshape(len(points), -1)
+        share = np.einsum("ptij,ptj->pti", inverse[near], points[:, None] - pattern[near, 0])
+        weight = np.concatenate([1.0 - share.sum(axis=-1, keepdims=True), share], axis=-1)
+        best = weight.min(axis=-1).argmax(axis=1)
+        rows = np.arange(len(points))
+        return np.asarray(np.einsum("pc,pcj->pj", weight[rows, best], surface[near[rows, best]]))
+
+    return lift
+
+
+def whole_lifts(pieces: Iterable[Piece], lifts: Mapping[str, Lift]) -> dict[str, Lift]:
+    """Return the lifts of whole pieces, as of :func:`warpflat.pattern.drafting.whole_pieces.whole_pieces`: bodies are mirrored at x = 0."""
+    found: dict[str, Lift] = {}
+    for piece in pieces:
+        if piece.name in lifts:
+            lift = lifts[piece.name]
+            found[piece.name] = _unfolded(piece, lift) if piece.on_fold else lift
+            found[piece.name + MIRRORED] = _turned(lift)
+    return found
+
+
+def _turned(lift: Lift) -> Lift:
+    return lambda points: lift(points * [-1.0, 1.0]) * [-1.0, 1.0, 1.0]
+
+
+def _unfolded(piece: Piece, lift: Lift) -> Lift:
+    start, end = next(edge for edge in piece.edges if edge.kind == "fold").points[[0, -1]]
+    along = (end - start) / np.linalg.norm(end - start)
+
+    def unfolded(points: FloatArray) -> FloatArray:
+        off = points - start
+        # The outline runs counter-clockwise: the half lies on the left of its fold.
+        beyond = along[0] * off[:, 1] - along[1] * off[:, 0] < 0.0
+        image = start + 2.0 * np.outer(off @ along, along) - off
+        found = lift(np.where(beyond[:, None], image, points))
+        found[beyond, 0] *= -1.0
+        return found
+
+    return unfolded

@@ -1,0 +1,132 @@
+"""A pattern whose vertices move: the lengths of its seams' edges, the areas of its cells, and the garment with the new pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.surface.triangles import corner_triangles
+from warpflat.garment.construction.garment import Garment
+from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.drafting.whole_pieces import MIRRORED
+from warpflat.pattern.export.geometry import outline_edges
+
+__all__ = ["edge_lengths", "largest_share", "moved_outlines", "pieces_of", "seam_edges", "seam_rows", "with_pattern"]
+
+# No cell shrinks below this share of its area in a step.
+_LEAST_AREA = 0.5
+
+
+def seam_edges(cloth: SewnCloth) -> IntArray:
+    """Return the edges of the outlines that are sewn together, #S by 2 edges by 2 vertices of `flat` in corresponding order."""
+    edges = outline_edges(cloth.flat_faces)
+    sewn = cloth.welded[edges]
+    turned = sewn[:, 0] > sewn[:, 1]
+    edges[turned], sewn[turned] = edges[turned][:, ::-1], sewn[turned][:, ::-1]
+    order = np.lexsort((sewn[:, 1], sewn[:, 0]))
+    same = (sewn[order][1:] == sewn[order][:-1]).all(axis=1) & (sewn[order][1:, 0] != sewn[order][1:, 1])
+    first = np.flatnonzero(same)
+    return np.stack([edges[order[first]], edges[order[first + 1]]], axis=1)
+
+
+def edge_lengths(flat: FloatArray, edges: IntArray) -> FloatArray:
+    """Return the lengths of edges (#E by 2) [m]."""
+    return np.asarray(np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1))
+
+
+def seam_rows(flat: FloatArray, seams: IntArray) -> csr_array:
+    """Return the change of the difference in length of the two sides by the displacement of the vertices, #S by 2 #P."""
+    rows, columns, values = [], [], []
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        ends = seams[:, side]
+        along = flat[ends[:, 1]] - flat[ends[:, 0]]
+        unit = sign * along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)
+        for end, of_end in ((0, -unit), (1, unit)):
+            rows.append(np.repeat(np.arange(len(seams)), 2))
+            columns.append((2 * ends[:, end, None] + np.arange(2)).ravel())
+            values.append(of_end.ravel())
+    shape = (len(seams), 2 * len(flat))
+    return coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape).tocsr()
+
+
+def largest_share(cloth: SewnCloth, step: FloatArray) -> float:
+    """Return the largest share of a step, of 1, 1/2, 1/4 ..., that leaves every cell enough of its area."""
+    corner, _, _ = corner_triangles(cloth.flat_faces)
+
+    def areas(flat: FloatArray) -> FloatArray:
+        a, b = flat[corner[:, 1]] - flat[corner[:, 0]], flat[corner[:, 2]] - flat[corner[:, 0]]
+        return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+    before, share = areas(cloth.flat), 1.0
+    while share > 1e-3 and (areas(cloth.flat + share * step) < _LEAST_AREA * before).any():
+        share *= 0.5
+    return share
+
+
+def moved_outlines(pattern: Pattern, size: str, before: SewnCloth, after: SewnCloth) -> Pattern:
+    """Return a pattern of one size whose pieces have moved as the flat cloth that was meshed from them.
+
+    Halves on the fold move evenly on both sides of it, and pieces that are cut in pairs alike.
+
+    Args:
+        pattern: of outlines.
+        size: that was meshed.
+        before, after: the cloth, whose pieces are those of :func:`warpflat.pattern.drafting.whole_pieces.whole_pieces`.
+    """
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+    def mover(name: str) -> Callable[[FloatArray], FloatArray]:
+        rows = before.piece_vertices[name]
+        across = [-1.0, 1.0] if name in before.turned else [1.0, 1.0]
+        places, move = before.flat[rows] * across, (after.flat[rows] - before.flat[rows]) * across
+        inside, beside = LinearNDInterpolator(places, move), NearestNDInterpolator(places, move)
+
+        def moves(points: FloatArray) -> FloatArray:
+            found = inside(points)
+            return np.where(np.isfinite(found), found, beside(points))
+
+        return moves
+
+    def moved(piece: Piece) -> Piece:
+        if piece.name not in before.piece_vertices:
+            return piece
+        own, fold = mover(piece.name), next((edge.points for edge in piece.edges if edge.kind == "fold"), None)
+        other, mirror, origin = own, np.eye(2), np.zeros(2)
+        if fold is not None:
+            along = (fold[-1] - fold[0]) / np.linalg.norm(fold[-1] - fold[0])
+            mirror, origin = 2.0 * np.outer(along, along) - np.eye(2), fold[0]
+        elif piece.name + MIRRORED in before.piece_vertices:
+            other, mirror = mover(piece.name + MIRRORED), np.diag([-1.0, 1.0])
+
+        def go(points: FloatArray) -> FloatArray:
+            image = (points - origin) @ mirror + origin
+            return np.asarray(points + 0.5 * (own(points) + other(image) @ mirror))
+
+        return replace(
+            piece, edges=[replace(edge, points=go(edge.points), vertices=None) for edge in piece.edges],
+            holes=[replace(hole, points=go(hole.points)) for hole in piece.holes],
+            internal_lines={name: go(line) for name, line in piece.internal_lines.items()},
+            marks={name: go(point[None])[0] for name, point in piece.marks.items()},
+        )  # fmt: skip
+
+    return replace(pattern, pieces={size: [moved(piece) for piece in pattern.pieces[size]]}, sample_size=size)
+
+
+def pieces_of(garment: Garment | Flattening) -> dict[str, Flattening]:
+    """Return the pieces by their names."""
+    return dict(garment.pieces) if isinstance(garment, Garment) else {garment.surface.name: garment}
+
+
+def with_pattern(garment: Garment | Flattening, cloth: SewnCloth) -> Garment | Flattening:
+    """Return the garment, or the piece, with the flat pieces of sewn cloth, and in that cloth's fabric."""
+    pieces = {
+        name: replace(piece, positions=cloth.flat[cloth.piece_vertices[name]], fabric=cloth.fabric)
+        for name, piece in pieces_of(garment).items()
+    }
+    return replace(garment, pieces=pieces) if isinstance(garment, Garment) else next(iter(pieces.values()))

@@ -1,0 +1,90 @@
+"""The openings of a sewn garment, and around which limb each goes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.flat.surface.connectivity import border_loops, orient
+from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, welded_vertices
+
+__all__ = ["Opening", "find_openings", "limbs_of"]
+
+# An opening whose middle lies this far aside, as a share of its width, is that of a limb.
+_ASIDE = 0.3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Opening:
+    """A closed border of a sewn garment.
+
+    Attributes:
+        vertices: its vertices in their order, in the numbering of the sewn mesh.
+        length: in the flat pieces [m].
+        pieces: those that have an edge on it.
+        turn: by how much it turns in the flat cloth [rad]: -2 pi around a hole, nothing at the end of a tube.
+    """
+
+    vertices: IntArray
+    length: float
+    pieces: frozenset[str]
+    turn: float
+
+
+def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> list[Opening]:
+    """Return the openings of pieces that are sewn together, the longest first; none where their seams make no surface."""
+    welded, begins = welded_vertices(meshes, welds)
+    faces = np.concatenate([welded[mesh.triangles + begins[name]] for name, mesh in meshes.items()])
+    try:
+        loops = border_loops(orient(np.column_stack([faces, np.full(len(faces), -1, np.int32)]))[0])
+    except InputError:
+        return []
+    lengths: dict[tuple[int, int], tuple[float, str]] = {}
+    angle = np.zeros(len(welded))
+    for name, mesh in meshes.items():
+        for k in range(3):
+            corner, *others = (mesh.points[mesh.triangles[:, (k + step) % 3]] @ [1.0, 1j] for step in range(3))
+            np.add.at(
+                angle,
+                welded[mesh.triangles[:, k] + begins[name]],
+                np.angle((others[1] - corner) / (others[0] - corner)),
+            )
+        edges = np.concatenate([mesh.triangles[:, [0, 1]], mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]]])
+        along = np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).tolist()
+        pairs = np.sort(welded[edges + begins[name]], axis=1).tolist()
+        lengths |= {(a, b): (length, name) for (a, b), length in zip(pairs, along, strict=True)}
+    found = []
+    for loop in loops:
+        on = [lengths[a, b] for a, b in np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()]
+        pieces = frozenset(name for _, name in on)
+        turn = float((np.pi - angle[loop]).sum())
+        found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces, turn=turn))
+    return sorted(found, key=lambda each: -each.length)
+
+
+def limbs_of(openings: Sequence[Opening], positions: FloatArray, on_arms: Collection[str]) -> list[str]:
+    """Return around which limb each opening goes, such as "left arm"; "" for the trunk and the neck.
+
+    Args:
+        openings: of the garment.
+        positions: #V by 3, where the sewn garment starts [m].
+        on_arms: pieces of sleeves.
+    """
+    middles = [positions[each.vertices, :2].mean(axis=0) for each in openings]
+    widths = [np.ptp(positions[each.vertices, 0]) for each in openings]
+    aside = [abs(middle[0]) > _ASIDE * width for middle, width in zip(middles, widths, strict=True)]
+    sleeved = [bool(each.pieces & set(on_arms)) for each in openings]
+    # Without sleeves arms are above the lowest opening of the trunk, or above the legs.
+    free = [middle[1] for middle, is_aside in zip(middles, aside, strict=True) if is_aside]
+    centred = [middle[1] for middle, is_aside in zip(middles, aside, strict=True) if not is_aside]
+    least = float(np.mean(free)) if len(free) > 2 else min(centred, default=0.0)
+    limbs = []
+    for middle, is_aside, is_sleeve in zip(middles, aside, sleeved, strict=True):
+        side = "left" if middle[0] > 0.0 else "right"
+        is_arm = is_sleeve or (middle[1] > least and not any(sleeved))
+        limbs.append(f"{side} {'arm' if is_arm else 'leg'}" if is_aside or is_sleeve else "")
+    return limbs

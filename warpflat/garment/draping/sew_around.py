@@ -1,0 +1,104 @@
+"""Sewn cloth is drawn together around a thin body, and the body grows into it: where a pattern from outside starts to be draped.
+
+The cloth is drawn together as rigidly as it can be, outside the body, by projective dynamics (Bouaziz et al. 2014): each triangle is laid
+as near to its place as it goes without strain, and one sparse factor joins them. It is first gathered around the thin body, then the
+body grows, then the cloth settles on it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array, diags_array
+
+from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.sparse import factor_symmetric
+from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.garment.draping.thin_body import ThinBody
+
+__all__ = ["sew_around", "stretches"]
+
+# Rounds around the thin body, while it grows, and around the whole one. The factor is renewed after so many, or where contact comes to
+# more than this share of the vertices.
+_GATHER, _GROW, _SETTLE, _RENEWED, _NEW_CONTACT = 60, 60, 30, 5, 0.02
+# The cloth is kept so far off the body [m]; planes farther than this do not count.
+_OFF, _REACH = 0.002, 0.12
+# Stiffness over the cloth's: of inertia, of contact, of what stays, and of bending.
+_INERTIA, _HOLD, _STAY, _BEND = 0.02, 1.0, 1e3, 0.02
+# Heights go back to those of the start by this share, until the body has grown. What hangs free falls by so much in a round [m].
+_KEEP, _FALL = 0.1, 0.003
+
+
+def sew_around(
+    cloth: SewnCloth, start: FloatArray, body: Body | ThinBody, *, fixed: BoolArray | None = None
+) -> FloatArray:
+    """Draw sewn cloth together around a body, nearly without strain.
+
+    Args:
+        cloth: the sewn cloth.
+        start: #V by 3, where its vertices are [m].
+        body: what it stays outside of; a thin one grows.
+        fixed: #V, the vertices that stay there.
+
+    Returns:
+        #V by 3 [m].
+    """
+    derivative, stiffness = _derivative(cloth)
+    membrane = derivative.T @ diags_array(stiffness) @ derivative
+    hold = membrane.diagonal().mean()
+    # Bending is the squared Laplacian at inner vertices, scaled by the mesh so that it weighs as the membrane does.
+    laplacian, of_vertex = cloth.laplacian()
+    area = cloth.vertex_areas()
+    inner = np.where(of_vertex > 0.0, area.mean() / np.maximum(area, 0.2 * area.mean()), 0.0)
+    whole = membrane + _BEND * (laplacian.T @ diags_array(inner) @ laplacian)
+    gather, grow = (_GATHER, _GROW) if isinstance(body, ThinBody) else (0, 0)
+    stays = np.zeros(len(start), bool) if fixed is None else fixed
+    x, touching, solve = start.copy(), np.zeros(len(start), bool), None
+    for number in range(gather + grow + _SETTLE):
+        if isinstance(body, ThinBody) and number <= gather + grow:
+            body.grow(float(np.clip((number - gather) / grow, 0.0, 1.0)))
+        centre, normal = body.nearest(x)
+        depth = np.einsum("ij,ij->i", x - centre, normal)
+        near = (depth < _OFF) & (np.linalg.norm(x - centre, axis=1) < _REACH)
+        if solve is None or number % _RENEWED == 0 or (near & ~touching).sum() > _NEW_CONTACT * len(x):
+            touching = near
+            pull = hold * (_INERTIA + _HOLD * touching + _STAY * stays)
+            solve = factor_symmetric(whole + diags_array(pull))
+        target = np.where((near & touching)[:, None], x + (_OFF - depth)[:, None] * normal, x)
+        if grow:
+            target[:, 1] += (
+                _KEEP * (start[:, 1] - x[:, 1]) * (number < gather + grow) - _FALL * (number >= gather // 2) * ~near
+            )
+        target[stays] = start[stays]
+        turned = _nearest_isometries((derivative @ x).reshape(-1, 2, 3))
+        x = solve(derivative.T @ (stiffness[:, None] * turned.reshape(-1, 3)) + pull[:, None] * target)
+    return x
+
+
+def stretches(cloth: SewnCloth, positions: FloatArray) -> FloatArray:
+    """Return #C, how much the more stretched thread of each cell is longer than in the flat pattern, as a share."""
+    frames = (_derivative(cloth)[0] @ positions).reshape(-1, 2, 3)
+    return np.asarray(np.linalg.norm(frames, axis=2).max(axis=1) - 1.0)
+
+
+def _derivative(cloth: SewnCloth) -> tuple[coo_array, FloatArray]:
+    """Return the derivative of the places along warp and weft in each cell (2 #C by #V), and the cells' areas, twice each (2 #C)."""
+    corner, _, gradient, area = cloth.cells()
+    along = gradient.reshape(-1, 2, 2)
+    weights = np.concatenate([-along.sum(axis=1, keepdims=True), along], axis=1)  # cell, corner, direction
+    rows = np.arange(2 * len(corner)).reshape(-1, 1, 2)
+    places = (np.broadcast_to(rows, weights.shape).ravel(), np.repeat(corner.ravel(), 2))
+    return coo_array((weights.ravel(), places), shape=(2 * len(corner), len(cloth.designed))).tocsr(), np.repeat(
+        area, 2
+    )
+
+
+def _nearest_isometries(frames: FloatArray) -> FloatArray:
+    """Return the pairs of orthonormal rows nearest to pairs of rows F (#C by 2 by 3): (F F^T)^(-1/2) F, in closed form."""
+    square = np.einsum("cik,cjk->cij", frames, frames)
+    square[:, [0, 1], [0, 1]] += 1e-12
+    root = np.sqrt(square[:, 0, 0] * square[:, 1, 1] - square[:, 0, 1] ** 2)
+    root = np.maximum(root, 1e-12)[:, None, None] * np.eye(2)
+    # The square root of a symmetric 2 by 2 matrix C is (C + sqrt(det C) I) / sqrt(tr C + 2 sqrt(det C)).
+    middle = (square + root) / np.sqrt(np.trace(square + root, axis1=1, axis2=2))[:, None, None]
+    return np.asarray(np.linalg.solve(middle, frames))

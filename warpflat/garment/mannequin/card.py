@@ -1,0 +1,183 @@
+"""A measurement card: which measurements a garment needs, how each is taken, and a picture of where."""
+
+from __future__ import annotations
+
+import os
+import textwrap
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.patches import Circle
+
+from warpflat.core.arrays import IntArray
+from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
+from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
+from warpflat.pattern.export.figure import GREY, Pen, new_figure, write_figure
+from warpflat.pattern.export.letters import all_letters
+from warpflat.pattern.export.picture_views import DrawnView, make_facets, view_from_side
+
+if TYPE_CHECKING:
+    from warpflat.garment.mannequin.mannequin import Mannequin
+
+__all__ = ["needed_measurements", "write_measurement_card"]
+
+#: By measurement how it is taken, in the order in which one measures.
+_HOW: Mapping[str, str] = {
+    "stature": "standing height without shoes, from the floor to the crown",
+    "head": "around the forehead and the back of the head, where it is widest",
+    "neck": "around the base of the neck, where a necklace lies",
+    "shoulder": "from the base of the neck to the shoulder's end, one side",
+    "bust": "around the fullest part of the chest, level all around",
+    "underbust": "around the ribs, right below the bust",
+    "bust_points": "from one bust point to the other",
+    "chest_width": "in front, from armhole crease to armhole crease",
+    "back_width": "behind, from armhole crease to armhole crease",
+    "armscye_depth": "behind, from the nape straight down to the level of the armpits",
+    "nape_to_waist": "behind, from the nape down the middle of the back to the waist",
+    "waist": "around the narrowest part; tie a string there for the other measurements",
+    "abdomen": "around the belly, half-way from waist to hip",
+    "hip": "around the widest part of the seat, level all around",
+    "upper_arm": "around the upper arm, where it is widest",
+    "elbow": "around the bent elbow",
+    "wrist": "around the wrist bone",
+    "hand": "around the knuckles, with the thumb laid in",
+    "arm_length": "from the shoulder's end over the elbow to the wrist bone, the arm a little bent",
+    "inside_leg": "from the crotch straight down to the floor",
+    "thigh_girth": "around one thigh, right below the crotch",
+    "knee_girth": "around one knee",
+    "calf_girth": "around one calf, where it is widest",
+    "ankle_girth": "around one ankle, above the bone",
+    "foot": "around heel and instep",
+}
+#: By measurement the line of the body on which it lies; lengths run between two heights of a line.
+_LINES = {
+    "neck": "neck", "shoulder": "shoulder left", "bust": "bust", "underbust": "underbust", "chest_width": "chest front",
+    "back_width": "chest back", "waist": "waist", "abdomen": "abdomen", "hip": "hip", "upper_arm": "biceps left",
+    "elbow": "elbow left", "wrist": "wrist left", "arm_length": "overarm left", "inside_leg": "inseam left",
+    "thigh_girth": "thigh left", "knee_girth": "knee left", "calf_girth": "calf left", "ankle_girth": "ankle left",
+}  # fmt: skip
+_BEHIND = ("back_width", "armscye_depth", "nape_to_waist")
+_PAGE = (8.27, 11.69)  # [in], A4
+_BODY, _LINE = (0.93, 0.90, 0.84), "#9c1f30"
+_HEIGHT, _TOP = 5.0, 10.75  # of the figures, and where they begin [in]
+
+
+def needed_measurements(bands: Collection[tuple[str, str]], *, hood: bool = False) -> list[str]:
+    """Return the measurements on which a garment depends, in the order in which one measures.
+
+    Args:
+        bands: upper and lower level of its parts, as ("shoulder", "hip").
+        hood: whether it has one.
+    """
+    found = {"stature"}
+    for upper, lower in bands:
+        if upper in TRUNK_LEVELS:
+            covered = TRUNK_LEVELS[TRUNK_LEVELS.index(upper) : TRUNK_LEVELS.index(lower) + 1]
+            found |= set(covered) & {"bust", "underbust", "waist", "abdomen", "hip"}
+            found |= {"hip"} if set(covered) & {"thigh", "knee", "ankle"} else set()
+            if upper == "shoulder":
+                found |= {
+                    "head",
+                    "neck",
+                    "shoulder",
+                    "bust_points",
+                    "chest_width",
+                    "back_width",
+                    "armscye_depth",
+                    "nape_to_waist",
+                }
+        elif upper in ARM_LEVELS:
+            covered = ARM_LEVELS[: ARM_LEVELS.index(lower) + 1]
+            found |= {"upper_arm", "arm_length"} | ({"elbow"} if "elbow" in covered else set())
+            found |= {"wrist", "hand"} if "forearm" in covered else set()
+        elif upper in LEG_LEVELS:
+            covered = LEG_LEVELS[: LEG_LEVELS.index(lower) + 1]
+            found |= {"hip", "inside_leg", "thigh_girth"}
+            for level in ("knee", "calf", "ankle"):
+                found |= {f"{level}_girth"} if f"leg_{level}" in covered else set()
+            found |= {"foot"} if "leg_ankle" in covered else set()
+    found |= {"head"} if hood else set()
+    return [name for name in _HOW if name in found]
+
+
+@all_letters()
+def write_measurement_card(
+    path: str | os.PathLike[str],
+    mannequin: Mannequin,
+    needed: Collection[str],
+    *,
+    title: str,
+    values: Mapping[str, float] | None = None,
+    guessed: Collection[str] = (),
+) -> None:
+    """Draw a page of A4: the body from the front and from behind with the tapes on it, and a row for each measurement.
+
+    Args:
+        path: the file, ``*.png``.
+        mannequin: whose picture it is.
+        needed: measurements.
+        title: of the page.
+        values: what is known [m]; a row without one has a line to write on.
+        guessed: of the values those that nobody gave.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    figure = new_figure(*_PAGE)
+    pen = Pen(figure)
+    pen.open_page()
+    pen.write(0.5, 11.3, title, 15, fontweight="bold")
+    pen.write(0.5, 11.03, "Measure over underwear, the tape snug and level, standing upright.", 9.5, color=GREY)
+    number = {name: k for k, name in enumerate(needed, start=1)}
+    faces = mannequin.layout.body_faces
+    facets = make_facets(faces, np.empty((0, 2), dtype=np.int32))
+    for middle, degrees, names in (
+        (2.20, 0.0, [name for name in needed if name not in _BEHIND]),
+        (6.07, 180.0, [name for name in needed if name in _BEHIND]),
+    ):
+        view = view_from_side(mannequin.vertices, facets, degrees)
+        scale = _HEIGHT / float(view.size[1])
+        drawn = DrawnView(
+            view, left=middle - 0.5 * float(view.size[0]) * scale, bottom=_TOP - _HEIGHT, inches_per_metre=scale
+        )
+        drawn.draw(pen.axes, np.tile(_BODY, (len(faces), 1)))
+        tapes = {name: drawn.to_page(view.points[ids]) for name in names if (ids := _tape(mannequin, name)) is not None}
+        for line in tapes.values():
+            pen.line(line, width=1.6, colour=_LINE, halo=True)
+        for name, line in tapes.items():
+            # A number lies on its tape: in the middle of a girth, half-way along a length.
+            closed = np.allclose(line[0], line[-1])
+            x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[len(line) // 2]
+            badge = Circle((float(x), float(y)), 0.10, facecolor="white", edgecolor=_LINE, linewidth=0.9, zorder=7)
+            pen.axes.add_patch(badge)
+            pen.write(float(x), float(y) - 0.01, str(number[name]), 8, fontweight="bold", color=_LINE, ha="center")
+    row = min(0.27, 5.1 / max(len(number), 1))
+    y = _TOP - _HEIGHT - 0.35
+    for name, k in number.items():
+        pen.write(0.62, y, str(k), 9.5, fontweight="bold", color=_LINE, ha="right")
+        pen.write(0.74, y, name.replace("_", " "), 9.5, fontweight="bold")
+        words = textwrap.shorten(_HOW[name], 86, placeholder=" …")
+        pen.write(1.95, y, words, 8.2, color=GREY)
+        if values is not None and name in values:
+            guess = " (guess)" if name in guessed else ""
+            pen.write(_PAGE[0] - 0.45, y, f"{100 * values[name]:.1f} cm{guess}", 9.5, ha="right")
+        else:
+            pen.line(np.array([(_PAGE[0] - 1.35, y - 0.08), (_PAGE[0] - 0.75, y - 0.08)]), width=0.7, colour=GREY)
+            pen.write(_PAGE[0] - 0.45, y, "cm", 9.5, ha="right")
+        y -= row
+    if guessed and values:
+        words = "A guess follows from the others by the size table: measure it yourself where you can."
+        pen.write(0.5, 0.28, words, 8.5, color=GREY, fontstyle="italic")
+    write_figure(path, figure)
+
+
+def _tape(mannequin: Mannequin, name: str) -> IntArray | None:
+    """Return the vertices along a tape; None where it lies on no line of the body."""
+    lines, at = mannequin.layout.lines, mannequin.vertices
+    if name in ("nape_to_waist", "armscye_depth"):
+        back, neck = lines["centre back"], float(at[lines["neck"], 1].max())
+        low = at[lines["waist"], 1].mean() if name == "nape_to_waist" else at[lines["underarm left"][0], 1]
+        kept = back[(at[back, 1] <= neck) & (at[back, 1] >= low - 1e-6)]
+        return kept if len(kept) > 1 else None
+    return lines[_LINES[name]] if name in _LINES else None

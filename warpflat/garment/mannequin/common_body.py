@@ -1,0 +1,175 @@
+"""One mesh for all bodies: the body model, fitted to each and laid on it, so that a vertex is the same place on every body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.mannequin.body_landmarks import model_places, near_level, value_at
+from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body
+from warpflat.garment.mannequin.fit_body import Mesh, fit_body
+from warpflat.garment.mannequin.fit_inside import fit_inside
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.read_body import read_body
+from warpflat.garment.mannequin.scan_levels import TRUNK
+from warpflat.garment.mannequin.scan_pose import ScanOptions
+from warpflat.garment.mannequin.stand_body import lay_on_scan
+
+__all__ = ["CommonBody", "common_body_inside", "common_body_of_mannequin", "common_body_of_scan", "skin_triangles"]
+
+
+# Levels that a mannequin and the model both have.
+_LEVELS = ("ankle", "knee", "hip", "waist", "underbust", "bust")
+# How far out an armhole's top and lowest place lie beside the model's, and how high the latter [m], of EU 38; and how far below the trunk
+# follows [m]; and how often they are moved.
+_BESIDE_ARM, _BELOW_ARM, _MOVES = (0.043, -0.010, -0.0045), 0.12, 2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CommonBody:
+    """A body as a mesh whose vertices are the same places on every body.
+
+    Attributes:
+        name: what it is called.
+        person: of the body model.
+        vertices: #V by 3 [m], the finer model's, laid on the body.
+        above: how far a level lies above the model's landmark of its name [m]; 0 of those left out.
+        turn, shift: points of the body's file come here as points @ turn + shift.
+        far: mean distance of the fitted model from the body [m].
+    """
+
+    name: str
+    person: Person
+    vertices: FloatArray
+    above: Mapping[str, float] = field(default_factory=dict)
+    turn: FloatArray = field(default_factory=lambda: np.eye(3))
+    shift: FloatArray = field(default_factory=lambda: np.zeros(3))
+    far: float = 0.0
+
+    def level(self, name: str) -> float:
+        """Return the height [m] of a level of the trunk: bust, underbust, waist or hip, where its mannequin has it."""
+        return _landmark(name, self.vertices) + self.above.get(name, 0.0)
+
+    def in_pose_of(self, other: CommonBody) -> CommonBody:
+        """Return this body as it stands where another one does, and with its joints bent as the other's."""
+        model, finer = BodyModel.load(), finer_body()[0]
+        posed = replace(self.person, bend=other.person.bend, turn=other.person.turn, place=other.person.place)
+        vertices = model.rebend(self.person, posed, finer, self.vertices)
+        # It stands on the same floor.
+        down = np.array([0.0, float(other.vertices[:, 1].min() - vertices[:, 1].min()), 0.0])
+        return replace(
+            self,
+            person=replace(posed, place=posed.place + down),
+            vertices=vertices + down,
+            turn=other.turn,
+            shift=other.shift,
+        )
+
+
+def common_body_of_scan(
+    vertices: FloatArray, faces: NDArray[np.integer[Any]], *, name: str, options: ScanOptions | None = None
+) -> CommonBody:
+    """Return the body of a scan, in the scan's pose.
+
+    Args:
+        vertices: #V by 3, any unit. faces: #F by 3 or 4 (-1 in the last column for a triangle).
+        name: of the body.
+        options: what is known of the scan.
+
+    Raises:
+        InputError: it is no standing body with arms and legs.
+    """
+    read = read_body(np.asarray(vertices, float), np.asarray(faces, dtype=np.int64), options or ScanOptions())
+    turn, shift = read.placed
+    return CommonBody(
+        name=name,
+        person=read.laid.fit.person,
+        vertices=read.posed,
+        above={level: read.found[level].height - _landmark(level, read.body.vertices) for level in TRUNK},
+        turn=turn,
+        shift=shift,
+        far=read.laid.far,
+    )
+
+
+def _landmark(level: str, vertices: FloatArray) -> float:
+    return float(value_at(near_level(level), vertices[:, 1]))
+
+
+def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
+    """Return the body of a mannequin of a size or of measurements; head, hands and feet, which it lacks, are the model's."""
+    triangles = triangulate(np.asarray(mannequin.layout.faces))[0].astype(np.int64)
+    # Without head and feet the model would slide up or down.
+    levels = mannequin.levels()
+    fit = fit_body(mannequin.vertices, triangles, {name: levels[name].height for name in _LEVELS})
+    mesh, whole = Mesh(mannequin.vertices, triangles), np.zeros(len(triangles), dtype=bool)
+    vertices, _ = lay_on_scan(finer_body()[0] @ BodyModel.load().vertices(fit.person), mesh, whole)
+    # Laid on the mannequin its levels are some millimetres off: they go where the mannequin has them, and what lies between follows.
+    places, heights = model_places(), vertices[:, 1]
+    for _ in range(_MOVES):
+        arms = places.strips["arm left"] | places.strips["arm right"]
+        own = np.array(
+            [
+                np.mean([value_at(near_level(name, side), vertices[:, 1]) for side in ("left", "right")])
+                for name in _LEVELS
+            ]
+        )
+        move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
+        vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
+        vertices, _ = lay_on_scan(vertices, mesh, whole)
+        heights = vertices[:, 1]
+    # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them.
+    for _ in range(_MOVES):
+        vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh, whole)
+    far = float(fit.distance[np.isfinite(fit.distance)].mean())
+    return CommonBody(name=name, person=fit.person, vertices=vertices, far=far)
+
+
+def _towards_armholes(vertices: FloatArray, mannequin: Mannequin) -> FloatArray:
+    """Return the moves, #V by 3 [m], that bring the ends of shoulders sideways and underarms to where a mannequin has its armholes.
+
+    An armhole lies on the trunk, and the model's arm begins beside it, farther in at the top: as far as on a woman of EU 38. Arms go along
+    as they are; the trunk follows the more, the farther out it is, down to a hand's length below the underarm.
+    """
+    places, triangles = model_places(), finer_body()[1]
+    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    move = np.zeros_like(vertices)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        arm = places.strips[f"arm {side}"]
+        across = ends[arm[ends[:, 0]] != arm[ends[:, 1]]]
+        hole, begins = mannequin.line(f"armhole {side}"), vertices[across].mean(axis=1)
+        (top, low), (from_top, from_low) = (
+            (row[row[:, 1].argmax()], row[row[:, 1].argmin()]) for row in (hole, begins)
+        )
+        at_top = np.array([top[0] - from_top[0] - sign * _BESIDE_ARM[0], 0.0, 0.0])
+        at_low = np.array([low[0] - from_low[0] - sign * _BESIDE_ARM[1], low[1] - from_low[1] - _BESIDE_ARM[2], 0.0])
+        height = (vertices[:, 1] - from_low[1]) / max(float(from_top[1] - from_low[1]), 1e-9)
+        out = np.clip(sign * vertices[:, 0] / abs(from_top[0]), 0.0, 1.0) ** 2
+        follows = out * np.clip(1.0 - (from_low[1] - vertices[:, 1]) / _BELOW_ARM, 0.0, 1.0)
+        follows[places.strips["leg left"] | places.strips["leg right"] | places.strips["head"]] = 0.0
+        follows[arm] = 1.0
+        follows[sign * vertices[:, 0] <= 0.0] = 0.0
+        move += follows[:, None] * (at_low + np.clip(height, 0.0, 1.0)[:, None] * (at_top - at_low))
+    return move
+
+
+def common_body_inside(vertices: FloatArray, triangles: NDArray[np.int64], *, name: str) -> CommonBody:
+    """Return the body that may wear a garment (#V by 3 [m], Y up, front +Z; #T by 3, outward)."""
+    fit = fit_inside(vertices, triangles)
+    model, finer = BodyModel.load(), finer_body()[0]
+    return CommonBody(name=name, person=fit.person, vertices=finer @ model.vertices(fit.person))
+
+
+@lru_cache(maxsize=1)
+def skin_triangles() -> NDArray[np.int64]:
+    """Return the triangles of the common mesh that cloth lies over: without head, hands and feet."""
+    finer, triangles = finer_body()
+    plain = finer @ BodyModel.load().detail.astype(float) < 0.5
+    return triangles[plain[triangles].all(axis=1)]

@@ -1,0 +1,251 @@
+"""The body model fitted to a scan: shape, pose and place by Gauss-Newton steps on closest points, in both directions.
+
+Each vertex of the body is drawn to the nearest place on the scan, along the scan's normal there, and each sample of the scan draws the
+nearest place of the body to itself. A landmark whose height is known is drawn there. A place counts less the farther it is away (Geman and
+McClure), and not at all where the two surfaces face different ways: so holes, hair, clothes, floors and missing hands do little. Small
+shapes and small bends are preferred.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.compile import launch_quietly
+from warpflat.flat.surface.normals import vertex_normals
+from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
+from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
+from warpflat.kernels.closest import find_closest
+
+__all__ = ["FittedBody", "Mesh", "fit_body"]
+
+# Points on the scan that draw the body to themselves.
+_SAMPLES = 2_500
+# Vertices of the body that are drawn while starts are compared.
+_FEW = 900
+# Surfaces face the same way where their normals' product is larger than this.
+_ALIKE = 0.35
+# How much the scan's samples count against the body's vertices.
+_FROM_SCAN = 0.7
+# A step bends no joint by more than this [rad].
+_MOST_BEND = 0.35
+# One in so many vertices of head, hands and feet counts.
+_THIN = 4
+# How much the body's vertices count together, however many they are.
+_VERTICES = 2_600.0
+# How much a landmark of a known height counts against them: so much that the scan's surface, along which it slides, gives way.
+_LANDMARK = 3000.0
+# Stages of the starts: steps, weight of the preferences, distance [m] at which a place counts a quarter, whether shapes may
+# change, how many starts go on; and of the best one.
+_FIRST = ((2, 0.6, 0.12, False, 3), (3, 0.6, 0.12, True, 2), (3, 0.15, 0.06, True, 1))
+_LAST = ((8, 0.04, 0.03),)
+# Bends of the arms [rad] from which the fit starts, about the axis to the front: as the model stands, raised, hanging, overhead.
+_ARMS = (0.0, 0.5, -0.5, 0.9)
+# Bends [rad] about the axis to the left of hips and knees of a body that sits: on a chair, on a saddle.
+_SEATS = ((-1.5, 1.4), (-1.0, 1.2))
+
+
+class Mesh:
+    """A triangle mesh that answers for the nearest places on it.
+
+    Args:
+        vertices: #V by 3 [m].
+        triangles: #T by 3.
+    """
+
+    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64]) -> None:
+        self.vertices, self.triangles = vertices, triangles
+        a, b, c = vertices[triangles].transpose(1, 0, 2)
+        cross = np.cross(b - a, c - a)
+        self.area = 0.5 * np.linalg.norm(cross, axis=1)
+        self.normals = cross / np.maximum(2.0 * self.area, 1e-300)[:, None]
+        self._mesh = wp.Mesh(
+            points=wp.array(vertices, dtype=wp.vec3, device="cpu"),
+            indices=wp.array(triangles.ravel(), dtype=wp.int32, device="cpu"),
+        )
+
+    def closest(self, points: FloatArray, reach: float = 1e6) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+        """Return the nearest triangle of each point (#P; -1 where none is within reach [m]), weights (#P by 3), and place (#P by 3 [m])."""
+        face = wp.empty(len(points), dtype=wp.int32, device="cpu")
+        weight = wp.empty(len(points), dtype=wp.vec3, device="cpu")
+        given = [self._mesh.id, wp.array(points, dtype=wp.vec3, device="cpu"), float(reach)]
+        launch_quietly(find_closest, dim=len(points), inputs=given, outputs=[face, weight], device="cpu")
+        found, share = face.numpy().astype(np.int64), weight.numpy().astype(np.float64)
+        return found, share, np.einsum("pk,pka->pa", share, self.vertices[self.triangles[found]])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FittedBody:
+    """The end of a fit.
+
+    Attributes:
+        person: the body.
+        distance: #V, from each vertex of the body to the scan [m]; infinite where the scan has nothing that faces the same way.
+        cost: mean robust distance both ways [m], by which starts are compared.
+    """
+
+    person: Person
+    distance: FloatArray
+    cost: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scan:
+    mesh: Mesh
+    points: FloatArray
+    normals: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Known:
+    """Landmarks of known heights: the vertices that show them, #L by #V how much each counts, and the heights [m], #L."""
+
+    model: BodyModel
+    weights: FloatArray
+    heights: FloatArray
+
+
+def fit_body(
+    vertices: FloatArray,
+    triangles: NDArray[np.int64],
+    landmarks: Mapping[str, float] | None = None,
+    *,
+    sits: bool = False,
+) -> FittedBody:
+    """Fit the body model to a scan that stands upright, or sits, facing +Z.
+
+    Args:
+        vertices: #V by 3 [m], Y up.
+        triangles: #T by 3, their normals outward.
+        landmarks: known heights [m] of landmarks by name; one that is no place of the model says nothing.
+        sits: whether it sits.
+    """
+    model, mesh = BodyModel.load(), Mesh(vertices, triangles)
+    rng = np.random.default_rng(0)
+    face = rng.choice(len(triangles), _SAMPLES, p=mesh.area / mesh.area.sum())
+    share = rng.dirichlet([1.0, 1.0, 1.0], _SAMPLES)
+    scan = _Scan(
+        mesh=mesh, points=np.einsum("pk,pka->pa", share, vertices[triangles[face]]), normals=mesh.normals[face]
+    )
+    # Head, hands and feet count less: hair, shoes and fingers differ from the model's.
+    plain = np.concatenate([np.flatnonzero(~model.detail), np.flatnonzero(model.detail)[::_THIN]])
+    normals = vertex_normals(model.mean[: model.count], model.triangles)
+    few = plain[:: max(1, len(plain) // _FEW)]
+    coarse, fine = model.only(few), model.only(plain)
+    heights = {name: height for name, height in (landmarks or {}).items() if name in PLACES}
+    given = np.array([height_weights(name) for name in heights]).reshape(-1, model.count)
+    used = np.flatnonzero(given.any(axis=0))
+    known = _Known(model=model.only(used), weights=given[:, used], heights=np.array([*heights.values()]))
+    seats = _SEATS if sits else ((0.0, 0.0),)
+    started = [(_start(model, vertices, arms, seat), np.inf) for seat in seats for arms in _ARMS]
+    for steps, preference, reach, shapes, keep in _FIRST:
+        for i, (person, cost) in enumerate(started):
+            for _ in range(steps):
+                person, cost = _step(
+                    coarse, normals[few], scan, known, person, preference, reach, shapes=shapes, sits=sits
+                )
+            started[i] = person, cost
+        started = sorted(started, key=lambda each: each[1])[:keep]
+    person, cost = started[0]
+    for steps, preference, reach in _LAST:
+        for _ in range(steps):
+            person, cost = _step(fine, normals[plain], scan, known, person, preference, reach, shapes=True, sits=sits)
+    posed = model.vertices(person)
+    found, _, place = mesh.closest(posed)
+    alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals[found]) > _ALIKE
+    distance = np.where(alike, np.linalg.norm(posed - place, axis=1), np.inf)
+    return FittedBody(person=person, distance=distance, cost=cost)
+
+
+def _start(model: BodyModel, vertices: FloatArray, arms: float, seat: tuple[float, float]) -> Person:
+    """Return the mean body, as tall as the scan and in its place, with its arms, and its hips and knees, bent [rad]."""
+    bend = np.zeros((len(model.joints), 3))
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        bend[model.joints.index(f"upperarm01.{side}"), 2] = sign * arms
+        for joint, angle in zip(("upperleg01", "lowerleg01"), seat, strict=True):
+            bend[model.joints.index(f"{joint}.{side}"), 0] = angle
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    height = high[1] - low[1]
+    person = Person(
+        shape=np.zeros(len(model.shapes)), bend=rotation(bend), turn=np.eye(3), scale=1.0, place=np.zeros(3)
+    )
+    person = replace(person, scale=float(height / np.ptp(model.vertices(person)[:, 1])))
+    posed = model.vertices(person)
+    place = np.array([
+        0.5 * (low[0] + high[0]) - 0.5 * (posed[:, 0].min() + posed[:, 0].max()),
+        low[1] - posed[:, 1].min(),
+        # Arms and feet may reach anywhere, but the knees of a body that sits are before its trunk.
+        np.median(vertices[:, 2]) - np.median(posed[:, 2])
+        if seat == (0.0, 0.0)
+        else 0.5 * (low[2] + high[2]) - 0.5 * (posed[:, 2].min() + posed[:, 2].max()),
+    ])  # fmt: skip
+    return replace(person, place=place)
+
+
+def _step(
+    model: BodyModel,
+    normals: FloatArray,
+    scan: _Scan,
+    known: _Known,
+    person: Person,
+    preference: float,
+    reach: float,
+    *,
+    shapes: bool,
+    sits: bool,
+) -> tuple[Person, float]:
+    """Take one Gauss-Newton step; return the person after it and the cost before it.
+
+    Both directions pull at vertices of the body along normals of the scan: they add up to a 3 by 3 matrix at each vertex.
+    """
+    from scipy.spatial import cKDTree
+
+    posed, jacobian = model.jacobian(person)
+    turned = model.turned(person, normals)
+    found, _, place = scan.mesh.closest(posed)
+    _, near = cKDTree(posed).query(scan.points)
+    hit = np.concatenate([np.arange(model.count), near])
+    directions = np.concatenate([scan.mesh.normals[found], scan.normals])
+    away = posed[hit] - np.concatenate([place, scan.points])
+    alike = np.einsum("pa,pa->p", turned[hit], directions) > _ALIKE
+    squared = np.einsum("pa,pa->p", away, away) / reach**2
+    weight = np.where(alike, 1.0 / (1.0 + squared) ** 2, 0.0)
+    weight *= np.repeat([_VERTICES / model.count, _FROM_SCAN], [model.count, len(near)])
+    residual = np.einsum("pa,pa->p", away, directions)
+    pulls = weight[:, None, None] * directions[:, :, None] * directions[:, None, :]
+    pull = np.stack([np.bincount(hit, each, model.count) for each in pulls.reshape(-1, 9).T], axis=1).reshape(-1, 3, 3)
+    push = np.stack([np.bincount(hit, (weight * residual) * each, model.count) for each in directions.T], axis=1)
+    flat = jacobian.reshape(3 * model.count, -1)
+    matrix = flat.T @ np.matmul(pull, jacobian).reshape(flat.shape)
+    gradient = flat.T @ push.ravel()
+    if len(known.heights):
+        at, moved = known.model.jacobian(person)
+        rows = known.weights @ moved[:, 1]
+        matrix += _LANDMARK * rows.T @ rows
+        gradient += _LANDMARK * rows.T @ (known.weights @ at[:, 1] - known.heights)
+    count, joints = len(model.shapes), len(model.joints)
+    stiffness = np.zeros(len(gradient))
+    stiffness[:count] = 0.05 * preference
+    bends = np.full((joints, 3), 0.3 * preference + 0.02)
+    for joint, name in enumerate(model.joints):
+        bends[joint] += 1.0 if name == "spine03" else 0.5 if name.startswith(("clavicle", "lowerleg")) else 0.0
+        if sits and name.startswith(("upperleg", "lowerleg")):
+            bends[joint] = 0.0
+    stiffness[count : count + 3 * joints] = bends.ravel()
+    value = np.zeros(len(gradient))
+    value[: count + 3 * joints] = model.departures(person)
+    matrix[np.diag_indices_from(matrix)] += stiffness + 1e-6
+    gradient += stiffness * value
+    free = np.arange(len(gradient)) >= (0 if shapes else count)
+    step = np.zeros(len(gradient))
+    step[free] = np.linalg.solve(matrix[np.ix_(free, free)], -gradient[free])
+    bent = np.abs(step[count : count + 3 * joints]).max()
+    step *= min(1.0, _MOST_BEND / max(bent, 1e-9))
+    body = slice(0, model.count)
+    mean = float(np.sqrt((weight[body] * residual[body] ** 2).sum() / max(weight[body].sum(), 1e-9)))
+    return model.moved(person, step), mean + 0.02 * float(1.0 - alike[body].mean())

@@ -1,0 +1,138 @@
+"""Seams of a form: stretches of edges that two pieces share on the mannequin."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpflat.core.arrays import IntArray
+from warpflat.garment.mannequin.pieces import FormPiece
+from warpflat.garment.mannequin.seam_names import name_seams
+
+__all__ = ["FormSeam", "SeamRun", "find_seams"]
+
+#: A segment of an edge: names of piece and edge, and the segment's number in it.
+_Place = tuple[str, str, int]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeamRun:
+    """A stretch of a seam along one edge on each side.
+
+    Attributes:
+        edges: names of the two edges.
+        vertices: vertex indices of the two pieces along the stretch, in corresponding order.
+    """
+
+    edges: tuple[str, str]
+    vertices: tuple[IntArray, IntArray]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FormSeam:
+    """Two edges (or parts of edges) that are sewn together: the same curve in space.
+
+    Attributes:
+        name: after the feature line, and where others are called so, the pieces: see `seam_names.name_seams`.
+        pieces: names of the two pieces; the same twice where one piece is sewn to itself.
+        edges: names of the two whole edges, as they are called without darts.
+        runs: the stretches of the seam in their order; one, unless darts interrupt it.
+    """
+
+    name: str
+    pieces: tuple[str, str]
+    edges: tuple[str, str]
+    runs: tuple[SeamRun, ...]
+
+
+def find_seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
+    """Return the seams between pieces, and of pieces with themselves.
+
+    A seam that darts interrupt is one seam of several runs. The legs of darts belong to none.
+    """
+    found: dict[tuple[str, str, str, str], list[SeamRun]] = {}
+    for names, run in _runs(pieces):
+        whole = [pieces[name].parts.get(edge, edge) for name, edge in zip(names, run.edges, strict=True)]
+        found.setdefault((names[0], names[1], whole[0], whole[1]), []).append(run)
+    rows = [(sides, tuple(chain)) for sides, runs in found.items() for chain in _chains(pieces[sides[0]], runs)]
+    called = name_seams(
+        [re.sub(r" \d+$", "", edge) for (_, _, edge, _), _ in rows],
+        [(first, second) for (first, second, _, _), _ in rows],
+        [pieces[first].surface.vertices[np.concatenate([run.vertices[0] for run in chain])]
+         for (first, _, _, _), chain in rows],
+    )  # fmt: skip
+    return tuple(
+        FormSeam(name=name, pieces=(first, second), edges=(edge, other), runs=chain)
+        for name, ((first, second, edge, other), chain) in zip(called, rows, strict=True)
+    )
+
+
+def _chains(piece: FormPiece, runs: Sequence[SeamRun]) -> list[list[SeamRun]]:
+    """Join runs that follow each other on the mannequin; what lies between them is closed darts."""
+    ends = [[int(piece.grid_vertices[run.vertices[0][at]]) for at in (0, -1)] for run in runs]
+    follower = {start: number for number, (start, _) in enumerate(ends)}
+    later = {follower[end] for _, end in ends if end in follower}
+    chains: list[list[SeamRun]] = []
+    done: set[int] = set()
+    # A closed ring of runs has no first one: it begins anywhere.
+    for number in [*(n for n in range(len(runs)) if n not in later), *range(len(runs))]:
+        chain: list[SeamRun] = []
+        at: int | None = number
+        while at is not None and at not in done:
+            done.add(at)
+            chain.append(runs[at])
+            at = follower.get(ends[at][1])
+        if chain:
+            chains.append(chain)
+    return chains
+
+
+def _runs(pieces: Mapping[str, FormPiece]) -> list[tuple[tuple[str, str], SeamRun]]:
+    """Return the stretches along which one edge is sewn to one edge, with the names of the two pieces."""
+    places: dict[tuple[int, int], list[_Place]] = {}
+    for name, piece in pieces.items():
+        legs = {leg for dart in piece.darts.values() for leg in dart}
+        for edge, ids in piece.edges.items():
+            if edge in legs:
+                continue
+            for i, (a, b) in enumerate(itertools.pairwise(piece.grid_vertices[ids].tolist())):
+                places.setdefault((min(a, b), max(a, b)), []).append((name, edge, i))
+    # In the order of the first sides.
+    pairs = {sides[0]: sides[1] for sides in places.values() if len(sides) == 2}
+    found: list[tuple[tuple[str, str], SeamRun]] = []
+    row: list[tuple[_Place, _Place]] = []
+    for name, piece in pieces.items():
+        for edge, ids in piece.edges.items():
+            for i in range(len(ids) - 1):
+                here = (name, edge, i)
+                other = pairs.get(here)
+                # A run goes on while its segments follow each other along the same two edges.
+                last = row[-1] if row else None
+                goes_on = (
+                    last is not None
+                    and other is not None
+                    and (here[:2], other[:2]) == (last[0][:2], last[1][:2])
+                    and abs(other[2] - last[1][2]) == 1
+                )
+                if row and not goes_on:
+                    found.append(_run(pieces, row))
+                    row = []
+                if other is not None:
+                    row.append((here, other))
+    return [*found, _run(pieces, row)] if row else found
+
+
+def _run(pieces: Mapping[str, FormPiece], row: Sequence[tuple[_Place, _Place]]) -> tuple[tuple[str, str], SeamRun]:
+    (name, edge, _), (other_name, other_edge, _) = row[0]
+    sides = []
+    for piece, side in ((name, 0), (other_name, 1)):
+        at = [places[side][2] for places in row]
+        sides.append(pieces[piece].edges[row[0][side][1]][min(at) : max(at) + 2])
+    first, second = sides
+    if pieces[name].grid_vertices[first[0]] != pieces[other_name].grid_vertices[second[0]]:
+        second = second[::-1]
+    return (name, other_name), SeamRun(edges=(edge, other_edge), vertices=(first, second))

@@ -1,0 +1,324 @@
+"""Necklines wider and deeper than the neck base: the neck's row slides on the form's own surface, and its neighbours follow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
+from warpflat.flat.surface.normals import vertex_normals
+from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.layout import Layout
+from warpflat.garment.mannequin.sheet import sheet_laplacian
+
+__all__ = ["Neckline", "widen_neck"]
+
+# Upright sections of chest and back begin so far [m] above the lowest point across chest or back.
+_ABOVE = 0.015
+# The neckline behind goes off the base of the neck in steps of so much [m].
+_STEP = 0.004
+# How much more upright edges weigh than those across, as the rows below a neckline follow it; the first that folds nothing is taken.
+_ALONG_COLUMNS = (1.0, 4.0, 16.0, 64.0, 256.0)
+# Share of corners that may look aside: those of a scan do so in its hollows. Beside a V or a square any of them shows.
+_FOLDED = 0.002
+# A corner that was folded has this area [m2] of its parallelogram once it is turned back.
+_TURNED_BACK = 1e-5
+# Brought back to the surface some fold again; so many times at most they are turned back.
+_TURNS_BACK = 5
+# A neckline deeper than this [cm] may fold the cloth below it.
+_DEEP = 8.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neckline:
+    """How far a neckline lies from the base of the neck, along the form.
+
+    Attributes:
+        side_cm: along the shoulder seams [cm].
+        front_cm, back_cm: along the centre lines [cm].
+        side_share: what is added to `side_cm`, as a share of the shoulder seams.
+        front_share, back_share: what is added to `front_cm` and `back_cm`, as a share of the centre lines down to the bust.
+        front_power: of the superellipse in front: 2 is round, 1 a V, 6 nearly square.
+    """
+
+    side_cm: float = 0.0
+    front_cm: float = 0.0
+    back_cm: float = 0.0
+    side_share: float = 0.0
+    front_share: float = 0.0
+    back_share: float = 0.0
+    front_power: float = 2.0
+
+    @staticmethod
+    def ranges() -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest valid value of every number."""
+        return {
+            "side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0), "side_share": (0.0, 0.6),
+            "front_share": (0.0, 0.8), "back_share": (0.0, 0.8), "front_power": (1.0, 8.0),
+        }  # fmt: skip
+
+    def in_cm(self, layout: Layout, vertices: FloatArray) -> Neckline:
+        """Return the same neckline without shares.
+
+        Args:
+            layout, vertices: of the body or form (#V by 3 [m]) whose lines they are shares of.
+        """
+        side = np.mean([arc_lengths(vertices[layout.yokes[f"front-{each}"][-1]])[-1] for each in ("left", "right")])
+        # Down the patch, and on along the rings to the bust.
+        rings = layout.rings[layout.level_row["bust"] :]
+        front, back = (
+            arc_lengths(vertices[np.concatenate([row[:0:-1, row.shape[1] // 2], rings[::-1, column]])])[-1]
+            for row, column in ((layout.front, 0), (layout.back, rings.shape[1] // 2))
+        )
+        return Neckline(
+            side_cm=self.side_cm + self.side_share * 100.0 * float(side),
+            front_cm=self.front_cm + self.front_share * 100.0 * float(front),
+            back_cm=self.back_cm + self.back_share * 100.0 * float(back),
+            front_power=self.front_power,
+        )
+
+
+def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> FloatArray:
+    """Return a form's vertices (#V by 3 [m]) with the neck's row moved to a wider neckline on the same surface.
+
+    In front each half is a quarter of a superellipse from the centre line to the shoulder seam, in the plane into which the chest unrolls,
+    its upright sections side by side. Behind, the neckline lies beside the base of the neck. What lies between
+    it, the armholes and the bust follows smoothly.
+
+    Raises:
+        InputError: the neckline takes a whole shoulder seam, or is so deep that the cloth folds below it.
+    """
+    ids, laplacian, local = sheet_laplacian(layout, layout.level_row["bust"])
+    quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
+    surface = _Surface(vertices, quads)
+    out = vertices.copy()
+    neckline = neckline.in_cm(layout, vertices)
+    neck, seams, centres = layout.neck[0], [], []
+    for side in ("left", "right"):
+        seam = layout.yokes[f"front-{side}"][-1]
+        seams.append(seam if seam[0] in neck else seam[::-1])
+        # The seam begins later; its outer end stays.
+        points, start = vertices[seams[-1]], 0.01 * neckline.side_cm
+        at = arc_lengths(points)
+        if start > at[-1] - 0.02:
+            raise InputError(f"neckline: side_cm is {100 * start:g}, but the shoulder is {100 * at[-1]:.1f} cm long")
+        out[seams[-1]] = points_at_lengths(points, start + (at[-1] - start) * at / at[-1])
+    for face, row, column, depth in (
+        ("front", layout.front, 0, neckline.front_cm),
+        ("back", layout.back, layout.rings.shape[1] // 2, neckline.back_cm),
+    ):
+        patches = [row, *(layout.yokes[f"{face}-{side}"] for side in ("left", "right"))]
+        half = _Surface(vertices, quads[np.isin(quads, np.concatenate([p.ravel() for p in patches])).all(axis=1)])
+        middle = row.shape[1] // 2
+        centres.append(np.concatenate([row[:0:-1, middle], layout.rings[::-1, column]]))
+        out[row[-1, middle]] = points_at_lengths(vertices[centres[-1]], [0.01 * depth])[0]
+        for seam in seams:
+            # The shorter part of the neck's closed row between the centre line and the seam.
+            first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (row[-1, middle], seam[0]))
+            parts = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
+            quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
+            share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
+            # There they become a quarter of the superellipse of that power.
+            centre, shoulder = out[quarter[0]], out[quarter[-1]]
+            if face == "back":
+                out[quarter] = half.beside(vertices[quarter], 0.01 * depth, 0.01 * neckline.side_cm, (centre, shoulder))
+                continue
+            power = neckline.front_power
+            level = float(half.vertices[:, 1].min()) + _ABOVE
+            turn = 0.5 * np.pi * share[1:-1]
+            if power != Neckline.front_power:
+                # A V and a square are not turned through evenly as they are walked along.
+                fine = np.linspace(0.0, 0.5 * np.pi, 513)
+                wide, high = abs(shoulder[0] - centre[0]), abs(shoulder[1] - centre[1])
+                walked = arc_lengths(
+                    np.column_stack([wide * np.sin(fine) ** (2.0 / power), -high * np.cos(fine) ** (2.0 / power)])
+                )
+                turn = np.interp(share[1:-1] * walked[-1], walked, fine)
+            across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
+            # Just beside the seams, so that the sections do not run along edges of the mesh.
+            sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
+            sections = [half.upright(float(x), level) for x in sides]
+            lengths = [arc_lengths(section) for section in sections]
+            low, high = (
+                float(np.interp(end[1], section[:, 1], length))
+                for end, section, length in ((centre, sections[0], lengths[0]), (shoulder, sections[-1], lengths[-1]))
+            )
+            wished = zip(sections[1:-1], low + (high - low) * up, strict=True)
+            on_sections = np.array([points_at_lengths(section, [length])[0] for section, length in wished])
+            out[quarter[1:-1]] = half.nearest(on_sections)
+    fixed = np.unique(
+        np.concatenate(
+            [neck, *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
+        )
+    )
+    moved = np.setdiff1d(ids, fixed)
+    # Smooth as far as that keeps every quad upright; below a deep neckline each column of the grid is drawn together by itself instead.
+    upright, best, fewest = _corners_upright(vertices, quads), out, quads.size + 1
+    few = (_FOLDED if neckline.front_power == Neckline.front_power else 0.0) * quads.size
+
+    def on_centres(placed: FloatArray) -> None:
+        """What lies on a centre line stays on it."""
+        for line in centres:
+            for vertex in np.intersect1d(line, moved):
+                placed[vertex] = nearest_on_polyline(placed[vertex], vertices[line])
+
+    for stiffness in _ALONG_COLUMNS:
+        placed = out.copy()
+        shift = _filled(out - vertices, ids, _along_columns(laplacian, vertices[ids], stiffness), local, fixed)
+        placed[moved] = surface.nearest(vertices[moved] + shift[moved])
+        on_centres(placed)
+        folded = int((upright & ~_corners_upright(placed, quads, along=vertices)).sum())
+        if folded < fewest:
+            best, fewest = placed, folded
+        if folded <= few:
+            break
+    # Where something is folded still, around the tip of a V or on the narrow shoulder of a scan, it is turned back by itself.
+    for _ in range(_TURNS_BACK):
+        if fewest <= few:
+            break
+        turned_back = best.copy()
+        turned_back[moved] = surface.nearest(_unfolded(best, quads, moved, vertices)[moved])
+        on_centres(turned_back)
+        folded = int((upright & ~_corners_upright(turned_back, quads, along=vertices)).sum())
+        if folded >= fewest:
+            break
+        best, fewest = turned_back, folded
+    # A round one that is not deep, as forms ask for by themselves, is drawn as well as it can be on anybody.
+    is_deep = max(neckline.front_cm, neckline.back_cm) > _DEEP or neckline.front_power != Neckline.front_power
+    if fewest > few and is_deep:
+        raise InputError("neckline: the cloth folds below it; make it less deep: a smaller front_cm or back_cm")
+    return best
+
+
+def _along_columns(laplacian: Any, points: FloatArray, stiffness: float) -> Any:
+    """Return an umbrella operator in which upright edges weigh more, by a stiffness that is 1 as it is."""
+    from scipy import sparse
+
+    if stiffness == 1.0:
+        return laplacian
+    pairs = (laplacian - sparse.diags(laplacian.diagonal())).tocoo()
+    edge = points[pairs.row] - points[pairs.col]
+    upright = edge[:, 1] ** 2 / (edge**2).sum(axis=1)
+    weights = sparse.coo_matrix((1.0 + (stiffness - 1.0) * upright, (pairs.row, pairs.col)), laplacian.shape).tocsr()
+    return weights - sparse.diags(np.asarray(weights.sum(axis=1)).ravel())
+
+
+def _corners_upright(points: FloatArray, quads: IntArray, along: FloatArray | None = None) -> BoolArray:
+    """Return whether every corner of every quad looks the way that the quad looks, or looked `along` (#F by 4)."""
+    corners = points[quads]
+    before = corners if along is None else along[quads]
+    normal = np.cross(before[:, 2] - before[:, 0], before[:, 3] - before[:, 1])
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    return np.asarray((np.cross(ahead, behind) * normal[:, None]).sum(axis=2) > 0.0)
+
+
+def _unfolded(points: FloatArray, quads: IntArray, moved: IntArray, along: FloatArray) -> FloatArray:
+    """Return points moved as little as it takes until every corner of every quad looks `along` as it did.
+
+    Least squares of what the area of each corner's parallelogram lacks; Escobar et al., Comput. Methods Appl. Mech. Eng. 192 (2003),
+    untangle so.
+    """
+    from scipy.optimize import minimize
+
+    before = along[quads]
+    normal = np.cross(before[:, 2] - before[:, 0], before[:, 3] - before[:, 1])
+    normal = (normal / np.linalg.norm(normal, axis=1)[:, None])[:, None]
+    out = points.copy()
+
+    def lacking(row: FloatArray) -> tuple[float, FloatArray]:
+        out[moved] = row.reshape(-1, 3)
+        corners = out[quads]
+        ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+        short = np.maximum(0.0, _TURNED_BACK - (np.cross(ahead, behind) * normal).sum(axis=2)) / _TURNED_BACK
+        pull = -2.0 * short[:, :, None] / _TURNED_BACK
+        to_ahead, to_behind = pull * np.cross(behind, normal), pull * np.cross(normal, ahead)
+        gradient = np.zeros_like(out)
+        np.add.at(gradient, np.roll(quads, -1, axis=1), to_ahead)
+        np.add.at(gradient, np.roll(quads, 1, axis=1), to_behind)
+        np.add.at(gradient, quads, -(to_ahead + to_behind))
+        return float((short**2).sum()), gradient[moved].ravel()
+
+    found = minimize(
+        lacking, points[moved].ravel(), jac=True, method="L-BFGS-B", options={"maxiter": 300, "ftol": 1e-12}
+    )
+    out[moved] = found.x.reshape(-1, 3)
+    return out
+
+
+class _Surface:
+    """A quad mesh that points are brought back to; four triangles around the middle of each quad keep mirror images alike."""
+
+    def __init__(self, vertices: FloatArray, quads: IntArray) -> None:
+        middles, self.quads = len(vertices) + np.arange(len(quads)), quads
+        self.vertices = np.vstack([vertices, vertices[quads].mean(axis=1)])
+        self.triangles = np.concatenate(
+            [np.column_stack([quads[:, [k, (k + 1) % 4]], middles]) for k in range(4)]
+        ).astype(np.int64)
+        self.closest = Closest(self.vertices, self.triangles)
+
+    def nearest(self, points: FloatArray) -> FloatArray:
+        """Return the nearest points of the surface (#P by 3 [m])."""
+        triangle, weights, _ = self.closest(points)
+        return np.asarray((self.vertices[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1))
+
+    def beside(self, line: FloatArray, first: float, last: float, ends: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return a line on the surface beside another one (#P by 3 [m]): square to it, so far [m] from its first and its last point.
+
+        Args:
+            line: on the surface; the new one lies on the side where the surface is.
+            first, last: distances [m]; in between they change as a sine squared.
+            ends: where the new line's ends lie.
+        """
+        count = max(1, math.ceil(max(first, last) / _STEP))
+        share = arc_lengths(line) / arc_lengths(line)[-1]
+        step = (first + (last - first) * np.sin(0.5 * np.pi * share) ** 2) / count
+        inner = self.vertices[self.triangles].mean(axis=(0, 1))
+        normals = vertex_normals(self.vertices[: -len(self.quads)], self.quads)
+        normals = np.vstack([normals, normals[self.quads].mean(axis=1)])
+        out = line
+        for _ in range(count):
+            triangle, weights, _ = self.closest(out)
+            normal = (normals[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1)
+            square = np.cross(normal, np.gradient(out, axis=0))
+            square /= np.linalg.norm(square, axis=1, keepdims=True)
+            square *= np.sign((square * (inner - out)).sum())
+            out = self.nearest(out + step[:, None] * square)
+        share = (arc_lengths(out) / arc_lengths(out)[-1])[:, None]
+        out = self.nearest(out + (1.0 - share) * (ends[0] - out[0]) + share * (ends[1] - out[-1]))
+        out[[0, -1]] = ends
+        return out
+
+    def upright(self, x: float, level: float) -> FloatArray:
+        """Return the section at `x` from the height `level` [m] up, #P by 3 from low to high."""
+        corner = self.vertices[self.triangles]
+        off = corner[:, :, 0] - x
+        ends = []
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            crossed = off[:, i] * off[:, j] < 0.0
+            share = (off[crossed, i] / (off[crossed, i] - off[crossed, j]))[:, None]
+            ends.append((1.0 - share) * corner[crossed, i] + share * corner[crossed, j])
+        line = np.concatenate(ends)
+        line = line[np.argsort(line[:, 1])]
+        return line[line[:, 1] > level]
+
+
+def _filled(
+    shift: FloatArray, ids: IntArray, laplacian: object, local: NDArray[np.int64], known: IntArray
+) -> FloatArray:
+    """Return the shift of a whole sheet, harmonic between the vertices whose shift is known."""
+    from scipy.sparse.linalg import spsolve
+
+    fixed = np.zeros(len(ids), dtype=bool)
+    fixed[local[known]] = True
+    operator = laplacian.tocsr()  # type: ignore[attr-defined]
+    free = np.flatnonzero(~fixed)
+    right = -(operator[free][:, fixed] @ shift[ids[fixed]])
+    out = shift.copy()
+    out[ids[free]] = spsolve(operator[free][:, free].tocsc(), right)
+    return out

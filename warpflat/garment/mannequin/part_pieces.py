@@ -1,0 +1,157 @@
+"""Pieces of a form are parted along whole feature lines, as by a princess seam."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.flat.surface.connectivity import join_labels
+from warpflat.garment.mannequin.bricks import select_bricks
+from warpflat.garment.mannequin.darts import FormDart, place_darts
+from warpflat.garment.mannequin.forms import Form, PieceRecipe
+from warpflat.garment.mannequin.halves import is_side
+from warpflat.garment.mannequin.layout import Layout
+
+__all__ = ["part_pieces", "princess_seams", "taken_over"]
+
+
+def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> Form:
+    """Part pieces along whole lines, and give their darts to the parts.
+
+    Darts along a parting line go: the seam takes what they took in. So do those that have no place in a part, as the bust
+    dart, whose point then lies on the border.
+
+    Args:
+        layout, vertices: of the body, #V by 3 [m].
+        form: whose pieces are parted.
+        seams: the cuts, each along a whole line.
+
+    Raises:
+        InputError: an unknown piece or line, or a line that does not part its piece.
+    """
+    lines: dict[str, list[str]] = {}
+    for seam in seams:
+        if seam.piece not in form.pieces:
+            raise InputError(f"seam {seam.name!r}: no piece {seam.piece!r}; {nearest(seam.piece, form.pieces)}")
+        if seam.line not in layout.lines:
+            raise InputError(f"seam {seam.name!r}: line {seam.line!r} is unknown: {nearest(seam.line, layout.lines)}")
+        images = (seam.line, _mirror_line(seam.line)) if seam.mirrored else (seam.line,)
+        lines.setdefault(seam.piece, []).extend(images)
+    pieces: dict[str, PieceRecipe] = {}
+    parts_of: dict[str, dict[str, PieceRecipe]] = {}
+    for name, recipe in form.pieces.items():
+        parts_of[name] = _parts(layout, vertices, name, recipe, lines[name]) if name in lines else {name: recipe}
+        pieces |= parts_of[name]
+    darts = []
+    for dart in form.darts:
+        if dart.piece not in lines:
+            darts.append(dart)
+        elif dart.line not in lines[dart.piece]:
+            # It goes on in the first part of its piece in which it has a place; without one it goes.
+            bricks = {name: select_bricks(layout, part.bricks) for name, part in parts_of[dart.piece].items()}
+            for name in bricks:
+                moved = replace(dart, piece=name)
+                try:
+                    place_darts(layout, vertices, bricks, [moved])
+                except InputError:
+                    continue
+                darts.append(moved)
+                break
+    return replace(form, pieces=pieces, darts=tuple(darts))
+
+
+def taken_over(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> list[FormDart]:
+    """Return the darts of a form that go when its pieces are parted: along a seam, or with no place in a part.
+
+    Args and errors as of :func:`part_pieces`.
+    """
+    left = {(dart.name, dart.line, dart.at) for dart in part_pieces(layout, vertices, form, seams).darts}
+    pieces = {seam.piece for seam in seams}
+    return [dart for dart in form.darts if dart.piece in pieces and (dart.name, dart.line, dart.at) not in left]
+
+
+def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[FormDart]:
+    """Return the cuts along whole princess lines that part a piece on both sides of the body.
+
+    Args:
+        layout: the grid.
+        bricks: of the piece, both sides of the body.
+        piece: its name.
+    """
+    lines = [f"princess {face} left" for face in ("front", "back")]
+    return [
+        FormDart(name="princess seam", piece=piece, line=line, part=(0.0, 1.0))
+        for line in lines
+        if len(set(_labels(layout, bricks, [line, _mirror_line(line)]).tolist())) > 1
+    ]
+
+
+def _mirror_line(line: str) -> str:
+    """Return the name of a line's mirror image."""
+    for side, other in (("left", "right"), ("right", "left")):
+        if line.endswith(f" {side}"):
+            return f"{line.removesuffix(side)}{other}"
+    return line
+
+
+def _parts(
+    layout: Layout, vertices: FloatArray, name: str, recipe: PieceRecipe, lines: Sequence[str]
+) -> dict[str, PieceRecipe]:
+    """Return the parts of a piece, named by where they lie.
+
+    Raises:
+        InputError: the lines do not part it.
+    """
+    bricks = select_bricks(layout, recipe.bricks)
+    label = _labels(layout, bricks, lines)
+    if len(set(label.tolist())) == 1:
+        raise InputError(
+            f"{' and '.join(repr(line) for line in lines)} do not part piece {name!r}; name lines that cross it"
+        )
+    groups = [[brick for brick, of in zip(bricks, label, strict=True) if of == part] for part in dict.fromkeys(label)]
+    found: dict[str, PieceRecipe] = {}
+    # Parts are named by where they lie to each other: centre and side_left, left and right, lower and upper.
+    sides = [
+        next((side for side in ("left", "right") if all(is_side(brick, side) for brick in part)), "") for part in groups
+    ]
+    centre = "" in sides and any(sides)
+    across = [("side_" + side if centre else side) if side else ("centre" if centre else "") for side in sides]
+    heights = [float(np.mean([vertices[layout.bricks[brick], 1].mean() for brick in part])) for part in groups]
+    names = []
+    for number, word in enumerate(across):
+        alike = sorted((k for k in range(len(across)) if across[k] == word), key=lambda k: heights[k])
+        at = alike.index(number)
+        place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
+        names.append("_".join(part for part in (word, place) if part))
+    for part, ending in zip(groups, names, strict=True):
+        bounds = _edges_of(layout, part)
+        through = [line for line in (recipe.datum, *lines) if line and _edges_along(layout, line) & bounds]
+        inner = [line for line in recipe.open if _edges_along(layout, line) & bounds]
+        found[f"{name}_{ending}"] = PieceRecipe(bricks=tuple(part), datum=(through or [""])[0], open=tuple(inner))
+    return found
+
+
+def _labels(layout: Layout, bricks: Sequence[str], lines: Sequence[str]) -> IntArray:
+    """Return for each brick the number of the part to which it belongs: neighbours are one part unless a line lies between."""
+    slits = set().union(*(_edges_along(layout, line) for line in lines))
+    edges = [_edges_of(layout, [brick]) - slits for brick in bricks]
+    links = [(i, k) for i in range(len(bricks)) for k in range(i) if edges[i] & edges[k]]
+    first, second = np.array(links, dtype=np.int32).reshape(-1, 2).T
+    return join_labels(len(bricks), first, second)
+
+
+def _edges_of(layout: Layout, bricks: Sequence[str]) -> set[tuple[int, int]]:
+    """Return the mesh edges of bricks."""
+    index = {brick: number for number, brick in enumerate(layout.bricks)}
+    corners = layout.faces[np.isin(layout.face_brick, [index[brick] for brick in bricks])]
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
+    return {(a, b) for a, b in ends.tolist()}
+
+
+def _edges_along(layout: Layout, line: str) -> set[tuple[int, int]]:
+    ids = layout.lines[line]
+    return {(min(a, b), max(a, b)) for a, b in zip(ids[:-1].tolist(), ids[1:].tolist(), strict=True)}

@@ -1,0 +1,436 @@
+"""Neck, shoulders, armholes, arms and legs of a scanned body, for the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, polyline_length, resample
+from warpflat.garment.mannequin.blueprint import ArmCurves, LegCurves, LegProfile, Profile, QuarterCurves
+from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS
+from warpflat.garment.mannequin.rays import ray_radii
+from warpflat.garment.mannequin.scan_sections import ArmSections, BodySections
+from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.garment.mannequin.table_legs import crotch_curve, profile_of_curve
+
+__all__ = ["leg_curves", "underarm_point", "upper_curves"]
+
+#: How far the armhole's plane leans outward from the armpit up.
+_LEAN = np.radians(9.0)
+# How far below the armpit the armhole ends, and how far outside the armpit it passes at the shoulder's height above it,
+# as shares of the stature.
+_DROP, _SHOULDER_HEIGHT = 0.016, 0.075
+# Down to this far above the armpit the armhole is the body's own section.
+_SCOOP = 0.012
+# The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew.
+_SHORTEST_SLEEVE = 0.087
+_HARMONICS = 5
+# Where an arm is sliced between biceps (0), elbow (1) and wrist (2): forearms swell below the elbow.
+_ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
+_NOTCH = 0.22
+# Rays around a leg, their harmonics that are kept, and how far they are smoothed along the leg [rows].
+_COUNT, _LEG_HARMONICS, _UP_SIGMA = 240, 16, 1.5
+# The outseam lies in the middle of what is within so much [m] of the outermost, smoothed along the leg [rows].
+_OUTERMOST, _OUTSEAM_SIGMA = 0.004, 6.0
+# Share of the crotch curve's length ahead of the crotch point.
+_POINT = 0.40
+
+
+def upper_curves(
+    body: BodySections,
+    levels: Mapping[str, float],
+    profile: Callable[[float], Profile],
+    underarms: Mapping[str, FloatArray],
+) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], FloatArray, float]:
+    """Return the curves of the quarters above the bust, those of the arms, the collar (#P by 3 [m]), and the neck base's length [m].
+
+    Args:
+        body: its sections.
+        levels: heights [m] of the levels.
+        profile: the trunk's profile at a height [m].
+        underarms: the left and the right armhole's lowest point (see :func:`underarm_point`).
+
+    Raises:
+        InputError: if the neck or an arm cannot be sliced.
+    """
+    slicer = body.slicer
+    neckline, collar = (np.roll(ring, -int(np.argmax(ring[:, 2])), axis=0) for ring in _neck(body, levels))
+    holes = {side: _armhole(body, side, underarms[side]) for side in ("left", "right")}
+    back = int(np.argmin(np.abs(neckline[:, 0]) + 10.0 * (neckline[:, 2] > neckline[:, 2].mean())))
+    bust = profile(levels["bust"])
+    quarters: dict[str, QuarterCurves] = {}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        around = neckline if sign > 0 else np.vstack([neckline[:1], neckline[:0:-1]])
+        end = back if sign > 0 else len(neckline) - back
+        corner = int(np.argmax(sign * around[: end + 1, 0]))
+        hole = holes[side]
+        tip = int(np.argmax(hole[:, 1]))
+        # The loop runs from the underarm forward: its first half is the front.
+        halves = {"front": hole[tip::-1], "back": np.vstack([hole[tip:], hole[:1]])}
+        seam = _shoulder(slicer, around[corner], hole[tip])
+        for face, line in (("front", around[: corner + 1]), ("back", around[corner : end + 1][::-1])):
+            curve = halves[face]
+            rise = (curve[:, 1] - curve[-1, 1]) / max(curve[0, 1] - curve[-1, 1], 1e-9)
+            s = arc_lengths(curve)
+            notch = int(np.argmin(np.abs(rise - _NOTCH)))
+            row = _row(slicer, curve[notch], face)
+            first = bust.curve[0 if face == "front" else len(bust.curve) // 2]
+            bottom = np.array([0.0, levels["bust"], first[1]])
+            quarters[f"{face}-{side}"] = QuarterCurves(
+                neckline=line, bend=0.52, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
+                centre=_centre(slicer, bottom, row[0], line[0], face),
+            )  # fmt: skip
+    arms = {side: _arm_curves(arm, holes[side]) for side, arm in body.arms.items()}
+    neck = polyline_length(neckline, closed=True)
+    return {name: quarters[name] for name in QUARTERS}, arms, collar, neck
+
+
+def _loop(
+    points: FloatArray,
+    origin: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    harmonics: int,
+    count: int = 360,
+    below: FloatArray | None = None,
+) -> FloatArray:
+    """Return a smooth closed curve around plane points: their hull, from direction `first` over `second`, #count by 3.
+
+    The curve starts at the point `below` if that is given.
+    """
+    from scipy.spatial import ConvexHull
+
+    flat = np.column_stack([(points - origin) @ first, (points - origin) @ second])
+    hull = flat[ConvexHull(flat).vertices]
+    middle = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
+    if below is not None:
+        middle[1] = (below - origin) @ second
+    corners = hull - middle
+    angle = np.arctan2(corners[:, 1], corners[:, 0]) % (2.0 * np.pi)
+    order = np.argsort(angle)
+    even = resample(corners[order], np.arange(720) / 720, closed=True)
+    even_angle = np.unwrap(np.arctan2(even[:, 1], even[:, 0]))
+    radius = np.linalg.norm(even, axis=1)
+    rays = np.arange(count) * 2.0 * np.pi / count
+    r = np.interp(rays, even_angle % (2.0 * np.pi), radius, period=2.0 * np.pi)
+    spectrum = np.fft.rfft(r)
+    spectrum[harmonics + 1 :] = 0.0
+    r = np.fft.irfft(spectrum, count)
+    plane = middle + np.column_stack([r * np.cos(rays), r * np.sin(rays)])
+    return np.asarray(origin + np.outer(plane[:, 0], first) + np.outer(plane[:, 1], second))
+
+
+def _neck(body: BodySections, levels: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
+    """Return neck base and collar, from the front over the left."""
+
+    def middle(height: float) -> FloatArray:
+        """Return z [m] of the scan in the midplane at a height."""
+        points = np.concatenate([p.points for p in body.scan.cut(np.array([0.0, 1.0, 0.0]), height)])
+        return np.asarray(points[np.abs(points[:, 0]) < 0.02 * body.stature, 2])
+
+    front = np.array([0.0, levels["front_neck"], middle(levels["front_neck"]).max()])
+    at_side = middle(levels["side_neck"])
+    side_z = 0.5 * float(at_side.min() + at_side.max())
+    slope = (levels["side_neck"] - front[1]) / max(front[2] - side_z, 0.02)
+    slope = float(np.clip(slope, 0.15, 0.65))
+    normal = np.array([0.0, 1.0, slope]) / np.hypot(1.0, slope)
+    ahead = np.array([0.0, -slope, 1.0]) / np.hypot(1.0, slope)
+    left = np.array([1.0, 0.0, 0.0])
+
+    def ring(lift: float) -> FloatArray:
+        parts = [p for p in body.scan.cut(normal, float(front @ normal) + lift)
+                 if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]  # fmt: skip
+        if not parts:
+            raise InputError(
+                f"scan: no neck at {front[1]:.2f} m above the floor; give front_neck and side_neck as landmarks"
+            )
+        part = max(parts, key=lambda p: p.length)
+        return _loop(part.points, part.points.mean(axis=0), ahead, left, _HARMONICS)
+
+    base = ring(0.004)
+    top = ring(0.035)
+    # A collar plane that meets the chin bulges: keep to a cylinder's growth.
+    wide = polyline_length(top, closed=True) / polyline_length(base, closed=True)
+    if wide > 1.02:
+        top = top.mean(axis=0) + (top - top.mean(axis=0)) * (0.95 / wide)
+    return base, top
+
+
+def underarm_point(body: BodySections, side: str, underbust: float) -> FloatArray:
+    """Return the lowest point of an armhole: on the trunk's side, 25 mm below the armpit on an adult.
+
+    As deep as a woven block needs it, and at least halfway from the underbust up; midway between the armhole's front and back.
+
+    Args:
+        body: its sections.
+        side: ``left`` or ``right``.
+        underbust: height of the underbust [m].
+
+    Raises:
+        InputError: if there is no armhole.
+    """
+    t, (_, armpit, z) = body.trunk, body.armpits[side]
+    sign = 1.0 if side == "left" else -1.0
+    height = max(armpit - _DROP * body.stature, 0.5 * (underbust + armpit))
+    ring = _hole_points(body, side, body.armpits[side], _LEAN, 0.004)
+    # Between the middle of the armhole and where the side seam comes from below.
+    middles = (
+        ring[:, 2].min() + ring[:, 2].max(),
+        np.interp(underbust, t.y, t.front) + np.interp(underbust, t.y, t.back),
+    )
+    z = 0.25 * float(sum(middles))
+    points = np.concatenate([p.points for p in body.slicer.cut(np.array([0.0, 1.0, 0.0]), height)])
+    reach = float(np.interp(height, t.y, t.left if sign > 0 else t.right))
+    beside = points[
+        (np.abs(points[:, 2] - z) < 0.006) & (sign * points[:, 0] > 0.0) & (sign * points[:, 0] < reach + 0.002)
+    ]
+    return np.array([sign * (float((sign * beside[:, 0]).max()) if len(beside) else reach), height, z])
+
+
+def _hole_points(body: BodySections, side: str, through: FloatArray, lean: float, outward: float) -> FloatArray:
+    """Return the part of the scan's section above `through` in the plane through it that leans `lean` outward.
+
+    Args:
+        body: its sections.
+        side: ``left`` or ``right``.
+        through: a point of the plane [m].
+        lean: of the plane, from plumb [radians].
+        outward: how far the plane is moved towards the arm [m].
+
+    Raises:
+        InputError: if there is none.
+    """
+    sign = 1.0 if side == "left" else -1.0
+    armpit = body.armpits[side][1]
+    normal = np.array([sign * np.cos(lean), -np.sin(lean), 0.0])
+    near = [
+        p.points[p.points[:, 1] > through[1] - 0.002]
+        for p in body.slicer.cut(normal, float(through @ normal) + outward)
+    ]
+    near = [
+        p for p in near if len(p) > 8 and armpit + 0.03 * body.stature < p[:, 1].max() < 0.95 * body.stature
+    ]  # fmt: skip
+    if not near:
+        raise InputError(f"scan: no {side} armhole above the armpit at {armpit:.2f} m; arms must stand off the body")
+    return max(near, key=len)
+
+
+def _armhole(body: BodySections, side: str, under: FloatArray) -> FloatArray:
+    """Return the closed armhole in the plane through the underarm point and the shoulder, from the underarm forward."""
+    sign = 1.0 if side == "left" else -1.0
+    x, armpit, _ = body.armpits[side]
+    # The plane passes the shoulder where one that leans `_LEAN` from the armpit would.
+    rise = _SHOULDER_HEIGHT * body.stature
+    lean = float(np.arctan2(sign * (x - under[0]) + rise * np.tan(_LEAN), rise + armpit - under[1]))
+    normal = np.array([sign * np.cos(lean), -np.sin(lean), 0.0])
+    up = np.array([sign * np.sin(lean), np.cos(lean), 0.0])
+    ring = _hole_points(body, side, under, lean, 0.001)
+    # From just above the armpit a quarter of an ellipse runs down to the underarm point, front and back.
+    level = armpit + _SCOOP * body.stature
+    points = [ring[ring[:, 1] > level]]
+    near = ring[np.abs(ring[:, 1] - level) < 0.005 * body.stature]
+    turn = np.linspace(0.0, 0.5 * np.pi, 24)[:, None]
+    for end in (near[np.argmin(near[:, 2])], near[np.argmax(near[:, 2])]):
+        across, down = np.array([0.0, 0.0, end[2] - under[2]]), (level - under[1]) / up[1] * up
+        points.append(under + 0.001 * normal + np.sin(turn) * across + (1.0 - np.cos(turn)) * down)
+    hole = _loop(np.concatenate(points), under, -up, np.array([0.0, 0.0, 1.0]), _HARMONICS, below=under)
+    # Few harmonics round the curve off below the underarm point, and tilt it there where that lies off the middle.
+    depth = ((hole[:, 1].max() - hole[:, 1]) / np.ptp(hole[:, 1]))[:, None] ** 2
+    way = hole[1] - hole[-1]
+    level = (hole[:, 2:] - hole[0, 2]) * (way @ up / way[2])
+    return np.asarray(hole + depth * (under - hole[0] - level * up))
+
+
+def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
+    """Return the seam from the side neck point to the shoulder point, on the scan's upper side."""
+    flat = tip - neck
+    normal = np.cross(flat, np.array([0.0, 1.0, 0.0]))
+    normal /= np.linalg.norm(normal)
+    t = np.linspace(0.0, 1.0, 40)
+    straight = neck + t[:, None] * flat
+    along = flat * np.array([1.0, 0.0, 1.0])
+    reach = float(np.linalg.norm(along))
+    along /= reach
+    points = np.concatenate([p.points for p in slicer.cut(normal, float(neck @ normal))] or [straight])
+    share = (points - neck) @ along / reach
+    line_y = neck[1] + share * flat[1]
+    keep = (share > 0.02) & (share < 0.98) & (np.abs(points[:, 1] - line_y) < 0.03)
+    if keep.sum() < 4:
+        return straight
+    order = np.argsort(share[keep])
+    lift = np.interp(t, share[keep][order], (points[:, 1] - line_y)[keep][order], left=0.0, right=0.0)
+    # A smooth arch through the scan's outline that keeps both ends.
+    fit = np.linalg.lstsq(np.column_stack([np.sin(np.pi * t), np.sin(2 * np.pi * t)]), lift, rcond=None)[0]
+    straight[:, 1] += fit[0] * np.sin(np.pi * t) + fit[1] * np.sin(2 * np.pi * t)
+    return straight
+
+
+def _row(slicer: Slicer, notch: FloatArray, face: str) -> FloatArray:
+    """Return the across-chest row on the scan, from the midplane to the armhole's notch."""
+    sign = 1.0 if face == "front" else -1.0
+    points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(notch[1]))])
+    side = np.sign(notch[0])
+    x = np.linspace(0.0, abs(notch[0]), 30)
+    width = x[1]
+    z = np.empty_like(x)
+    for i, at in enumerate(x):
+        near = points[np.abs(side * points[:, 0] - at) < width]
+        z[i] = sign * (sign * near[:, 2]).max() if len(near) else notch[2]
+    fit = np.polynomial.Polynomial.fit(x / x[-1], z - notch[2], 5)(x / x[-1])
+    z = notch[2] + fit - fit[-1] * (x / x[-1]) ** 3
+    return np.column_stack([side * x, np.full_like(x, notch[1]), z])
+
+
+def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArray, face: str) -> FloatArray:
+    """Return the centre line from the bust to the neckline on the scan."""
+    sign = 1.0 if face == "front" else -1.0
+    y = np.linspace(bottom[1], top[1], 24)
+    points = np.concatenate([p.points for p in slicer.cut(np.array([1.0, 0.0, 0.0]), 1e-4)])
+    z = np.interp(y, [bottom[1], chest[1], top[1]], [bottom[2], chest[2], top[2]])
+    for i in range(2, len(y) - 1):
+        near = points[np.abs(points[:, 1] - y[i]) < 0.006]
+        near = near[np.abs(near[:, 2] - z[i]) < 0.05]
+        if len(near):
+            z[i] = sign * (sign * near[:, 2]).max()
+    z[1:-1] = np.convolve(z, [0.25, 0.5, 0.25], mode="same")[1:-1]
+    return np.column_stack([np.zeros_like(y), y, z])
+
+
+def _arm_curves(arm: ArmSections, hole: FloatArray) -> ArmCurves:
+    """Return the curves at biceps, elbow and wrist; they turn with the arm and are not wrung against the armhole `hole`."""
+    top = hole[int(np.argmax(hole[:, 1]))]
+    axis = (arm.line[-1] - hole.mean(axis=0)) / np.linalg.norm(arm.line[-1] - hole.mean(axis=0))
+    beyond = max(float(point @ axis) for point in (hole[0], top)) + _SHORTEST_SLEEVE
+    biceps = float(np.clip(np.interp(beyond, arm.line @ axis, arm.s), arm.s[4], arm.elbow - 0.10 * arm.s[-1]))
+    places = sorted({0.0, 1.0, 2.0, *_ARM_PLACES})
+    along = np.interp(places, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
+    # From the armhole's lowest to its highest point, carried along the arm without a twist.
+    up = top - hole[0]
+    side = np.sign(hole[0, 0])
+    rings: dict[float, FloatArray] = {}
+    for place, s in zip(places, along, strict=True):
+        at, across = arm.frame(float(s))
+        up = up - across * float(across @ up)
+        up /= np.linalg.norm(up)
+        cut = arm.cut(at, across)
+        rings[place] = _loop(cut, cut.mean(axis=0), -up, side * np.cross(across, up), 4, 240)
+    return ArmCurves(
+        biceps=rings.pop(0.0), elbow=rings.pop(1.0), wrist=rings.pop(2.0), between=rings,
+    )  # fmt: skip
+
+
+def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) -> LegCurves:
+    """Return crotch curve and legs for the grid.
+
+    Args:
+        body: its sections.
+        levels: heights [m], the leg levels among them.
+        hip: the trunk's profile at the hip.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    legs = body.legs
+    crotch = _crotch(body, levels["hip"], hip)
+    point = float(resample(crotch, _POINT)[2])
+    thigh, knee = levels["leg_thigh"], levels["leg_knee"]
+    curves: dict[str, FloatArray] = {}
+    outseams: dict[str, FloatArray] = {}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        hulls = [hull * np.array([sign, 1.0]) for hull in legs.hulls[side]]
+        middle = gaussian_filter1d(np.array([0.5 * (h.min(axis=0) + h.max(axis=0)) for h in hulls]), 2.0, axis=0)
+        # Rays turn from the inside over the front: as those of a trunk that looks to the inside.
+        turned = [(h - m)[:, ::-1] * np.array([1.0, -1.0]) for h, m in zip(hulls, middle, strict=True)]
+        radii = np.stack([
+            ray_radii(h, np.zeros(2), _COUNT, float(y)) for h, y in zip(turned, legs.y, strict=True)
+        ])  # fmt: skip
+        radii = gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest")
+        spectrum = np.fft.rfft(radii, axis=1)
+        spectrum[:, _LEG_HARMONICS:] = 0.0
+        radii = np.fft.irfft(spectrum, _COUNT, axis=1)
+        rays = np.arange(_COUNT) * 2.0 * np.pi / _COUNT
+        outward = np.column_stack([-np.cos(rays), np.sin(rays)])
+        curves[side] = (radii[..., None] * outward + middle[:, None]) * np.array([sign, 1.0])
+        # The outer side is flat: the middle of what is outermost, smooth along the leg.
+        reach = sign * curves[side][..., 0]
+        outermost = np.maximum(reach - reach.max(axis=1, keepdims=True) + _OUTERMOST, 0.0)
+        places = (outermost * curves[side][..., 1]).sum(axis=1) / outermost.sum(axis=1)
+        foot = legs.y < levels["leg_ankle"]
+        places[foot] = places[~foot][0]
+        outseams[side] = gaussian_filter1d(places, _OUTSEAM_SIGMA, mode="nearest")
+
+    def profile(side: str, height: float) -> LegProfile:
+        at = float(np.clip(np.interp(height, legs.y, np.arange(len(legs.y))), 0.0, len(legs.y) - 1.001))
+        i, f = int(at), at - int(at)
+        curve = (1.0 - f) * curves[side][i] + f * curves[side][i + 1]
+        near = max(0.0, 1.0 - (thigh - height) / (thigh - knee))
+        # At the thigh the inseam stands below the crotch point, from the knee down on the leg's inside.
+        s = arc_lengths(curve, closed=True)
+        inside = np.arange(-_COUNT // 5, _COUNT // 5)
+        ahead = float(
+            np.interp(point, np.maximum.accumulate(curve[inside, 1]), s[inside % _COUNT] - s[-1] * (inside < 0))
+        )
+        share = near * float(np.clip(ahead / s[-1], -0.1, 0.1))
+        curve = resample(curve, share + np.arange(_COUNT) / _COUNT, closed=True)
+        girth = (1.0 - f) * legs.girths[side][i] + f * legs.girths[side][i + 1]
+        return profile_of_curve(
+            curve, float(girth), near, float((1.0 - f) * outseams[side][i] + f * outseams[side][i + 1])
+        )
+
+    heights = {level: levels[level] for level in LEG_LEVELS[1:]}
+    return LegCurves(
+        heights=heights, profile=profile, crotch=crotch, point=_POINT,
+        attract=_seat_attractor(body, thigh, levels["hip"], 0.5 * float(np.ptp(hip.curve[:, 0]))),
+    )  # fmt: skip
+
+
+def _seat_attractor(body: BodySections, low: float, high: float, half: float) -> Callable[[FloatArray], FloatArray]:
+    """Return the nearest place on seat and thighs for every point inside the body; points outside stay where they are.
+
+    Cloth bridges cleft and crotch, so nothing is drawn inwards.
+
+    Args:
+        body: its sections.
+        low, high: heights between which it is asked [m].
+        half: of the width at the hip [m]: what lies farther out than hip and thighs is a hand.
+    """
+    points, triangles, legs = body.vertices, body.slicer.triangles, body.legs
+    middle = points[triangles].mean(axis=1)
+    room = 0.06
+    # The thighs may be broader than the hip.
+    thighs = [hull for hulls in legs.hulls.values() for hull, y in zip(hulls, legs.y, strict=True) if y > low - room]
+    half = max(half, *(float(np.abs(hull[:, 0]).max()) for hull in thighs))
+    near = (middle[:, 1] > low - room) & (middle[:, 1] < high + room) & (np.abs(middle[:, 0]) < half + 0.01)
+    corners = points[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # A mesh whose faces turn inwards has a negative volume.
+    turn = np.sign(np.einsum("td,td->", normals, corners.mean(axis=1) - points.mean(axis=0)))
+    normals = turn * normals[near]
+    closest = Closest(points, triangles[near])
+
+    def attract(where: FloatArray) -> FloatArray:
+        triangle, weights, _ = closest(where)
+        way = np.einsum("nk,nkd->nd", weights, closest.corners[triangle]) - where
+        return where + np.where(np.einsum("nd,nd->n", way, normals[triangle])[:, None] > 0.0, way, 0.0)
+
+    return attract
+
+
+def _crotch(body: BodySections, hip: float, profile: Profile) -> FloatArray:
+    """Return the crotch curve: through air at the back, where cloth bridges the cleft, and nowhere inside the body."""
+    from scipy.spatial import ConvexHull
+
+    front, back = float(profile.curve[0, 1]), float(profile.curve[len(profile.curve) // 2, 1])
+    curve = crotch_curve(hip, body.lowest, front, back)
+    cut = np.concatenate([p.points for p in body.slicer.cut(np.array([1.0, 0.0, 0.0]), 1e-5)])
+    inside = (cut[:, 1] < hip) & (cut[:, 1] > body.lowest - 1e-6) & (cut[:, 2] < front) & (cut[:, 2] > back)
+    flat = np.concatenate([curve[:, [2, 1]], cut[inside][:, [2, 1]]])
+    hull = flat[ConvexHull(flat).vertices]
+    order = np.argsort(np.arctan2(hull[:, 1] - hip - 1e-4, hull[:, 0] - 0.5 * (front + back)))
+    hull = hull[order][::-1]
+    hull = np.roll(hull, -int(np.argmax(hull[:, 0])), axis=0)
+    line = resample(hull, np.linspace(0.0, 1.0, 200))
+    return np.column_stack([np.zeros(len(line)), line[:, 1], line[:, 0]])

@@ -1,0 +1,834 @@
+"""What a garment is: up, front and left, its plane of symmetry, its borders by role, and its kind.
+
+Borders tell most. Those that mirror each other beside the plane of symmetry are sleeves, armholes or legs; those in the plane are neck,
+waist and hem. Where the garment is a tube that forks, the shortest way between two borders runs through the fork: the armpit, the crotch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from warpflat.core.arrays import FloatArray
+from warpflat.flat.surface.connectivity import border_loops, components, euler_characteristic
+from warpflat.flat.surface.half_edges import mesh_edges
+from warpflat.garment.seams.cloth import Cloth, section
+from warpflat.garment.seams.fields import MirrorMap, Operators, mirror_map
+
+__all__ = [
+    "AXES",
+    "HOLE",
+    "ROLES",
+    "Anatomy",
+    "Border",
+    "Limb",
+    "averaged_limbs",
+    "axis_name",
+    "describe",
+    "find_anatomy",
+]
+
+Ids = NDArray[np.int64]
+Kind = Literal[
+    "top", "dress", "skirt", "trousers", "jumpsuit", "sleeve", "hat", "glove", "sock", "band", "closed", "other"
+]
+
+#: Directions by name.
+AXES = {sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[k] for k, letter in enumerate("xyz") for sign in "+-"}
+
+#: What borders are.
+ROLES = ("neck", "waist", "hem", "sleeve", "leg", "opening", "armhole", "hole", "border", "middle", "limb")
+
+# Lengths are shares of the square root of the area, unless they say otherwise.
+# A border shorter than this is a hole: a buttonhole, or a fault of the mesh.
+HOLE = 0.06
+# Two borders mirror each other if their middles do within this, and their lengths within this ratio.
+_PAIR, _PAIR_RATIO = 0.3, 1.7
+# A border whose middle is nearer to the plane of symmetry is in the middle.
+_BESIDE = 0.06
+# An opening in front reaches down by at least this share of the garment's height.
+_OPEN = 0.6
+# A sleeve shorter than this is an armhole with a facing.
+_SHORTEST_SLEEVE = 0.05
+# The way along sleeve and side bends at the armpit by at least this [cosine of the angle between both].
+_STRAIGHT = np.cos(np.radians(160.0))
+# Two limbs are the same, mirrored, if their directions are within this angle [cosine].
+_SAME_WAY = np.cos(np.radians(20.0))
+# Nothing that is worn around the trunk, and no head's opening, is narrower [m]; no sleeve is wider.
+_SLIMMEST = 0.55
+# What is narrower below its upper end by this share is no skirt; if it goes on below its waist by this [m], it is a dress.
+_WAISTED, _BELOW_WAIST = 0.93, 0.3
+# A waist is no longer than the cloth below it is wide by this; what goes on farther below an armhole, or a neck, than this is a dress [m].
+_WAVES, _LONG = 1.25, 0.8
+# Around a neck that is no longer [m], this upper share of a poncho lies level by this (mean cosine).
+_NECKS, _SHOULDERS, _LIES = 0.62, 0.35, 0.5
+# The trunk of a newborn is so long, and so far around its widest opening [m]. What is shorter than the third ends at the thigh, where a
+# leg's girth is this share of the waist's.
+_LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
+# Openings around heads, and around wrists and ankles, are so long [m]; a hand is no thicker than this share of its width.
+_HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
+# A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
+_SLANT, _ENOUGH_ABOVE = 0.15, 0.2
+# A front opening's area vector is less than this of a ring's; a hem's lies along the height by this cosine; cloth that goes on from all its
+# hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a ball's from 1.2 on).
+_RING, _DOWN, _TUBE = 0.6, 0.5, 1.16
+# It is turned around if it can be worn better by this; an opening in front ends in such a share of the garment's height.
+_SURELY, _END = 0.25, 0.15
+# A garment lies on its back if the way through it is upright by this (cosine).
+_LIES_ON_BACK = 0.8
+# A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
+_SYMMETRIC = 0.02
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Border:
+    """A closed border.
+
+    Attributes:
+        vertices: in their order.
+        middle: [m], length: [m].
+        normal: the area vector of the loop over its length squared: how level it is, and which way it faces.
+        role: neck, waist, hem, sleeve, leg, opening, armhole, hole, or border.
+        side: +1 on the garment's left, -1 on its right, 0 in the middle.
+    """
+
+    vertices: Ids
+    middle: FloatArray
+    length: float
+    normal: FloatArray
+    role: str
+    side: int = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limb:
+    """A sleeve or a leg.
+
+    Attributes:
+        kind: "sleeve" or "leg".
+        side: +1 left, -1 right.
+        border: its number in the anatomy.
+        fork: the place where its inner line meets that of the trunk or the other leg: the armpit, or the crotch [m].
+        along: direction from the fork along the limb.
+        length: from the fork to its end [m].
+    """
+
+    kind: Literal["sleeve", "leg"]
+    side: int
+    border: int
+    fork: FloatArray
+    along: FloatArray
+    length: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Anatomy:
+    """What a garment is.
+
+    Attributes:
+        kind: of garment.
+        up, front, left: directions in space.
+        normal, offset: the plane of symmetry, normal . x = offset; the normal points to the left.
+        asymmetry: median distance of the mirrored cloth from the cloth [m].
+        symmetric: whether it is its own mirror image in that plane.
+        mirror: the mirror images of its vertices; None without symmetry.
+        borders: by length.
+        limbs: sleeves and legs.
+        open_front: whether it opens from top to bottom in front.
+        size: square root of its area [m].
+        notes: what was chosen, one sentence each.
+    """
+
+    kind: Kind
+    up: FloatArray
+    front: FloatArray
+    left: FloatArray
+    normal: FloatArray
+    offset: float
+    asymmetry: float
+    symmetric: bool
+    mirror: MirrorMap | None
+    borders: tuple[Border, ...]
+    limbs: tuple[Limb, ...]
+    open_front: bool
+    size: float
+    notes: tuple[str, ...] = field(default=())
+
+    def limbs_of(self, kind: str) -> list[Limb]:
+        """Return the sleeves, or the legs."""
+        return [limb for limb in self.limbs if limb.kind == kind]
+
+    def border(self, role: str) -> Border | None:
+        """Return the longest border of a role, if there is one."""
+        return next((border for border in self.borders if border.role == role), None)
+
+
+def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, front: str | None = None) -> Anatomy:
+    """Find out what a garment is.
+
+    Args:
+        cloth: one connected part, its normals pointing out.
+        operators: of its mesh.
+        up, front: directions as "+y", "-z", where the user says them; +y and +z are tried first otherwise.
+    """
+    loops = [_measured(cloth.vertices, loop) for loop in cloth.borders()]
+    if up:
+        made = _worn(cloth, operators, loops, AXES[up], front)
+    else:
+        size = float(np.sqrt(cloth.face_areas.sum()))
+        first = _upward([one for one in loops if one[1] >= HOLE * size], cloth.vertices)
+        made = _worn(cloth, operators, loops, first, front)
+        turned = _worn(cloth, operators, loops, -first, front)
+        made = turned if _wearable(cloth, turned) > _wearable(cloth, made) + _SURELY else made
+        if made.up[1] < 0.5 and len(loops) > 1:
+            why = "as its openings lie" if made.up @ first > 0.5 else "as nobody could wear it the other way up"
+            words = f"up is taken as {axis_name(made.up)}, {why}; --up says otherwise"
+            made = replace(made, notes=(words, *made.notes))
+    if made.symmetric:
+        mirror = mirror_map(cloth.vertices, cloth.faces, made.normal, made.offset, reach=0.05 * made.size)
+        made = replace(made, mirror=mirror)
+    return made
+
+
+def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
+    """Return how well a body could wear a garment this way up, from about -1 to 2.
+
+    A head needs an opening. A neck is shorter than a hem, and a waist, too; sleeves begin near the neck and hang.
+    """
+    heights = cloth.vertices @ anatomy.up
+    low, tall = float(heights.min()), max(float(np.ptp(heights)), 1e-300)
+
+    def end(role: str, highest: bool) -> float:
+        """Return the girth of the trunk's end [m]: of a circle as large as its border; of an opening in front, the length there."""
+        own = anatomy.border(role)
+        if own is not None:
+            return own.length * float(np.sqrt(np.linalg.norm(own.normal)))
+        opening = anatomy.border("opening")
+        if opening is None:
+            return 0.0
+        ring = cloth.vertices[np.append(opening.vertices, opening.vertices[0])]
+        level = heights[opening.vertices]
+        at_end = (level > level.max() - _END * tall) if highest else (level < level.min() + _END * tall)
+        return float(np.linalg.norm(np.diff(ring, axis=0), axis=1)[at_end].sum())
+
+    if anatomy.kind not in ("top", "dress", "skirt", "trousers", "jumpsuit"):
+        return -0.5
+    if anatomy.kind == "trousers":
+        return 0.0
+    if anatomy.kind == "jumpsuit":
+        neck = anatomy.border("neck") or anatomy.border("opening")
+        return 2.0 * float(heights[neck.vertices].max() - low) / tall - 1.0 if neck is not None else -1.0
+    above, below = end("waist" if anatomy.kind == "skirt" else "neck", True), end("hem", False)
+    if not above or not below:
+        return -1.0
+    sleeves = anatomy.limbs_of("sleeve")
+    # One that leads to the other side begins elsewhere.
+    outward = [float(limb.along @ anatomy.normal) * limb.side > 0.0 for limb in sleeves]
+    hangs = [-float(limb.along @ anatomy.up) if out else -1.0 for limb, out in zip(sleeves, outward, strict=True)]
+    hang = sum(hangs) / max(len(sleeves), 1)
+    begin = sum((float(limb.fork @ anatomy.up) - low) / tall - 0.5 for limb in sleeves) / max(len(sleeves), 1)
+    return (below - above) / (below + above) + hang + begin
+
+
+def _worn(
+    cloth: Cloth,
+    operators: Operators,
+    raw: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
+    upward: FloatArray,
+    front: str | None,
+) -> Anatomy:
+    """Return what a garment is that is worn with `upward` up, without its mirror images; see `find_anatomy`.
+
+    `raw` are its borders, measured.
+    """
+    size = float(np.sqrt(cloth.face_areas.sum()))
+    notes: list[str] = []
+    normal, offset, asymmetry = _plane_of_symmetry(
+        cloth.vertices, _above_slanted_hem(cloth.vertices, operators.mass, upward, raw, size), upward, size
+    )
+    holds = asymmetry <= _SYMMETRIC * size
+    side = np.cross(upward, normal)
+    side /= max(float(np.linalg.norm(side)), 1e-300)
+    beside, ahead = (
+        [abs(float(border.middle @ across) - at) for border in _roles(raw, across, at, size) if border.role == "limb"]
+        for across, at in ((normal, offset), (side, float(np.median(cloth.vertices @ side))))
+    )
+    # A sleeve that comes forward is beside the plane between front and back, too, yet it is farther off to its side.
+    one_sleeve = (
+        holds
+        and sum(one[1] >= HOLE * size for one in raw) > 2
+        and len(beside) < 2
+        and max(ahead, default=0.0) > max(beside, default=0.0)
+    )
+    if one_sleeve:
+        # The plane lies between front and back.
+        holds = False
+    if front:
+        forward = AXES[front] - (AXES[front] @ upward) * upward
+        if np.linalg.norm(forward) < 0.5:
+            forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
+    else:
+        forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
+        if one_sleeve:
+            forward = np.cross(side, upward) * (1.0 if np.cross(side, upward) @ forward >= 0.0 else -1.0)
+    if holds:
+        level = normal - (normal @ upward) * upward
+        level /= np.linalg.norm(level)
+        across = np.cross(upward, forward)
+        # Front is at right angles to the plane of symmetry, unless the user says that it is not.
+        if abs(across @ level) > 0.5 or not front:
+            turned = np.cross(level, upward)
+            forward = turned * (1.0 if turned @ forward >= -1e-9 else -1.0)
+    left = np.cross(upward, forward)
+    left /= np.linalg.norm(left)
+    forward = np.cross(left, upward)
+    if not holds or abs(normal @ left) < 0.5:
+        normal, offset = left, float(np.median(cloth.vertices @ left))
+    normal, offset = (normal, offset) if normal @ left > 0 else (-normal, -offset)
+    borders = _roles(raw, normal, offset, size)
+    heights = cloth.vertices @ upward
+    kind, borders, open_front = _kind(cloth, borders, upward, heights, size)
+    limbs = _limbs(cloth, borders, upward, kind, size)
+    if holds:
+        # An armhole whose facing is as long as the shortest sleeve is the same on both sides.
+        both = {(limb.kind, limb.side) for limb in limbs}
+        mates = {(border.role, -border.side) for border in borders}
+        limbs = [limb for limb in limbs if (limb.kind, limb.side) not in mates or (limb.kind, -limb.side) in both]
+    if front is None:
+        turned_words = _faces_backwards(cloth, borders, kind, upward, forward, open_front, size)
+        if turned_words:
+            notes.append(turned_words)
+            forward, left, normal, offset = -forward, -left, -normal, -offset
+            borders = [replace(border, side=-border.side) for border in borders]
+            limbs = [replace(limb, side=-limb.side) for limb in limbs]
+    if one_sleeve:
+        notes.append("it has a sleeve on one side alone: each side has its own lines")
+    elif not holds:
+        notes.append(
+            f"it has no plane of symmetry (mirrored, it is {1e3 * asymmetry:.0f} mm off): each side has its own lines"
+        )
+    return Anatomy(
+        kind=kind,
+        up=upward,
+        front=forward,
+        left=left,
+        normal=normal,
+        offset=offset,
+        asymmetry=asymmetry,
+        symmetric=holds,
+        mirror=None,
+        borders=tuple(borders),
+        limbs=tuple(limbs),
+        open_front=open_front,
+        size=size,
+        notes=tuple(notes),
+    )
+
+
+def describe(anatomy: Anatomy) -> str:
+    """Return what a garment is, in a few words: "top, two sleeves, open in front"."""
+    words: list[str] = [anatomy.kind]
+    for kind in ("sleeve", "leg"):
+        count = len(anatomy.limbs_of(kind))
+        if count and anatomy.kind not in (kind, "trousers"):
+            words.append(f"{count} {kind}{'s' if count > 1 else ''}")
+    if anatomy.open_front:
+        words.append("open in front")
+    return ", ".join(words)
+
+
+def _measured(vertices: FloatArray, loop: Ids) -> tuple[FloatArray, float, FloatArray, Ids]:
+    """Return middle, length and area vector over the length squared of a loop, and its vertices."""
+    points = vertices[loop]
+    following = np.roll(points, -1, axis=0)
+    steps = np.linalg.norm(following - points, axis=1)
+    length = float(steps.sum())
+    middle = ((points + following) * (0.5 * steps[:, None])).sum(axis=0) / max(length, 1e-300)
+    area = 0.5 * np.cross(points - middle, following - middle).sum(axis=0)
+    return middle, length, area * (4.0 * np.pi / max(length, 1e-300) ** 2), loop
+
+
+def _upward(loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]], vertices: FloatArray) -> FloatArray:
+    """Return +y, or +z where the openings lie level in z and not in y, or a garment that is open in front lies on its back."""
+    if not loops:
+        return AXES["+y"]
+    level = sum(length * np.abs(normal) for _, length, normal, _ in loops)
+    assert isinstance(level, np.ndarray)
+    _, longest, facing, _ = max(loops, key=lambda one: one[1])
+    if np.linalg.norm(facing) < _RING and longest > 0.5 * sum(one[1] for one in loops):
+        # The thinnest way through it is from back to front.
+        through = np.linalg.eigh(np.cov(vertices.T))[1][:, 0]
+        return AXES["+z"] if abs(through[1]) > _LIES_ON_BACK else AXES["+y"]
+    return AXES["+z"] if level[2] > 2.0 * level[1] and level[2] > level[0] else AXES["+y"]
+
+
+def axis_name(direction: FloatArray) -> str:
+    """Return the axis of space that is nearest to a direction, as "+y"."""
+    k = int(np.abs(direction).argmax())
+    return f"{'+' if direction[k] > 0 else '-'}{'xyz'[k]}"
+
+
+def _above_slanted_hem(
+    vertices: FloatArray,
+    mass: FloatArray,
+    upward: FloatArray,
+    loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
+    size: float,
+) -> FloatArray:
+    """Return the masses of vertices [m2]; 0 beside a hem that slants: it says nothing about the body."""
+    heights = vertices @ upward
+    wide = [heights[loop] for _, length, _, loop in loops if length >= HOLE * size]
+    if len(wide) < 2:
+        return mass
+    hem = min(wide, key=lambda own: float(own.mean()))
+    above = mass * (heights > hem.max())
+    slants = np.ptp(hem) > _SLANT * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * mass.sum()
+    return above if slants else mass
+
+
+# Rounds of closest points for the plane of symmetry that is taken.
+_MORE_ROUNDS = 40
+
+
+def _plane_of_symmetry(
+    vertices: FloatArray, mass: FloatArray, upward: FloatArray, size: float
+) -> tuple[FloatArray, float, float]:
+    """Return normal, offset [m] and asymmetry [m] of the plane in which a surface is most its own mirror image.
+
+    Closest points again and again, from twelve upright planes through the middle.
+    """
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(vertices)
+    share = mass / mass.sum()
+    # Quadrature points of equal area, and so independent of how fine the mesh is where.
+    rank = np.searchsorted(np.cumsum(share), (np.arange(900) + 0.5) / 900)
+    points = vertices[np.unique(np.minimum(rank, len(vertices) - 1))]
+    middle = points.mean(axis=0)
+    one = np.cross(upward, [1.0, 0.0, 0.0] if abs(upward[0]) < 0.9 else [0.0, 1.0, 0.0])
+    one /= np.linalg.norm(one)
+    other = np.cross(upward, one)
+
+    def closer(normal: FloatArray, offset: float, rounds: int) -> tuple[float, FloatArray, float]:
+        """Return the asymmetry of a plane after some rounds of closest points, its normal and its offset."""
+        for _ in range(rounds):
+            image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
+            away, nearest = tree.query(image)
+            near = away <= max(float(np.quantile(away, 0.8)), 1e-3 * size)
+            p, q = points[near], vertices[nearest[near]]
+            p_mean, q_mean = p.mean(axis=0), q.mean(axis=0)
+            spread = (p - p_mean).T @ (q - q_mean)
+            values, axes = np.linalg.eigh(spread + spread.T)
+            # Of the three the one that is nearest to the plane before: the smallest may be the thickness of a flat thing.
+            k = int(np.abs(axes.T @ normal).argmax()) if values[1] - values[0] < 0.05 * values[2] else 0
+            normal = axes[:, k] * (1.0 if axes[:, k] @ normal >= 0 else -1.0)
+            offset = float(normal @ (p_mean + q_mean)) / 2.0
+        image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
+        return float(np.median(tree.query(image)[0])), normal, offset
+
+    normals = [np.cos(angle) * one + np.sin(angle) * other for angle in np.pi / 12 * np.arange(12)]
+    found = [closer(normal, float(normal @ middle), 6) for normal in normals]
+    # A lying plane (above against below) is no garment's.
+    upright = [one for one in found if abs(one[1] @ upward) < 0.5] or found
+    best = min(upright, key=lambda one: one[0])
+    # Round things have many: the one nearest to the axes is taken.
+    as_good = [one for one in upright if one[0] <= best[0] + 0.004 * size]
+    best = max(as_good, key=lambda one: (round(float(abs(one[1][0])), 2), -one[0]))
+    # The lean of a coarse mesh is found slowly.
+    best = min(best, closer(best[1], best[2], _MORE_ROUNDS), key=lambda one: one[0])
+    spacing = float(np.median(tree.query(vertices[:: max(1, len(vertices) // 500)], k=2)[0][:, 1]))
+    # Images fall between vertices: what the mesh's own spacing explains is no asymmetry.
+    return best[1], best[2], max(0.0, best[0] - 0.5 * spacing)
+
+
+def _roles(
+    raw: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
+    normal: FloatArray,
+    offset: float,
+    size: float,
+) -> list[Border]:
+    """Return the borders: pairs beside the plane of symmetry as "limb", those in the middle as "middle", and holes."""
+    across = np.array([middle @ normal - offset for middle, *_ in raw])
+    roles = ["hole" if length < HOLE * size else "middle" for _, length, *_ in raw]
+    pairs = []
+    for i, (middle, length, *_) in enumerate(raw):
+        for j in range(i + 1, len(raw)):
+            if "hole" in (roles[i], roles[j]) or across[i] * across[j] >= 0.0:
+                continue
+            image = middle - 2.0 * across[i] * normal
+            away = float(np.linalg.norm(image - raw[j][0]))
+            ratio = max(length, raw[j][1]) / min(length, raw[j][1])
+            if (
+                away < _PAIR * size
+                and away < 0.7 * abs(across[i] - across[j])
+                and ratio < _PAIR_RATIO
+                and min(abs(across[i]), abs(across[j])) > _BESIDE * size
+            ):
+                pairs.append((away, i, j))
+    for _, i, j in sorted(pairs):
+        if roles[i] == roles[j] == "middle":
+            roles[i] = roles[j] = "limb"
+    widest = max((abs(x) for x in across), default=0.0)
+    longest = max((length for _, length, *_ in raw), default=0.0)
+    for i, (_, length, *_) in enumerate(raw):
+        # One sleeve alone.
+        if roles[i] == "middle" and abs(across[i]) > max(0.15 * size, 0.5 * widest) and length < 0.6 * longest:
+            roles[i] = "limb"
+    return [
+        Border(
+            vertices=loop,
+            middle=middle,
+            length=length,
+            normal=area,
+            role=roles[i],
+            side=int(np.sign(across[i])) if roles[i] == "limb" else 0,
+        )
+        for i, (middle, length, area, loop) in enumerate(raw)
+    ]
+
+
+def _kind(
+    cloth: Cloth, borders: Sequence[Border], upward: FloatArray, heights: FloatArray, size: float
+) -> tuple[Kind, list[Border], bool]:
+    """Return the kind, the borders with their roles, and whether the front is open."""
+    low, high = float(heights.min()), float(heights.max())
+    tall = max(high - low, 1e-300)
+    around = [border.length for border in borders if border.role == "middle"]
+    # No arm and no leg is as thin as that; what has one more opening alone, and ends at the thigh, is as wide as a thigh.
+    thigh = _THIGH * around[0] if len(around) == 1 and tall < _TO_THE_THIGH else 0.0
+    thin = max(_HANDS[0], thigh)
+    limbs = [i for i, border in enumerate(borders) if border.role == "limb" and border.length > thin]
+    if tall < _LEAST_BODY[0] or (len(limbs) < 4 and max(around, default=0.0) < _LEAST_BODY[1]):
+        limbs = []
+    borders = [
+        replace(border, role="hole", side=0) if border.role == "limb" and i not in limbs else border
+        for i, border in enumerate(borders)
+    ]
+    middles = [i for i, border in enumerate(borders) if border.role == "middle"]
+    roles = {i: border.role for i, border in enumerate(borders)}
+    level = {i: float(borders[i].middle @ upward) for i in range(len(borders))}
+
+    def reach(i: int) -> tuple[float, float]:
+        own = heights[borders[i].vertices]
+        return float(own.min()), float(own.max())
+
+    spans = {i: (reach(i)[1] - reach(i)[0]) / tall for i in middles}
+    # An opening from top to bottom is no ring.
+    open_front = len(limbs) > 0 and any(
+        span > _OPEN and np.linalg.norm(borders[i].normal) < _RING for i, span in spans.items()
+    )
+    kind: Kind = "other"
+    if not borders or all(role == "hole" for role in roles.values()):
+        kind = "closed"
+    elif len(limbs) >= 4:
+        kind = "jumpsuit"
+        order = sorted(limbs, key=lambda i: level[i])
+        for i in order[:2]:
+            roles[i] = "leg"
+        for i in order[2:]:
+            roles[i] = "sleeve"
+        for i in middles:
+            roles[i] = "opening" if spans[i] > _OPEN else "neck"
+    elif limbs and len(middles) == 1 and not open_front:
+        i = middles[0]
+        if all(level[k] < level[i] for k in limbs):
+            kind = "trousers"
+            roles[i] = "waist"
+            for k in limbs:
+                roles[k] = "leg"
+        else:
+            kind = "top"
+            roles[i] = "hem" if level[i] < (low + high) / 2 else "neck"
+            for k in limbs:
+                roles[k] = "sleeve"
+    elif limbs:
+        order = sorted(middles, key=lambda i: level[i])
+        kind = "top"
+        for i in middles:
+            roles[i] = "border"
+        if open_front:
+            roles[max(middles, key=lambda i: spans[i])] = "opening"
+        elif order:
+            roles[order[0]], roles[order[-1]] = "hem", "neck"
+        for k in limbs:
+            roles[k] = "sleeve"
+    elif len(middles) == 2:
+        a, b = sorted(middles, key=lambda i: level[i])
+        girth = 0.5 * (borders[a].length + borders[b].length)
+        apart = float(np.linalg.norm(borders[a].middle - borders[b].middle))
+        upright = abs(level[b] - level[a]) > 0.5 * apart
+        if apart < 0.2 * girth:
+            kind = "band"
+            roles[a], roles[b] = "border", "border"
+        elif upright and girth > _SLIMMEST:
+            kind = _around_the_trunk(cloth, borders[b], reach(a)[1], upward)
+            roles[a], roles[b] = "hem", "waist" if kind == "skirt" else "neck"
+        else:
+            ratio = max(borders[a].length, borders[b].length) / min(borders[a].length, borders[b].length)
+            kind = "sleeve" if girth < _SLIMMEST and apart > 0.75 * girth and ratio < _PAIR_RATIO else "other"
+            roles[a], roles[b] = "border", "border"
+    elif len(middles) == 1:
+        kind = _one_border(cloth, borders[middles[0]], upward, size)
+        roles[middles[0]] = "border"
+    else:
+        for i in middles:
+            roles[i] = "border"
+    if kind == "top":
+        hem = next((i for i, role in roles.items() if role == "hem"), None)
+        arms = [i for i, role in roles.items() if role == "sleeve"]
+        if hem is not None and arms:
+            # From the armhole down, a dress is longer than a body is to the hip.
+            above = max(level[i] for i in arms)
+            top = max([level[i] for i, role in roles.items() if role == "neck"] or [above])
+            if top - reach(hem)[0] > _LONG or (top - reach(hem)[0]) > 1.9 * _trunk_width(cloth, borders, upward):
+                kind = "dress"
+            faces_down = abs(borders[hem].normal @ upward) > _DOWN * np.linalg.norm(borders[hem].normal)
+            if not (faces_down and min(_widening(cloth, borders[i]) for i in (hem, *arms)) < _TUBE):
+                # A ball with holes.
+                kind = "other"
+                roles = {i: "hole" if role == "hole" else "border" for i, role in roles.items()}
+    made = [replace(border, role=roles[i]) for i, border in enumerate(borders)]
+    return kind, made, open_front
+
+
+def _widening(cloth: Cloth, border: Border) -> float:
+    """Return the area within a border's radius of it, over that of a tube: more than 1 for a ball."""
+    radius = border.length / (2.0 * np.pi)
+    edges = mesh_edges(cloth.faces.astype(np.int32)).astype(np.int64)
+    long = np.linalg.norm(cloth.vertices[edges[:, 0]] - cloth.vertices[edges[:, 1]], axis=1)
+    graph = coo_array((long, (edges[:, 0], edges[:, 1])), shape=(len(cloth.vertices),) * 2).tocsr()
+    far = dijkstra(graph, directed=False, indices=border.vertices, min_only=True)
+    near = far[cloth.faces].mean(axis=1) <= radius
+    return float(cloth.face_areas[near].sum() / max(radius * border.length, 1e-300))
+
+
+def _trunk_width(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> float:
+    """Return the girth of the lowest middle border over two: about how wide the garment is, laid flat."""
+    hem = min((b for b in borders if b.role == "middle"), key=lambda b: float(b.middle @ upward))
+    return 0.5 * hem.length
+
+
+def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArray) -> Kind:
+    """Return what a tube around the trunk is: a skirt is narrowest at its upper end, which is a waist.
+
+    A top's end runs up and down between straps and armholes, or goes around a neck from which cloth lies over the shoulders. What widens
+    again below a waist is a dress.
+
+    Args:
+        cloth: the tube.
+        upper: its upper border.
+        low: the height of its hem [m].
+        upward: direction.
+    """
+    heights = cloth.vertices @ upward
+    high = float(heights[upper.vertices].min())
+    if high - low < 0.02:
+        return "skirt"
+    everywhere = np.ones(len(cloth.faces), dtype=bool)
+    levels = np.linspace(high, low, 17)[1:-1]
+    girths = np.array([section(cloth, heights - level, everywhere)[0] for level in levels])
+    narrowest = int(girths.argmin())
+    if upper.length > _WAVES * girths[narrowest]:
+        return "dress" if high - low > _LONG else "top"
+    near = heights[cloth.faces].mean(axis=1) > high - _SHOULDERS * (high - low)
+    area = cloth.face_areas[near]
+    lies = float((np.abs(cloth.face_normals[near] @ upward) * area).sum() / max(float(area.sum()), 1e-300))
+    if upper.length < _NECKS and lies > _LIES:
+        return "dress" if high - low > _LONG else "top"
+    if girths[narrowest] > _WAISTED * girths[0]:
+        return "skirt"
+    return "dress" if levels[narrowest] - low > _BELOW_WAIST else "top"
+
+
+def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -> Kind:
+    """Return what a thing with one border is: a hat, a sock or a glove if its size and its shape say so, else "other"."""
+    holes = len(border_loops(cloth.faces.astype(np.int32)))
+    others = [loop for loop in cloth.borders() if not np.array_equal(np.sort(loop), np.sort(border.vertices))]
+    if sum(_measured(cloth.vertices, loop)[1] for loop in others) > 0.5 * border.length:
+        return "other"
+    if border.length > 3.0 * size or euler_characteristic(cloth.faces.astype(np.int32)) != 2 - holes:
+        # A disk that is no deeper than a panel, or a thing with a handle, as a mug.
+        return "other"
+    way = cloth.vertices - border.middle
+    depth = way @ upward
+    girth, radius = border.length, border.length / (2.0 * np.pi)
+    if _HEADS[0] < girth < _HEADS[1] and max(0.5 * radius, -2.0 * depth.min()) < depth.max() < 2.0 * girth:
+        return "hat"
+    if not _HANDS[0] < girth < _HANDS[1]:
+        return "other"
+    # A foot is much longer than the leg above it is wide.
+    level = way - np.outer(depth, upward)
+    tall = -float(depth.min())
+    if tall > 2.0 * depth.max():
+        foot, leg = level[depth < -0.75 * tall], level[depth > -0.4 * tall]
+        axes = np.linalg.eigh(foot.T @ foot)[1] if len(foot) > 2 else np.eye(3)
+        spans = np.ptp(foot @ axes[:, 1:], axis=0) if len(foot) > 2 else np.zeros(2)
+        if len(leg) and spans[1] > 1.8 * max(float(np.ptp(leg @ axes[:, 2])), float(spans[0])):
+            return "sock"
+    # A hand is flat, and its thumb or its fingers stand apart.
+    areas = cloth.face_areas
+    along = areas @ way[cloth.faces].mean(axis=1)
+    along /= max(float(np.linalg.norm(along)), 1e-300)
+    reach = way @ along
+    outer = way[reach > 0.4 * reach.max()]
+    outer = outer - np.outer(outer @ along, along)
+    axes = np.linalg.eigh(np.cov(outer.T))[1] if len(outer) > 3 else np.eye(3)
+    thick, wide = np.ptp(outer @ axes[:, 1:], axis=0)
+    if thick < _FLAT_HAND * wide and reach.max() > 0.6 * girth:
+        for part in np.linspace(0.3, 0.95, 14):
+            above = reach[cloth.faces] > part * reach.max()
+            crossed = cloth.faces[above.any(axis=1) & ~above.all(axis=1)].astype(np.int32)
+            if len(crossed) and components(crossed).max() > 0:
+                return "glove"
+    return "other"
+
+
+def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Kind, size: float) -> list[Limb]:
+    """Return the limbs with their forks, which the shortest ways between borders pass through."""
+    arms = [i for i, border in enumerate(borders) if border.role == "sleeve"]
+    legs = [i for i, border in enumerate(borders) if border.role == "leg"]
+    if not arms and not legs:
+        return []
+    edges = mesh_edges(cloth.faces.astype(np.int32)).astype(np.int64)
+    long = np.linalg.norm(cloth.vertices[edges[:, 0]] - cloth.vertices[edges[:, 1]], axis=1)
+    graph = coo_array((long, (edges[:, 0], edges[:, 1])), shape=(len(cloth.vertices),) * 2).tocsr()
+    heights = cloth.vertices @ upward
+    found = []
+    for i in (*arms, *legs):
+        own = borders[i]
+        if i in arms:
+            # To the lower part of the trunk's end: the hem, the lower part of an opening, or the legs.
+            ends = [b.vertices for b in borders if b.role in ("hem", "opening", "leg")]
+            if not ends:
+                continue
+            goal = np.concatenate(ends)
+            goal = goal[heights[goal] <= heights[goal].min() + 0.25 * (heights.max() - heights[goal].min())]
+            # Borders of the garment's own side, so that the way runs down this side.
+        else:
+            mates = [borders[j].vertices for j in legs if j != i]
+            if not mates:
+                continue
+            goal = np.concatenate(mates)
+        far, before, _ = dijkstra(graph, directed=False, indices=own.vertices, min_only=True, return_predecessors=True)
+        end = int(goal[np.argmin(far[goal])])
+        if not np.isfinite(far[end]):
+            continue
+        way = [end]
+        while before[way[-1]] >= 0:
+            way.append(int(before[way[-1]]))
+        points = cloth.vertices[way[::-1]]
+        fork, along, length, bend = _fork(points, upward, size)
+        if i in arms and (bend < _STRAIGHT or length < _SHORTEST_SLEEVE * size):
+            continue
+        found.append(
+            Limb(
+                kind="sleeve" if i in arms else "leg",
+                side=own.side or 1,
+                border=i,
+                fork=fork,
+                along=along,
+                length=length,
+            )
+        )
+    return found
+
+
+def averaged_limbs(anatomy: Anatomy, *, alike: bool) -> tuple[Limb, ...]:
+    """Return the limbs, each the mean of itself and its mate's mirror image where both are nearly the same, or all `alike`."""
+    if anatomy.mirror is None:
+        return anatomy.limbs
+    normal, offset = anatomy.normal, anatomy.offset
+    made = []
+    for limb in anatomy.limbs:
+        mate = next((one for one in anatomy.limbs if one.kind == limb.kind and one.side == -limb.side), None)
+        if mate is not None:
+            along = mate.along - 2.0 * float(mate.along @ normal) * normal
+            fork = mate.fork - 2.0 * (float(mate.fork @ normal) - offset) * normal
+            near = along @ limb.along > _SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
+            if alike or near:
+                both = along + limb.along
+                both /= np.linalg.norm(both)
+                length = 0.5 * (limb.length + mate.length)
+                limb = replace(limb, along=both, fork=0.5 * (fork + limb.fork), length=length)
+        made.append(limb)
+    return tuple(made)
+
+
+def _fork(points: FloatArray, upward: FloatArray, size: float) -> tuple[FloatArray, FloatArray, float, float]:
+    """Return where a way along a limb and on along the trunk bends most, the direction from there along the limb, and its length.
+
+    Returns:
+        The place, the direction, the length from the first point to the place [m], and the cosine of the angle between both legs.
+    """
+    from warpflat.core.polyline import arc_lengths, points_at_lengths
+
+    arc = arc_lengths(points)
+    total = float(arc[-1])
+    samples = np.linspace(0.0, total, 201)
+    line = points_at_lengths(points, samples)
+    for _ in range(2):
+        # The way follows edges: its steps are smoothed away.
+        line[1:-1] = 0.25 * line[:-2] + 0.5 * line[1:-1] + 0.25 * line[2:]
+    reach = max(3, int(200 * 0.2 * size / max(total, 1e-300)))
+
+    def legs(at: int) -> tuple[FloatArray, FloatArray, int]:
+        r = max(3, min(at, 200 - at, reach))
+        low, high = max(0, at - r), min(200, at + r)
+        one, other = line[low] - line[at], line[high] - line[at]
+        one /= max(float(np.linalg.norm(one)), 1e-300)
+        other /= max(float(np.linalg.norm(other)), 1e-300)
+        return one, other, r
+
+    # Where it comes up from the limb and goes down again. At the waist a way bends, too, and a short sleeve bends it near its end only.
+    rises = [-r * float((one + other) @ upward) for one, other, r in map(legs, range(1, 200))]
+    at = 1 + int(np.argmax(rises))
+    for _ in range(4):
+        one, other, r = legs(at)
+        low, high = max(0, at - r), min(200, at + r)
+        step = line[low : high + 1] @ -(one + other)
+        new = low + int(step.argmax())
+        new = min(max(new, 1), 199)
+        if new == at:
+            break
+        at = new
+    along = line[0] - line[at]
+    return line[at], along / max(float(np.linalg.norm(along)), 1e-300), float(samples[at]), float(one @ other)
+
+
+def _faces_backwards(
+    cloth: Cloth,
+    borders: Sequence[Border],
+    kind: Kind,
+    upward: FloatArray,
+    forward: FloatArray,
+    open_front: bool,
+    size: float,
+) -> str:
+    """Return why the garment faces the other way, or "": an opening lies in front, a neck is lower in front, a seat is behind."""
+    heights, depth = cloth.vertices @ upward, cloth.vertices @ forward
+    middle = float(np.median(depth))
+    for border in borders:
+        own = border.vertices
+        if open_front and border.role == "opening":
+            # Between top and bottom only the edges of the opening are left.
+            low, high = heights[own].min(), heights[own].max()
+            inner = own[(heights[own] > low + 0.3 * (high - low)) & (heights[own] < low + 0.7 * (high - low))]
+            if len(inner) and np.median(depth[inner]) < middle - 0.02 * size:
+                return (
+                    f"it opens at the {axis_name(-forward)} side, which is taken as its front; --front says otherwise"
+                )
+            return ""
+    for border in borders:
+        own = border.vertices
+        if border.role == "neck" and kind in ("top", "dress"):
+            ahead = depth[own] > np.median(depth[own])
+            drop = float(np.quantile(heights[own[~ahead]], 0.1) - np.quantile(heights[own[ahead]], 0.1))
+            if drop < -0.06 * size:
+                return f"its neck is lower at the {axis_name(-forward)} side, which is taken as its front; --front says otherwise"
+    return ""

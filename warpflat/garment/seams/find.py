@@ -1,0 +1,553 @@
+"""`find_seams`: a whole garment, made by somebody else as one mesh, becomes pieces that sew up into it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, expect
+from warpflat.core.polyline import polyline_length
+from warpflat.core.short_repr import short_repr
+from warpflat.core.text import find_unused_name, format_count
+from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.fabric.library import as_fabric
+from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.paths.lines import line_from_curve, line_on_plane
+from warpflat.flat.surface.paths.section import plane_sections
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.seams.anatomy import HOLE, ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
+from warpflat.garment.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
+from warpflat.garment.seams.cloth import Cloth, PieceMesh
+from warpflat.garment.seams.energy import Trial, cut_by_energy, laid_flat
+from warpflat.garment.seams.fields import Operators
+from warpflat.garment.seams.openings import open_tubes
+from warpflat.garment.seams.options import SeamOptions
+from warpflat.garment.seams.solid import is_panel, part_solids
+from warpflat.garment.seams.symmetric import averaged, mirrored
+from warpflat.garment.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves
+from warpflat.garment.seams.thickness import without_thickness
+from warpflat.pattern.drafting.pieces import FoundSeam
+
+__all__ = ["GRAIN", "FoundSeams", "find_seams", "seam_words"]
+
+Ids = NDArray[np.int64]
+
+# A band has no more than this share of the cloth, and its border, squared, is so many times its area: 4.5 times as long as wide.
+_BAND_AREA, _BAND = 0.12, 27.0
+# It runs along an opening by at least this share of its border: a panel of a leg only ends there.
+_ALONG = 0.2
+#: What a band is called, by the border along which it runs.
+BANDS = {"waist": "waistband", "neck": "neck_band", "hem": "hem_band", "sleeve": "cuff", "leg": "cuff"}
+
+# Pieces are alike if sizes, outlines and extents agree within this share.
+_ALIKE = 0.015
+
+# A piece whose parts in front and behind differ by less than this share is of neither.
+_AROUND = 0.35
+
+# A piece is longer than wide from this ratio of the second moments of its length and width on.
+_LONG = 2.0
+
+#: The line of a piece along which its grain runs.
+GRAIN = "grain"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FoundSeams:
+    """The pieces of a garment, and the seams between them.
+
+    Attributes:
+        pieces: surfaces of different names, whose borders meet vertex by vertex along the seams; the line "grain" of each runs with the
+            body, other lines name the stretches of its border.
+        seams: by name.
+        what: the garment in words.
+        up, front: the axes of space that are nearest to its own, as "+y" and "+z".
+        notes: what was chosen or left out, one sentence each, the most important first.
+        along: what of the garment's file the seams follow, in words; "" where they were found or drawn.
+    """
+
+    __repr__ = short_repr
+
+    pieces: tuple[Surface, ...]
+    seams: tuple[FoundSeam, ...]
+    what: str
+    up: str
+    front: str
+    notes: tuple[str, ...] = ()
+    along: str = ""
+
+
+def find_seams(
+    surface: Surface | Sequence[Surface],
+    options: SeamOptions | None = None,
+    *,
+    fabric: Fabric | str | None = None,
+) -> FoundSeams:
+    """Find the seams of a whole garment, and cut it there.
+
+    Seams are zero lines of smooth fields (harmonic, or screened by where the cloth faces), averaged over both sides of a symmetric garment.
+    Faces are split along them.
+
+    Args:
+        surface: one connected layer of cloth, or several of one garment.
+        options: see `SeamOptions`.
+        fabric: the cloth; with it further seams and darts are tried where it stays strained beyond its limit.
+
+    Raises:
+        InputError: an option is wrong.
+    """
+    options = options or SeamOptions()
+    options.validate()
+    layers = [surface] if isinstance(surface, Surface) else list(surface)
+    for layer in layers:
+        expect(layer, Surface, "surface", "a Surface, or a sequence of them")
+    # What the user draws lies on any of the layers, and before anything is changed in them.
+    cloths, drawn = cut_by_hand([cloth_of(layer) for layer in layers], layers, options.cuts)
+    found: list[FoundSeams] = []
+    for layer, cloth in zip(layers, cloths, strict=True):
+        found.append(_find_in_layer(cloth, layer, options, None if fabric is None else as_fabric(fabric)))
+        # All layers of a garment are worn the same way up.
+        options = replace(options, up=options.up or found[0].up, front=options.front or found[0].front)
+    often = Counter(piece.name for one in found for piece in one.pieces)
+    pieces, taken = list[Surface](), set[str]()
+    for one in found:
+        for piece in one.pieces:
+            name = piece.name if often[piece.name] == 1 else f"{one.what.split(',')[0]} {piece.name}"
+            name = find_unused_name(name, taken)
+            taken.add(name)
+            pieces.append(replace(piece, name=name))
+    return FoundSeams(
+        pieces=tuple(pieces),
+        seams=tuple(seam for one in found for seam in one.seams),
+        what="; ".join(
+            what if count == 1 else f"{count} x {what}" for what, count in Counter(one.what for one in found).items()
+        ),
+        up=found[0].up,
+        front=found[0].front,
+        notes=(*drawn, *(note for one in found for note in one.notes)),
+    )
+
+
+def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
+    cloth, closed_holes = _without_holes(cloth)
+    cloth, turned = without_thickness(cloth)
+    turned = [*closed_holes, *turned]
+    operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    if options.smooth:
+        cloth, words = _smoothed(cloth, operators, options.smooth)
+        turned = [words, *turned]
+        operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
+    even, moved, why = False, "", ""
+    if not options.cuts:  # what the user draws on one side is on that side alone
+        cloth, moved, even = averaged(cloth, anatomy, operators)
+        operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+    anatomy = replace(anatomy, limbs=averaged_limbs(anatomy, alike=even))
+    role = np.zeros(len(cloth.vertices))
+    for border in anatomy.borders:
+        role[border.vertices] = 1.0 + ROLES.index(border.role)
+    cloth = replace(cloth, values={**cloth.values, "role": role})
+    notes, auto = list[str](), options.find == "auto"
+    if anatomy.kind in TAILORED:
+        fields = draw_fields(cloth, anatomy, operators)
+        tailored = auto or options.keep
+        cloth, notes = (
+            cut_as_a_tailor(fields, anatomy, hood=not options.forbids("hood"))
+            if tailored
+            else (with_drawn_sleeves(fields, anatomy, anywhere=True), [])
+        )
+        for name in list(cloth.seams):
+            if not (auto or name.startswith(HAND) or options.keeps(name)):
+                cloth = cloth.without_seam(name)
+    cloth, left = leave_to_hand(cloth, options)
+    cloth, kept = keep_seams(cloth, anatomy, options)
+    cloth, inside = join_ends(cloth)
+    notes += [*left, *kept, *inside]
+    if auto:
+        shape = anatomy.kind not in TAILORED and not is_panel(cloth)
+        alike = even and shape
+        if alike:
+            cloth, why = mirrored(cloth, anatomy)
+        cloth, more = part_solids(
+            cloth,
+            shape=shape,
+            mirror=anatomy if alike and not why else None,
+            most=options.most_pieces,
+            measure=None
+            if fabric is None or anatomy.kind in TAILORED
+            else lambda trial, mesh, width: laid_flat(_surface_of(trial, anatomy, mesh, surface), fabric, width),
+        )
+        notes += more
+    if even:
+        cloth, why = mirrored(cloth, anatomy)
+    for name in list(cloth.seams):
+        if not name.startswith(HAND) and options.forbids(name):
+            cloth = cloth.without_seam(name)
+    cloth = open_tubes(cloth, anatomy, options)
+    by_hand = tuple(name.removeprefix(HAND) for name in cloth.seams if name.startswith(HAND))
+    options = replace(options, keep=(*options.keep, *by_hand))
+    cloth = replace(cloth, seams={name.removeprefix(HAND): edges for name, edges in cloth.seams.items()})
+    if not auto:
+        _require_open(cloth)
+    trials, basic = list[Trial](), set(cloth.seams)
+    if fabric is not None and auto:
+        try:
+            cloth, trials, _ = cut_by_energy(
+                cloth, anatomy, fabric, options, lambda trial, mesh: _surface_of(trial, anatomy, mesh, surface)
+            )
+        except InputError as reason:
+            notes.append(f"no further seams were looked for: {reason}")
+        if even:
+            cloth, why = mirrored(cloth, anatomy)
+        if closed := sorted(basic - cloth.seams.keys()):
+            notes.append(f"{', '.join(closed)} closed again: the cloth lies flat without, within its limit")
+    if why:
+        moved = f"both sides are averaged, but each is cut by itself, as {why}{'; ' if moved else ''}{moved}"
+    elif even and moved:
+        moved = f"both sides are averaged and cut alike: {moved}"
+    price = {trial.name: trial for trial in trials}
+    pieces = _as_surfaces(cloth, anatomy, surface)
+    return FoundSeams(
+        pieces=tuple(pieces),
+        seams=tuple(
+            FoundSeam(
+                name=name,
+                length=float(np.linalg.norm(np.diff(cloth.vertices[edges], axis=1), axis=2).sum()),
+                released=price[name].released if name in price else None,
+                needed=price[name].needed if name in price else "",
+            )
+            for name, edges in cloth.seams.items()
+        ),
+        what=describe(anatomy),
+        up=axis_name(anatomy.up),
+        front=axis_name(anatomy.front),
+        notes=(
+            *notes,
+            *turned,
+            *([moved] if moved else []),
+            *(() if anatomy.kind in TAILORED else _alike(pieces)),
+            *anatomy.notes,
+        ),
+    )
+
+
+def _require_open(cloth: Cloth) -> None:
+    """Refuse what no cut opens: closed pieces, and those with a handle.
+
+    Raises:
+        InputError: there is one.
+    """
+    for mesh in cloth.pieces():
+        loops = len(border_loops(mesh.faces.astype(np.int32)))
+        if loops == 0 or euler_characteristic(mesh.faces.astype(np.int32)) != 2 - loops:
+            x, y, z = (100.0 * mesh.vertices.mean(axis=0)).tolist()
+            what = "is closed" if loops == 0 else "has a handle"
+            raise InputError(
+                f'what the cuts leave {what}, about ({x:.0f}, {y:.0f}, {z:.0f}) cm: cut it once more, or let find = "auto" (--seams auto) '
+                "find the other seams"
+            )
+
+
+def _smoothed(cloth: Cloth, operators: Operators, length: float) -> tuple[Cloth, str]:
+    """Return the cloth without wrinkles shorter than a few times a length [m], and how far it has moved.
+
+    Smoothing once draws a tube in by the square of length over radius; what it took from its own result is given back, so that the
+    fourth power is left.
+    """
+    once = operators.smooth(cloth.vertices, length)
+    vertices = 2.0 * once - operators.smooth(once, length)
+    moved = 1e3 * np.linalg.norm(vertices - cloth.vertices, axis=1)
+    words = f"smoothed over {1e3 * length:g} mm, on request: it moved by {moved.mean():.1f} mm in the mean, {moved.max():.1f} mm at most"
+    return replace(cloth, vertices=vertices), words
+
+
+def _without_holes(cloth: Cloth) -> tuple[Cloth, list[str]]:
+    """Return the cloth with its holes closed, and a note if there were any: nobody sews around a fault of the mesh, or a buttonhole."""
+    vertices, fans, longest = [cloth.vertices], list[Ids](), 0.0
+    for loop in cloth.borders():
+        ring = cloth.vertices[loop]
+        length = polyline_length(np.append(ring, ring[:1], axis=0))
+        if length < HOLE * np.sqrt(float(cloth.face_areas.sum())):
+            middle = np.full(len(loop), len(cloth.vertices) + len(fans))
+            vertices.append(ring.mean(axis=0)[None])
+            fans.append(np.stack([np.roll(loop, -1), loop, middle], axis=1))
+            longest = max(longest, length)
+    if not fans:
+        return cloth, []
+    added = len(np.concatenate(fans))
+    cloth = replace(
+        cloth,
+        vertices=np.concatenate(vertices),
+        faces=np.concatenate([cloth.faces, *fans]),
+        values={name: np.append(value, np.zeros(len(fans))) for name, value in cloth.values.items()},
+        labels={name: np.append(label, np.zeros(added, dtype=np.int64)) for name, label in cloth.labels.items()},
+    )
+    return cloth, [f"{format_count(len(fans), 'hole')} of at most {1e3 * longest:.0f} mm around closed"]
+
+
+def cloth_of(surface: Surface) -> Cloth:
+    """Return the cloth of a surface: its triangles, wound so that their normals point out."""
+    triangles, _ = triangulate(surface.faces)
+    faces = triangles.astype(np.int64)
+    outwards = _volume(surface.vertices, faces) >= 0.0
+    return Cloth(vertices=surface.vertices.copy(), faces=faces if outwards else faces[:, ::-1].copy())
+
+
+def _volume(vertices: FloatArray, faces: Ids) -> float:
+    """Return the volume inside of a mesh whose borders are closed by fans [m3]; negative where normals point inwards."""
+    points = vertices - vertices[np.unique(faces)].mean(axis=0)
+    a, b, c = points[faces].transpose(1, 0, 2)
+    total = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())
+    for loop in border_loops(faces.astype(np.int32)):
+        ring = points[loop]
+        following, middle = np.roll(ring, -1, axis=0), ring.mean(axis=0)
+        total += float((np.cross(following, ring) @ middle).sum())
+    return total / 6.0
+
+
+def _as_surfaces(cloth: Cloth, anatomy: Anatomy, whole: Surface) -> list[Surface]:
+    """Return the pieces as surfaces: named, with the stretches of their borders and their grain as lines."""
+    meshes = list(cloth.pieces())
+    names = _names(cloth, anatomy, meshes)
+    label = {tuple(edge): name for name, edges in cloth.seams.items() for edge in edges.tolist()}
+    role = {
+        vertex: ROLES[int(number) - 1]
+        for vertex, number in enumerate(np.round(cloth.values["role"]).tolist())
+        if number > 0.0
+    }
+    of_face = np.empty(len(cloth.faces), dtype=np.int64)
+    for number, mesh in enumerate(meshes):
+        of_face[mesh.face_of] = number
+    beside = _faces_beside(cloth)
+    made = []
+    for number, mesh in enumerate(meshes):
+        piece = _surface_of(cloth, anatomy, mesh, whole, name=names[number])
+        lines = _edge_lines(piece, mesh, number, names, label, role, of_face, beside)
+        made.append(replace(piece, lines={**lines, **piece.lines}))
+    # Repairs of the whole are told once.
+    if made and whole.notes:
+        made[0] = replace(made[0], notes=whole.notes)
+    return made
+
+
+def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface, *, name: str = "piece") -> Surface:
+    """Return a piece as a surface, with its grain."""
+    faces = np.full((len(mesh.faces), 4), -1, dtype=np.int32)
+    faces[:, :3] = mesh.faces
+    piece = Surface(
+        vertices=mesh.vertices.copy(),
+        faces=faces,
+        name=name,
+        input_vertices=mesh.vertices.copy(),
+        input_index=np.arange(len(mesh.vertices), dtype=np.int32),
+        sources=whole.sources,
+    )
+    grain = _grain(piece, cloth, mesh, anatomy)
+    return piece if grain is None else replace(piece, lines={GRAIN: grain})
+
+
+def _faces_beside(cloth: Cloth) -> Mapping[tuple[int, int], list[int]]:
+    """Return the faces at each edge of a seam."""
+    wanted = set(map(tuple, cloth.seam_edges().tolist()))
+    found: dict[tuple[int, int], list[int]] = {}
+    for k in range(3):
+        sides = np.sort(np.stack([cloth.faces[:, k], cloth.faces[:, (k + 1) % 3]], axis=1), axis=1)
+        for face, edge in enumerate(map(tuple, sides.tolist())):
+            if edge in wanted:
+                found.setdefault(edge, []).append(face)
+    return found
+
+
+def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[str]:
+    """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
+    area = cloth.face_areas
+    plain, bands = [], [_band(cloth, mesh) for mesh in meshes]
+    of_sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1))
+    sleeves = [int(np.median(of_sleeve[mesh.face_of])) for mesh in meshes]
+    # A short sleeve from the armhole on is no cuff.
+    bands = [
+        "" if band == "cuff" and sleeves.count(sleeve) == 1 and sleeve >= 0 else band
+        for band, sleeve in zip(bands, sleeves, strict=True)
+    ]
+    both_sides = Counter[str]()
+    for mesh, band, sleeve in zip(meshes, bands, sleeves, strict=True):
+        weight = area[mesh.face_of]
+        corners = cloth.faces[mesh.face_of]
+        facing = cloth.values.get(FACING, np.zeros(len(cloth.vertices)))
+        across = (cloth.vertices[corners].mean(axis=1) @ anatomy.normal - anatomy.offset) * weight
+        # Wholly on one side, or over the middle; of the front and the back, or of one of them.
+        lopsided = abs(float(across.sum())) > 0.6 * float(np.abs(across).sum())
+        side = float(across.sum())
+        turned = facing[corners].mean(axis=1) * weight
+        face = ("front" if float(turned.sum()) > 0.0 else "back") if FACING in cloth.values else ""
+        if FACING in cloth.values and abs(float(turned.sum())) < _AROUND * float(np.abs(turned).sum()):
+            face = ""
+        if sleeve >= 0:
+            of_hood = sleeve >= len(anatomy.limbs_of("sleeve"))
+            name = f"{side_word(side)}_{'hood' if of_hood else 'sleeve'}"
+        elif anatomy.kind == "trousers":
+            # By its role: vertices of a cloth that has been mirrored have other numbers.
+            ends = np.round(cloth.values["role"][mesh.vertex_of]) == 1 + ROLES.index("leg")
+            part = "leg" if ends.any() else "yoke"
+            name = "_".join(filter(None, [side_word(side) if lopsided else "", face, part]))
+        elif anatomy.kind in ("top", "dress", "skirt", "jumpsuit"):
+            name = f"{side_word(side)}_{face or 'side'}" if lopsided else face or "body"
+        elif len(meshes) == 1:
+            name = anatomy.kind if anatomy.kind not in ("other", "closed") else "piece"
+        else:
+            name = "piece"
+        if band:
+            # What lies ahead of the middle is in front, whichever way the faces of a band point.
+            middle = (cloth.vertices[corners].mean(axis=1) * weight[:, None]).sum(axis=0) / weight.sum()
+            ahead = float((middle - 0.5 * (cloth.vertices.min(axis=0) + cloth.vertices.max(axis=0))) @ anatomy.front)
+            part = side_word(side) if lopsided else "front" if ahead > 0.0 else "back"
+            name = f"{part}_{band}" if bands.count(band) > 1 else band
+        plain.append(name)
+        both_sides[name] += 1
+    seen = Counter[str]()
+    names = []
+    for name in plain:
+        seen[name] += 1
+        names.append(f"{name}_{seen[name]}" if both_sides[name] > 1 else name)
+    return names
+
+
+def _band(cloth: Cloth, mesh: PieceMesh) -> str:
+    """Return what a piece is called that is a narrow strip along the waist, the neck, a sleeve's or a leg's end; "" for others."""
+    area = float(cloth.face_areas[mesh.face_of].sum())
+    loops = [np.append(loop, loop[0]) for loop in border_loops(mesh.faces.astype(np.int32))]
+    steps = [np.linalg.norm(np.diff(mesh.vertices[loop], axis=0), axis=1) for loop in loops]
+    around = float(sum(step.sum() for step in steps))
+    if "role" not in cloth.values or area > _BAND_AREA * float(cloth.face_areas.sum()) or around**2 < _BAND * area:
+        return ""
+    roles = np.round(cloth.values["role"][mesh.vertex_of]).astype(int)
+
+    def along(role: str) -> float:
+        own = roles == 1 + ROLES.index(role)
+        return sum(float(step[own[loop[:-1]] & own[loop[1:]]].sum()) for loop, step in zip(loops, steps, strict=True))
+
+    most = max(BANDS, key=along)
+    return BANDS[most] if along(most) > _ALONG * around else ""
+
+
+def _alike(pieces: Sequence[Surface]) -> list[str]:
+    """Return a note on pieces that are much the same, or mirror images: a maker draws them once."""
+    measures = []
+    for piece in pieces:
+        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+        around = [piece.vertices[np.append(loop, loop[0])] for loop in border_loops(piece.faces)]
+        length = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in around)
+        axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
+        measures.append(
+            [
+                np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()),
+                length,
+                *np.ptp(piece.vertices @ axes, axis=0),
+            ]
+        )
+    left = list(range(len(pieces)))
+    notes = []
+    while left:
+        first, *others = left
+        size, around, *extents = measures[first]
+        off = _ALIKE * np.array([size, around, *[max(extents)] * 3])
+        same = [first, *(k for k in others if (np.abs(np.subtract(measures[k], measures[first])) < off).all())]
+        left = [k for k in left if k not in same]
+        names = [pieces[k].name for k in same]
+        if len(names) > 2 or (len(names) == 2 and names[0].startswith("piece")):
+            notes.append(f"{', '.join(names)} are alike: cut {len(names)}, or some of them mirrored")
+    return notes
+
+
+def _edge_lines(
+    piece: Surface,
+    mesh: PieceMesh,
+    number: int,
+    names: Sequence[str],
+    label: Mapping[tuple[int, ...], str],
+    role: Mapping[int, str],
+    of_face: Ids,
+    beside: Mapping[tuple[int, int], list[int]],
+) -> dict[str, NDArray[np.int32]]:
+    """Return the stretches of a piece's border as lines, by the seam and the piece to which each is sewn, or by its role."""
+    lines: dict[str, NDArray[np.int32]] = {}
+    for loop in border_loops(piece.faces):
+        around = loop.tolist()
+        origin = mesh.vertex_of[loop].tolist()
+        keys = []
+        for k, vertex in enumerate(origin):
+            edge = tuple(sorted((vertex, origin[(k + 1) % len(origin)])))
+            seam = label.get(edge)
+            if seam is None:
+                keys.append((role.get(edge[0], role.get(edge[1], "edge")), -1))
+            else:
+                others = [int(of_face[face]) for face in beside[edge] if of_face[face] != number]
+                keys.append((seam, others[0] if others else number))
+        starts = [k for k in range(len(keys)) if keys[k] != keys[k - 1]]
+        if not starts:
+            continue
+        for a, b in zip(starts, [*starts[1:], starts[0] + len(keys)], strict=True):
+            run = [around[k % len(around)] for k in range(a, b + 1)]
+            seam, other = keys[a]
+            plain = seam.removesuffix(" left").removesuffix(" right")
+            several = len({key[1] for key in keys if key[0] == seam}) > 1
+            words = names[other].split("_")
+            words = words[: words.index(plain)] if plain in words[1:] else words
+            title = f"{plain} {words[-1]}" if several and other >= 0 else plain
+            lines[find_unused_name(title, lines)] = np.array(run, dtype=np.int32)
+    return lines
+
+
+def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> NDArray[np.int32] | None:
+    """Return the line along which a piece's grain runs: down the trunk and the leg, along a sleeve; None where there is none."""
+    sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
+    sleeves = anatomy.limbs_of("sleeve")
+    # A garment that leans in its file hangs along its own plane of symmetry.
+    upright = anatomy.up if anatomy.mirror is None else anatomy.up - (anatomy.up @ anatomy.normal) * anatomy.normal
+    along = sleeves[sleeve].along if 0 <= sleeve < len(sleeves) else upright
+    if anatomy.kind not in TAILORED:
+        # A gore, a strip: nothing but its own length says how it hangs.
+        spread, axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))
+        along = axes[:, 2] if spread[2] > _LONG * spread[1] else along
+    a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    facing = normals.sum(axis=0)
+    middle = np.average((a + b + c) / 3.0, axis=0, weights=np.maximum(np.linalg.norm(normals, axis=1), 1e-300))
+    count = np.bincount(mesh.vertex_of, minlength=len(cloth.vertices))
+    opened = mesh.vertices[count[mesh.vertex_of] > 1]
+    around = len(opened) > 0 and np.linalg.norm(facing) < 0.6 * np.linalg.norm(normals, axis=1).sum()
+    if around:
+        # It lies around a limb or the trunk: opposite to where it is opened.
+        facing = middle - opened.mean(axis=0)
+        rims = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, mesh.vertex_of).all()]
+        along = rims[0].along if len(rims) == 1 and rims[0].kind == "leg" else along
+    across = np.cross(along, facing)
+    if np.linalg.norm(across) < 0.1 * np.linalg.norm(facing) or not facing.any():
+        return None
+    try:
+        if around:
+            # The plane meets it on both sides.
+            beyond = np.cross(across, along)
+            sections = plane_sections(piece, middle, across, towards=beyond if beyond @ facing > 0.0 else -beyond)
+            line = line_from_curve(piece, max(sections, key=lambda one: polyline_length(one.points)).points, name=GRAIN)
+        else:
+            line = line_on_plane(piece, middle, across)
+    except (InputError, ValueError):
+        return None
+    reach = float(np.linalg.norm(piece.vertices[line[-1]] - piece.vertices[line[0]])) if len(line) > 1 else 0.0
+    if len(np.unique(line)) < len(line) or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
+        return None
+    return np.asarray(line, dtype=np.int32)
+
+
+def seam_words(found: FoundSeams) -> str:
+    """Return what was found in one line."""
+    total = 100 * sum(seam.length for seam in found.seams)
+    along = f", along {found.along}" if found.along else ""
+    return f"{found.what}: {format_count(len(found.pieces), 'piece')}, {format_count(len(found.seams), 'seam')} of {total:.0f} cm{along}"

@@ -1,0 +1,160 @@
+"""The layers of a garment that was made as a whole: its connected parts, without buttons and crumbs; and the lines drawn on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import NamedTuple
+
+import numpy as np
+
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import make_file_name, plain_label
+from warpflat.core.text import area_words, format_count, quote_value
+from warpflat.flat.surface.connectivity import euler_characteristic
+from warpflat.flat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
+from warpflat.flat.surface.io.usd_stage import ALL_PRIMS
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.repair.layers import Layer, surplus_faces, surplus_layers
+from warpflat.flat.surface.repair.validate import make_surface, parts_of_faces
+from warpflat.garment.seams.options import SeamCut
+
+__all__ = ["GarmentFile", "read_garment", "read_layers"]
+
+# A part is a trifle, such as a button, below this share of the area of all; a closed one below this.
+_TRIFLE, _CLOSED_TRIFLE = 0.004, 0.05
+# A body is no shorter than a newborn, and half of what it wears is as near as this [m].
+_SHORTEST_BODY, _WORN = 0.45, 0.1
+# So many parts at most are cut, each on its own.
+_MOST_LAYERS = 40
+
+
+class GarmentFile(NamedTuple):
+    """The layers of a garment's file, its lines as cuts, and its mesh as it stands, of `scale` metres per unit."""
+
+    layers: tuple[Surface, ...]
+    marks: tuple[SeamCut, ...]
+    raw: RawMesh
+    scale: float
+
+
+def read_layers(
+    path: str | PathLike[str], *, units: str | None = None, prim: str | None = None, name: str | None = None
+) -> tuple[Surface, ...]:
+    """Read a garment whose seams are to be found: each connected part is a layer, largest first; closed ones are kept.
+
+    Vertices at one place are joined, so that seams of a texture do not part the cloth. Buttons, crumbs and second layers are left out
+    with a note, as are a body that wears the rest, and a part that is no surface where another one is.
+
+    Args:
+        path, units: as :func:`warpflat.read_surface`.
+        prim: of a USD stage or a GLB scene; all meshes if not given.
+        name: of the layers; by default the file's stem.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    return read_garment(path, units=units, prim=prim, name=name).layers
+
+
+def read_garment(
+    path: str | PathLike[str], *, units: str | None = None, prim: str | None = None, name: str | None = None
+) -> GarmentFile:
+    """Read the layers of a garment as :func:`read_layers`, and as cuts the lines of its file.
+
+    Lines are line elements of OBJ, edge elements of PLY, and curves and creases of USD.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim or ALL_PRIMS, name=name)
+    vertices, title = raw.vertices * scale, name or make_file_name(file.stem)
+    notes = list(raw.notes)
+    polygons = raw.polygons
+    try:
+        apart = parts_of_faces(vertices, polygons, weld=False)
+        # Faces that share no vertices are a soup, whose second layer falls away as they are joined.
+        if 0 < apart.max() < len(polygons) // 2:
+            surplus_of, told = surplus_faces(vertices, polygons, apart)
+            notes += told
+            polygons = polygons[~surplus_of]
+        part = parts_of_faces(vertices, polygons, weld=True, notes=notes)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    found: list[Surface] = []
+    faults: list[InputError] = []
+    largest = 0.0
+    counts = np.bincount(part[part >= 0])
+    order = np.argsort(-counts, kind="stable")
+    for number in order[:_MOST_LAYERS].tolist():
+        try:
+            surface = make_surface(
+                vertices, polygons[part == number], name=title, weld=True, closed=True, source=str(file)
+            )
+        except InputError as error:
+            faults.append(error)
+            continue
+        size = float(np.ptp(surface.vertices, axis=0).max())
+        largest = max(largest, size)
+        if size >= POSSIBLE[0] or len(order) == 1:
+            found.append(surface)
+    if not found:
+        raise faults[0] if faults else wrong_size(largest, file, scale)
+    bodies = [surface for surface in found if _is_body(surface, [other for other in found if other is not surface])]
+    for body in bodies:
+        tall = float(np.ptp(body.vertices, axis=0).max())
+        notes.append(f"a body, {tall:.2f} m tall, left out: closed, and the rest lies around it")
+    found = [surface for surface in found if all(surface is not body for body in bodies)]
+    layers = [Layer(surface.vertices, surface.faces) for surface in found]
+    total = sum(layer.area for layer in layers)
+    surplus = surplus_layers(layers)
+    notes += surplus.values()
+    kept, trifles, area = list[Surface](), len(order) - len(found) - len(faults), 0.0
+    for number, (surface, layer) in enumerate(zip(found, layers, strict=True)):
+        if number in surplus:
+            continue
+        if number and layer.area < (_CLOSED_TRIFLE if _is_closed(surface) else _TRIFLE) * total:
+            trifles, area = trifles + 1, area + layer.area
+        else:
+            check_size(surface, file, scale)
+            kept.append(replace(surface, sources=tuple(dict.fromkeys(sources))))
+    if trifles:
+        notes.append(f"{format_count(trifles, 'small part')}, such as buttons, left out ({area_words(area)})")
+    notes += [f"a part left out: {str(fault).removeprefix(f'{file}: ')}" for fault in faults[:3]]
+    kept.sort(key=lambda surface: -Layer(surface.vertices, surface.faces).area)
+    marks = [
+        SeamCut(name=plain_label(key), edges=(tuple(chain.tolist()),), where=f"line {quote_value(key)} of {file}")
+        for key, chain in raw.chains.items()
+    ]
+    if raw.marked:
+        rows = tuple(tuple(row.tolist()) for row in raw.marked)
+        marks.append(SeamCut(name="marked", edges=rows, where=f"marked edges of {file}"))
+    for key, curve in raw.curves.items():
+        points = [tuple(point) for point in (curve * scale).tolist()]
+        closed = len(points) > 3 and points[0] == points[-1]
+        line = tuple(points[:-1] if closed else points)
+        marks.append(
+            SeamCut(name=plain_label(key), line=line, closed=closed, where=f"line {quote_value(key)} of {file}")
+        )
+    kept[0] = replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes])))
+    return GarmentFile(layers=tuple(kept), marks=tuple(marks), raw=raw, scale=scale)
+
+
+def _is_body(surface: Surface, others: Sequence[Surface]) -> bool:
+    """Return whether a layer is the body that wears the others: closed, without handles, as tall as one, and most of them lie on it."""
+    from scipy.spatial import cKDTree
+
+    if np.ptp(surface.vertices, axis=0).max() < _SHORTEST_BODY or not _is_closed(surface):
+        return False
+    worn = [other.vertices for other in others if not _is_closed(other)]
+    if not worn or euler_characteristic(surface.faces) != 2:
+        return False
+    away = cKDTree(surface.vertices).query(np.concatenate(worn))[0]
+    return float(np.median(away)) < _WORN
+
+
+def _is_closed(surface: Surface) -> bool:
+    from warpflat.flat.surface.connectivity import border_of
+
+    return len(border_of(surface)) == 0

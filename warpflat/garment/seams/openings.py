@@ -1,0 +1,104 @@
+"""Tubes that seams have left are opened where it serves the garment: sleeves at the underarm, legs at the inseam, trunks at centre back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.text import find_unused_name
+from warpflat.flat.surface.connectivity import border_loops
+from warpflat.flat.surface.tubes import tube_borders
+from warpflat.garment.seams.anatomy import Anatomy
+from warpflat.garment.seams.cloth import Cloth, PieceMesh, edge_components
+from warpflat.garment.seams.options import SeamOptions
+from warpflat.garment.seams.tailor import FACING, LEFT, side_word, tidied
+
+__all__ = ["open_tubes"]
+
+Ids = NDArray[np.int64]
+Cost = Callable[[Cloth, Ids], float]
+
+
+def open_tubes(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> Cloth:
+    """Return the cloth with its tubes cut open along lines of a tailor; one through which none of these runs is left as it is.
+
+    Args:
+        cloth: with its seams, and the fields of a tailor (see `draw_fields`); without them nothing is opened.
+        anatomy: of the garment.
+        options: which seams are not to be made.
+    """
+    if FACING not in cloth.values:
+        return cloth
+    for _ in range(4 * (1 + len(anatomy.borders))):
+        for mesh in cloth.pieces():
+            if len(border_loops(mesh.faces.astype(np.int32))) > 1 and _tubes(mesh):
+                made = _opened(cloth, mesh, anatomy, options)
+                if made is not None:
+                    cloth = made
+                    break
+        else:
+            break
+    return cloth
+
+
+def _tubes(mesh: PieceMesh) -> int:
+    """Return around how many of a piece's borders it is a tube."""
+    return len(tube_borders(Cloth(vertices=mesh.vertices, faces=mesh.faces).as_surface()))
+
+
+def _opened(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy, options: SeamOptions) -> Cloth | None:
+    """Return the cloth with one tube opened along the first line of a tailor that does so; None if none does."""
+    before, used = _tubes(mesh), np.unique(mesh.vertex_of)
+    limbs = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, used).all()]
+    for name, level, cost in _lines(cloth, anatomy, [limb.kind for limb in limbs]):
+        own = np.zeros(len(cloth.faces), dtype=np.int64)
+        own[mesh.face_of] = 1
+        marked = replace(cloth, labels={**cloth.labels, "own": own})
+        made, positive = tidied(marked, level, own > 0).split(level, own > 0)
+        own = made.labels["own"]
+        made = replace(made, labels={key: label for key, label in made.labels.items() if key != "own"})
+        lines = made.line_between(positive, own > 0)
+        seam, stride = made.seam_edges(), np.int64(len(made.vertices))
+        lines = lines[~np.isin(lines[:, 0] * stride + lines[:, 1], seam[:, 0] * stride + seam[:, 1])]
+        he = made.half_edges
+        parts = edge_components(lines, ends=np.union1d(he.edges[he.count == 1], seam))
+        chosen = [(cost(made, part), part) for part in parts]
+        for value, part in sorted(chosen, key=lambda one: one[0]):
+            across = float((made.vertices[np.unique(part)] @ anatomy.normal).mean()) - anatomy.offset
+            title = name if level == LEFT else f"{name} {side_word(across)}"
+            if not np.isfinite(value) or options.forbids(title):
+                continue
+            trial = made.with_seam(find_unused_name(title, made.seams), part)
+            # Still one piece, and less of a tube than before.
+            pieces = [piece for piece in trial.pieces() if own[piece.face_of].any()]
+            if len(pieces) == 1 and _tubes(pieces[0]) < before:
+                return trial
+    return None
+
+
+def _lines(cloth: Cloth, anatomy: Anatomy, limbs: list[str]) -> Iterator[tuple[str, str, Cost]]:
+    """Yield lines along which a tube may be opened, the best first: name, field, and what a part of its zero line costs."""
+
+    def height(cloth: Cloth, edges: Ids) -> float:
+        return float((cloth.vertices[np.unique(edges)] @ anatomy.up).mean())
+
+    def beside(cloth: Cloth, edges: Ids) -> float:
+        return float(np.abs(cloth.vertices[np.unique(edges)] @ anatomy.normal - anatomy.offset).mean())
+
+    def behind(cloth: Cloth, edges: Ids) -> float:
+        facing = float(cloth.values[FACING][np.unique(edges)].mean())
+        return facing if facing < 0.0 else np.inf
+
+    def ahead(cloth: Cloth, edges: Ids) -> float:
+        return behind(replace(cloth, values={FACING: -cloth.values[FACING]}), edges)
+
+    if limbs == ["sleeve"]:
+        yield "underarm", FACING, height
+    if "leg" in limbs:
+        yield "inseam", FACING, beside
+    yield "centre back", LEFT, behind
+    yield "centre front", LEFT, ahead
+    yield "side", FACING, lambda cloth, edges: -beside(cloth, edges)

@@ -1,0 +1,141 @@
+"""Cloth that is turned inside at an opening: drawn thickness, which is no cloth to be cut."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from warpflat.core.arrays import BoolArray
+from warpflat.core.text import format_count
+from warpflat.flat.surface.connectivity import join_labels
+from warpflat.garment.seams.cloth import Cloth
+from warpflat.garment.seams.fields import Operators
+
+__all__ = ["even_line", "without_thickness"]
+
+# A layer of faces around an opening is turned inside if it faces its middle by this (mean cosine), and outside from the second on.
+_INSIDE, _OUTSIDE = -0.25, 0.35
+# So is a first layer that lies across the opening, no wider than this share, if the next one stands up from it.
+_ACROSS, _RIM, _UPRIGHT = 0.9, 0.025, 0.85
+# Turned cloth is no wider than this share of the square root of the area.
+_WIDEST = 0.15
+# What takes more than this share of a piece that the user has drawn is that piece, as a waistband, and is worn as it lies.
+_PIECE = 0.5
+# An opening is level from this on (its area over that of a circle as long).
+_LEVEL = 0.4
+# The line where it ends is evened over this share of the garment's size, and lies within so much of where it was; a line that strays
+# from it by no more than the third is even.
+_EVEN, _REACH, _RAGGED = 0.03, 0.05, 0.004
+
+
+def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
+    """Return the cloth without what is turned inside at its openings, and a note if there was any."""
+    size = float(np.sqrt(cloth.face_areas.sum()))
+    drop = np.zeros(len(cloth.faces), dtype=bool)
+    openings, areas, part = 0, cloth.face_areas, cloth.parts
+    piece = np.bincount(part, areas)
+    for loop in cloth.borders():
+        points = cloth.vertices[loop]
+        following, middle = np.roll(points, -1, axis=0), points.mean(axis=0)
+        area = 0.5 * np.cross(points - middle, following - middle).sum(axis=0)
+        length = float(np.linalg.norm(following - points, axis=1).sum())
+        if length < 0.06 * size or np.linalg.norm(area) < _LEVEL * length**2 / (4 * np.pi):
+            continue
+        turned = _turned(cloth, loop, area / np.linalg.norm(area), size)
+        if turned is not None and (np.bincount(part, areas * turned) <= _PIECE * piece).all():
+            drop |= turned
+            openings += 1
+    if not openings or drop.mean() > 0.5:
+        return cloth, []
+    cloth, drop = even_line(cloth, drop, size)
+    kept = replace(cloth, faces=cloth.faces[~drop])
+    part = replace(kept, seams={}).parts
+    kept = replace(kept, faces=kept.faces[part == np.bincount(part).argmax()])
+    used, place = np.unique(kept.faces, return_inverse=True)
+    area_out = 1e4 * float(cloth.face_areas[drop].sum())
+    number = np.full(len(cloth.vertices), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    seams = {name: number[edges] for name, edges in cloth.seams.items()}
+    made = Cloth(
+        vertices=cloth.vertices[used],
+        faces=place.reshape(-1, 3).astype(np.int64),
+        seams={name: edges[(edges >= 0).all(axis=1)] for name, edges in seams.items()},
+    )
+    return made, [
+        f"cloth turned inside at {format_count(openings, 'opening')} ({area_out:.0f} cm2) left out: it is drawn thickness"
+    ]
+
+
+def even_line(cloth: Cloth, drop: BoolArray, size: float) -> tuple[Cloth, BoolArray]:
+    """Return the cloth split along an even line where some of its faces end, and #F, those beyond it.
+
+    They are found layer by layer, and the mesh's own edges between them and the others are ragged. The line is where the distance from
+    these edges, negative beyond them, is zero when it is smoothed.
+    """
+    among, others = (np.isin(np.arange(len(cloth.vertices)), cloth.faces[chosen]) for chosen in (drop, ~drop))
+    rim = np.flatnonzero(among & others)
+    away, nearest = cKDTree(cloth.vertices[rim]).query(cloth.vertices)
+    away *= np.where(others, 1.0, -1.0)
+    level = Operators(vertices=cloth.vertices, faces=cloth.faces).smooth(away, _EVEN * size)
+    # A strip is narrower than what smoothing reaches: each line is shifted back to where it was in the mean.
+    ring = cloth.faces[drop]
+    own = join_labels(len(cloth.vertices), ring[:, [0, 1]].ravel(), ring[:, [1, 2]].ravel())[rim]
+    shift = np.bincount(own, level[rim]) / np.maximum(np.bincount(own), 1)
+    level -= shift[own[nearest]]
+    stray = np.zeros(len(shift))
+    np.maximum.at(stray, own, np.abs(level[rim]))
+    ragged = stray > _RAGGED * size
+    if not ragged.any():
+        return cloth, drop
+    near = ((np.abs(away) < _REACH * size) & ragged[own[nearest]])[cloth.faces].any(axis=1)
+    marked = replace(
+        cloth, values={"turned": level}, labels={"turned": drop.astype(np.int64), "near": near.astype(np.int64)}
+    )
+    made, outside = marked.split("turned", near)
+    dropped = np.where(made.labels["near"] > 0, ~outside, made.labels["turned"] > 0)
+    return replace(made, values={}, labels={}), dropped
+
+
+def _turned(cloth: Cloth, loop: np.ndarray, axis: np.ndarray, size: float) -> BoolArray | None:
+    """Return #F, the faces turned inside around one opening; None if there are none."""
+    normals, middles = cloth.face_normals, cloth.vertices[cloth.faces].mean(axis=1)
+    areas = cloth.face_areas
+    reached = np.zeros(len(cloth.vertices), dtype=bool)
+    reached[loop] = True
+    taken = np.zeros(len(cloth.faces), dtype=bool)
+    turned, last, width = False, np.zeros(len(cloth.faces), dtype=bool), 0.0
+    rim: BoolArray | None = None
+    ring = cloth.vertices[loop].mean(axis=0)
+    around = float(np.linalg.norm(np.diff(cloth.vertices[np.append(loop, loop[0])], axis=0), axis=1).sum())
+    for _ in range(40):
+        layer = reached[cloth.faces].any(axis=1) & ~taken
+        if not layer.any():
+            return None
+        weight = areas[layer]
+        radial = middles[layer] - ring
+        radial -= (radial @ axis)[:, None] * axis
+        radial /= np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-300)
+        facing = float((np.einsum("ij,ij->i", normals[layer], radial) * weight).sum() / max(weight.sum(), 1e-300))
+        if rim is not None:
+            return rim if facing > _UPRIGHT else None
+        across = abs(float(((normals[layer] @ axis) * weight).sum())) / max(float(weight.sum()), 1e-300)
+        lies_across = _INSIDE <= facing < _OUTSIDE and across > _ACROSS
+        if not turned and lies_across and weight.sum() < _RIM * size * around:
+            rim = layer.copy()
+        elif facing >= _OUTSIDE or (not turned and facing >= _INSIDE):
+            break
+        turned |= facing < _INSIDE
+        taken |= layer
+        last = taken.copy()
+        width += float(weight.sum()) / max(around, 1e-300)
+        if width > _WIDEST * size:
+            return None
+        new = np.unique(cloth.faces[layer])
+        new = new[~reached[new]]
+        if len(new) == 0:
+            return None
+        reached[new] = True
+        ring = cloth.vertices[new].mean(axis=0)
+    return last if turned else None

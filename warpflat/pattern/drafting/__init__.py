@@ -1,0 +1,1 @@
+"""A flat piece becomes a pattern here: sewing lines, allowances, notches, labels, marker."""

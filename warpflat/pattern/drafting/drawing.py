@@ -1,0 +1,455 @@
+"""A drafted piece as strokes and words: what it shows in every file format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import polyline_length, resample
+from warpflat.core.text import name_without_number, without_side
+from warpflat.pattern.drafting.curves import Curve, fit_curve
+from warpflat.pattern.drafting.draft import nest_label
+from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedPiece
+from warpflat.pattern.drafting.drafted_darts import fisheye_legs
+from warpflat.pattern.drafting.label import TAILS, Label, Words, text_width
+from warpflat.pattern.drafting.measures import name_in_units
+from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS, LEFT_OUT
+from warpflat.pattern.drafting.placement import LabelRoom, Spot, spots_along
+from warpflat.pattern.drafting.words import translate, translate_name
+
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+__all__ = ["Drawing", "OnPaper", "Stroke", "draw_nest", "draw_piece", "grain_strokes"]
+
+
+#: Arrow heads: length and half width [m].
+ARROW, BARB = 0.006, 0.002
+#: The bracket that says "on fold" stands this far [m] inside the fold.
+BRACKET = 0.014
+#: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
+NAME, NAME_GAP = 0.0024, 0.0028
+#: On an edge of a nest that is no longer than this [m] the sizes stand once.
+SHORT_EDGE = 0.15
+#: Where along its line a name stands, in order of preference.
+NAME_SHARES = (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5)
+#: Least distance [m] of words from all else; that at which no better place is sought, for names and for letters.
+CLEAR, WELL_CLEAR, LETTER_CLEAR = 0.0004, 0.006, 0.001
+#: Height [m] of a seam's letter beside a notch, and its distance from it.
+LETTER, LETTER_GAP = 0.0026, 0.0012
+#: What lies closer [m] to a fold lies on it.
+ON_FOLD = 1e-5
+#: No words stand so far beyond a fold [m].
+BEYOND_FOLD = 0.02
+#: Radius [m] of the circle around a drill hole.
+DRILL = 0.002
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stroke:
+    """One line of a drawing.
+
+    Attributes:
+        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "left_out", "grain", "notch", "drill", "cutout",
+            "leader".
+        name: what it is called in files, unique among the strokes of a piece; empty for decoration.
+        points: #P by 2 [m].
+        closed: the last point joins the first.
+        curve: the line as Béziers, where there are such.
+        hidden: not visible, but named and kept in files that can keep hidden lines.
+    """
+
+    role: str
+    name: str
+    points: FloatArray
+    closed: bool = False
+    curve: Curve | None = None
+    hidden: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OnPaper:
+    """What printing changes: a fold is not cut, words cross no joint, notches have letters.
+
+    Attributes:
+        joints: lines (2 by 2 [m]) where sheets of paper meet or end.
+        outside: what no sheet shows.
+        letters: of seams, by their names.
+    """
+
+    joints: Sequence[FloatArray] = ()
+    outside: Geometry | None = None
+    letters: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drawing:
+    """All strokes and words of one piece in one size (or of the label of a nest)."""
+
+    piece: DraftedPiece
+    strokes: tuple[Stroke, ...]
+    words: tuple[Words, ...]
+
+
+def draw_piece(piece: DraftedPiece, paper: OnPaper | None = None) -> Drawing:
+    """Draw one piece in one size; `paper` where it is printed."""
+    strokes = [
+        *_cut_strokes(piece, open_folds=paper is not None),
+        *(_edge_stroke(piece, edge) for edge in piece.edges if paper is None or edge.kind != "fold"),
+        *_cutout_sew_strokes(piece),
+        *_detail_strokes(piece),
+    ]
+    more, words = _annotations(piece, piece.label, piece.label.words(), paper)
+    return Drawing(piece=piece, strokes=(*strokes, *more), words=tuple(words))
+
+
+def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) -> tuple[Drawing, ...]:
+    """Draw one piece in all its sizes upon each other: cut lines, darts and notches of each; label and grain once.
+
+    The sewing lines of several sizes would be a thicket: they are hidden.
+    """
+    if len(pieces) == 1:
+        return (draw_piece(pieces[0], paper),)
+    import shapely
+
+    drawings = []
+    middle = len(pieces) // 2
+    longest = max(pieces, key=lambda piece: sum(polyline_length(edge.line) for edge in piece.fold_edges))
+
+    def shift_across(name: str) -> float:
+        middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
+        start, end = pieces[0].edge(name).line[[0, -1]]
+        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
+        shift = middles[1] - middles[0]
+        return abs(float(shift[0] * along[1] - shift[1] * along[0]))
+
+    # Where the sizes lie farthest apart a size is easiest to read off its line.
+    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
+    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
+    edge = max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
+    for index, piece in enumerate(pieces):
+        strokes = [
+            *_cut_strokes(piece, open_folds=paper is not None),
+            *(
+                replace(_edge_stroke(piece, e), hidden=e.kind not in ("dart", "fold"))
+                for e in piece.edges
+                if paper is None or e.kind != "fold"
+            ),
+            *(replace(line, hidden=True) for line in _cutout_sew_strokes(piece)),
+            *_detail_strokes(piece),
+        ]
+        if piece is not longest:
+            # Dashes of several sizes upon each other would be a full line.
+            strokes = [replace(line, hidden=True) if line.role == "fold" else line for line in strokes]
+        words: list[Words] = []
+        if index == middle:
+            label = nest_label(pieces)
+            sizes = ", ".join(p.size for p in pieces)
+            # The label names all sizes in place of its own, no wider than it is.
+            rows = label.words()
+            for number, row in enumerate(rows):
+                one_size, all_sizes = translate("size {size}", size=piece.size), translate("sizes {sizes}", sizes=sizes)
+                if row.text == one_size[0].upper() + one_size[1:]:
+                    text = all_sizes[0].upper() + all_sizes[1:]
+                    height = row.height * min(1.0, label.width / text_width(text, row.height))
+                    rows[number] = replace(row, text=text, height=height)
+            others = [stroke for other in pieces if other is not piece for stroke in _detail_strokes(other)]
+            slits = [shapely.LineString(stroke.points) for stroke in others if stroke.role == "notch"]
+            more, words = _annotations(piece, label, rows, paper, borders=False, slits=slits)
+            strokes += more
+        if edge:
+            # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
+            ring = shapely.LinearRing(piece.cut_line)
+            joints = shapely.MultiLineString([] if paper is None else [joint.tolist() for joint in paper.joints])
+            # Twice on a long edge.
+            rows_of_tags = ((0.08, 0.3), (0.62, 0.3)) if piece.edge(edge).length > SHORT_EDGE else ((0.05, 0.9),)
+            for start, along in rows_of_tags:
+                at_first = start + along * (index + 0.5) / len(pieces)
+                tags = []
+                # A little to either side, more and more, where a joint of two sheets would cut it.
+                for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
+                    at = resample(piece.edge(edge).line, min(max(at_first + away, 0.0), 1.0))
+                    on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+                    tags.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
+                    if shapely.disjoint(shapely.Polygon(tags[-1].box()), joints):
+                        break
+                else:
+                    tags = tags[:1]
+                words.append(tags[-1])
+        drawings.append(Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words)))
+    return tuple(drawings)
+
+
+def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
+    """Return the cutting line; with `open_folds`, as what is cut and what lies on the fold, up to the cut edges."""
+    if not (open_folds and piece.fold_edges):
+        return [Stroke(role="cut", name="cut", points=piece.cut_line, closed=True)]
+    ring = piece.cut_line
+    onwards = np.roll(ring, -1, axis=0)
+    on_fold = np.zeros(len(ring), dtype=bool)
+    for edge in piece.fold_edges:
+        start, end = edge.line[[0, -1]]
+        along = (end - start) / np.linalg.norm(end - start)
+        away = [np.abs((points - start) @ [-along[1], along[0]]) for points in (ring, onwards)]
+        on_fold |= np.maximum(*away) < ON_FOLD
+    if not on_fold.any() or on_fold.all():
+        whole = Stroke(role="cut", name="cut", points=ring, closed=True)
+        return [whole, *(_edge_stroke(piece, edge) for edge in piece.fold_edges)]
+    first = next(k for k in range(len(ring)) if on_fold[k - 1] and not on_fold[k])
+    order = np.roll(np.arange(len(ring)), -first)
+    changes = [k for k in range(len(ring)) if on_fold[order[k]] != on_fold[order[k - 1]]]
+    strokes = []
+    for number, (a, b) in enumerate(zip(changes, [*changes[1:], len(ring)], strict=True)):
+        points = ring[order[np.arange(a, b + 1) % len(ring)]]
+        folded = bool(on_fold[order[a]])
+        name = piece.fold_edges[0].name if folded else "cut"
+        strokes.append(
+            Stroke(
+                role="fold" if folded else "cut",
+                name=name if number < 2 else f"{name} {number // 2 + 1}",
+                points=points,
+            )
+        )
+    return strokes
+
+
+def _edge_stroke(piece: DraftedPiece, edge: DraftedEdge) -> Stroke:
+    role = edge.kind if edge.kind in ("hem", "fold", "dart") else "sew"
+    line = piece.drawn_line(edge)
+    return Stroke(role=role, name=edge.name, points=line, curve=edge.curve if line is edge.line else None)
+
+
+def _cutout_sew_strokes(piece: DraftedPiece) -> list[Stroke]:
+    """Return the sewing lines of holes that have an allowance."""
+    return [
+        Stroke(role="sew", name=f"{name}.sew", points=cutout.sew_line, closed=True)
+        for name, cutout in piece.cutouts.items()
+        if cutout.width > 0
+    ]
+
+
+def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
+    strokes = [
+        Stroke(role="dart_fold", name=f"{dart.dart.name}.fold", points=dart.fold)
+        for dart in piece.darts
+        if dart.fold is not None
+    ]
+    for index, notch in enumerate(piece.notches):
+        for slit, base in enumerate(notch.base):
+            name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
+            line = np.stack([base, base + notch.depth * notch.direction])
+            strokes.append(Stroke(role="notch", name=name, points=line))
+    for hole in piece.drill_holes:
+        turn = np.linspace(0, 2 * np.pi, 17)[:-1]
+        ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])
+        strokes.append(Stroke(role="drill", name="", points=ring, closed=True))
+        for axis in np.eye(2):
+            cross = np.stack([hole.at - 1.5 * DRILL * axis, hole.at + 1.5 * DRILL * axis])
+            strokes.append(Stroke(role="drill", name="", points=cross))
+    strokes += [
+        Stroke(role="cutout", name=name, points=cutout.cut_line, closed=True) for name, cutout in piece.cutouts.items()
+    ]
+    for name, line in piece.fisheyes.items():
+        left, right = fisheye_legs(line)
+        strokes += [
+            Stroke(role="dart", name=f"{name}.left", points=left),
+            Stroke(role="dart", name=f"{name}.right", points=right),
+            Stroke(role="dart_fold", name=f"{name}.fold", points=left[[0, -1]]),
+        ]
+    return strokes
+
+
+def _annotations(
+    piece: DraftedPiece,
+    label: Label,
+    rows: Sequence[Words],
+    paper: OnPaper | None,
+    *,
+    borders: bool = True,
+    slits: Sequence[Geometry] = (),
+) -> tuple[list[Stroke], list[Words]]:
+    """Draw grain, internal lines, leader and brackets of folds, and place all words of a piece so that they keep clear of each other.
+
+    An edge's name stands inside the sewing line, a dart's beside its first leg, a seam's letter beside its notch, in the
+    allowance. Nothing is written across a joint.
+
+    Args:
+        piece: whose words they are.
+        label: of the piece, or of its nest.
+        rows: what the label says, at its place.
+        paper: where it is printed; None writes no letters.
+        borders: whether edges have names.
+        slits: notches of other sizes, which letters keep off.
+    """
+    import shapely
+
+    strokes = [
+        *grain_strokes(piece.grain),
+        *(
+            Stroke(
+                role="left_out" if name.endswith(LEFT_OUT) else "internal",
+                name=name,
+                points=line,
+                curve=_fit_internal_line(line.tobytes()),
+            )
+            for name, line in piece.internal_lines.items()
+        ),
+    ]
+    words, room = list(rows), LabelRoom()
+    if label.leader is None:
+        room.take(shapely.Polygon(label.box))
+    else:
+        strokes.append(Stroke(role="leader", name="", points=label.leader))
+    for joint in () if paper is None else paper.joints:
+        room.take(shapely.LineString(joint))
+    if paper is not None and paper.outside is not None:
+        room.take(paper.outside)
+    for hole in piece.drill_holes:
+        room.take(shapely.Point(hole.at).buffer(2 * DRILL))
+    for cutout in piece.cutouts.values():
+        room.take(shapely.LinearRing(cutout.sew_line))
+    for stroke in grain_strokes(piece.grain):
+        room.take(shapely.LineString(stroke.points))
+
+    def write(text: str, height: float, spots: Iterable[Spot], *, bold: bool = False, **clear: Any) -> bool:
+        width = text_width(text, height, bold=bold)
+        spot = room.place_clear(spots, width, TAILS * height, **clear)
+        if spot is not None:
+            at = np.array([spot.x, spot.y])
+            words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
+        return spot is not None
+
+    beyond = list[Any]()
+    for fold in piece.fold_edges:
+        # A line beside the fold whose two arms point to it, with words along it.
+        start, span = fold.line[0], fold.line[-1] - fold.line[0]
+        length = float(np.linalg.norm(span))
+        inwards = np.array([-span[1], span[0]]) / length
+        depth = min(BRACKET, length / 4)
+        a, b = start + 0.15 * span, start + 0.85 * span
+        points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
+        bracket = [
+            Stroke(role="grain", name="", points=points),
+            _arrow(a, -inwards, "grain"),
+            _arrow(b, -inwards, "grain"),
+        ]
+        strokes += bracket
+        angle = float(np.arctan2(span[1], span[0]))
+        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
+            angle += np.pi
+        places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
+        inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
+        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
+        # Other words keep off the bracket, and inside the half that is printed.
+        for stroke in bracket:
+            room.take(shapely.LineString(stroke.points))
+        if paper is not None:
+            run, out = BEYOND_FOLD * span / length, BEYOND_FOLD * inwards
+            ends = start - run, fold.line[-1] + run
+            beyond.append(shapely.Polygon([ends[0], ends[0] - out, ends[1] - out, ends[1]]))
+            room.take(beyond[-1])
+
+    # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
+    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
+    second_legs = {dart.dart.right for dart in piece.darts}
+    named = [(name, line, "above") for name, line in piece.internal_lines.items()]
+    for edge in piece.edges:
+        if edge.name in first_legs:
+            named.append((first_legs[edge.name], piece.drawn_line(edge), "left"))
+        elif borders and edge.kind != "fold" and edge.name not in second_legs:
+            named.append((edge.name, edge.line, "left"))
+    named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
+    called = {name for name, _, _ in named}
+    hems = {
+        edge.name
+        for edge in piece.edges
+        if edge.kind == "hem" or (edge.kind == "cut" and HEMMED_LEVELS & set(edge.name.split(" ")))
+    }
+    drawn = [shapely.LineString(line) for _, line, _ in named]
+    for index, (name, line, side) in enumerate(named):
+        # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; vents and wraps keep theirs.
+        kind = (
+            "hem"
+            if name in hems and not {"vent", "slit", "wrap"} & set(name.split(" "))
+            else name_without_number(name, called)
+        )
+        # One of a pair is neither left nor right, as in the sewing order.
+        text = translate_name(without_side(kind) if piece.piece.is_pair else kind)
+        text = name_in_units(text, piece.piece.units)
+        width = text_width(text, NAME)
+        if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
+            others = [*drawn[:index], *drawn[index + 1 :]]
+            # Beside an edge, as a zip is, a name may have room on one side alone.
+            for which in (side, "either") if side == "above" else (side,):
+                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=which)
+                if write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
+                    break
+    # The first button and the first buttonhole of a row, which are too short for a name along them.
+    marks = {hole.name: hole.at for hole in piece.drill_holes if hole.name == "button"}
+    marks |= {name: line.mean(axis=0) for name, line in piece.internal_lines.items() if name == "buttonhole"}
+    for name, at in marks.items():
+        text = translate_name(name)
+        out = np.array([text_width(text, NAME) / 2 + 2 * DRILL + 0.001, 2 * DRILL + NAME])
+        sides = [
+            (0, 1),
+            (0, -1),
+            (1, 0),
+            (-1, 0),
+            (0, 2),
+            (0, -2),
+            (1, 1),
+            (1, -1),
+            (-1, 1),
+            (-1, -1),
+            (1.6, 0),
+            (-1.6, 0),
+        ]
+        around = [Spot(x=float(x), y=float(y)) for x, y in at + out * sides]
+        write(text, NAME, around, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
+    letters = {} if paper is None else paper.letters
+    for notch in piece.notches:
+        letter = letters.get(notch.seam)
+        if letter is not None:
+            along = np.array([notch.direction[1], -notch.direction[0]])
+            middle = (notch.depth / 2 + 0.0004) * notch.direction
+            # Beside the outer slit of a double notch.
+            aside = [max(float((base - notch.base[0]) @ along * sign) for base in notch.base) for sign in (1.0, -1.0)]
+            half = text_width(letter, LETTER, bold=True) / 2 + LETTER_GAP
+            # Close to the notch, or where the sheet ends there, some way along the edge.
+            places = [
+                notch.base[0] + middle + sign * (out + half + way) * along
+                for way in (0.0, LETTER, 2.0 * LETTER)
+                for sign, out in zip((1.0, -1.0), aside, strict=True)
+            ]
+            # Where the sheets' joint runs through all of them, the fold still counts.
+            off = [min(shapely.distance(shapely.Point(place), beyond), default=np.inf) for place in places]
+            places = [place for place, away in zip(places, off, strict=True) if away > half - LETTER_GAP] or places
+            beside = [Spot(x=float(x), y=float(y)) for x, y in places]
+            write(letter, LETTER, beside, bold=True, avoid=slits, enough=LETTER_CLEAR)
+    return strokes, words
+
+
+@lru_cache(maxsize=1024)
+def _fit_internal_line(line: bytes) -> Curve:
+    """Fit a curve to an internal line; cached, since every file asks for it."""
+    return fit_curve(np.frombuffer(line).reshape(-1, 2))
+
+
+def grain_strokes(grain: FloatArray) -> list[Stroke]:
+    """Draw the grain line (2 by 2 [m]) with an arrow at either end."""
+    low, high = grain
+    strokes = [Stroke(role="grain", name="grain", points=grain)]
+    strokes += [_arrow(high, high - low, "grain"), _arrow(low, low - high, "grain")]
+    return strokes
+
+
+def _arrow(tip: FloatArray, direction: FloatArray, role: str) -> Stroke:
+    along = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    across = np.array([-along[1], along[0]])
+    points = np.stack([tip - ARROW * along + BARB * across, tip, tip - ARROW * along - BARB * across])
+    return Stroke(role=role, name="", points=points)

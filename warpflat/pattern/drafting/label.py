@@ -1,0 +1,208 @@
+"""The text on a pattern: its letters, DejaVu Sans, and what the label of a piece says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.text import size_words
+from warpflat.pattern.drafting.measures import length_words
+from warpflat.pattern.drafting.pieces import Piece
+from warpflat.pattern.drafting.words import translate
+
+if TYPE_CHECKING:
+    from reportlab.pdfbase.ttfonts import TTFont
+
+__all__ = [
+    "BOLD",
+    "CAPITALS",
+    "FONT",
+    "LEADING",
+    "TAILS",
+    "TEXT",
+    "TITLE",
+    "Label",
+    "Words",
+    "cutting_words",
+    "embedded_font",
+    "label_lines",
+    "printed_size",
+    "rotation",
+    "text_width",
+    "wrap_text",
+]
+
+
+FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
+#: Height of capitals over the font's size.
+CAPITALS = 0.729
+#: Width over the font's size of letters that the font lacks: in other fonts they are no wider than their body.
+UNKNOWN = 1.0
+#: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
+TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
+#: Height of letters with tails below, over that of capitals.
+TAILS = 1.6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Words:
+    """One line of text.
+
+    Attributes:
+        text: what it says.
+        at: its centre [m].
+        height: of its capitals [m].
+        angle: [rad] counter-clockwise.
+        bold: in bold letters.
+        tag: names a size on that size's own line: in the line's colour, on a white ground.
+    """
+
+    text: str
+    at: FloatArray
+    height: float
+    angle: float = 0.0
+    bold: bool = False
+    tag: bool = False
+
+    def box(self) -> FloatArray:
+        """Return the corners of what it covers, 4 by 2 [m]; tails below the line count."""
+        half = np.array([text_width(self.text, self.height, bold=self.bold) / 2, self.height * TAILS / 2])
+        return self.at + (half * [[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ rotation(self.angle).T
+
+
+@cache
+def embedded_font(name: str) -> TTFont:
+    """Return FONT or BOLD for PDF files."""
+    from reportlab.pdfbase.ttfonts import TTFont
+
+    # The fonts have most of the world's letters and come with matplotlib; importing that takes longer than writing a pattern.
+    found = find_spec("matplotlib")
+    assert found is not None
+    assert found.origin is not None
+    return TTFont(name, str(Path(found.origin).parent / "mpl-data" / "fonts" / "ttf" / f"{name}.ttf"))
+
+
+def text_width(text: str, height: float, *, bold: bool = False) -> float:
+    """Return the width [m] of one line whose capitals are `height` [m] high."""
+    widths = embedded_font(BOLD if bold else FONT).face.charWidths  # in thousandths of the font's size
+    return sum(widths.get(ord(letter), 1000 * UNKNOWN) / 1000 for letter in text) * height / CAPITALS
+
+
+def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> str:
+    """Turn spaces of a text into line breaks where a line would be wider than `width` [m]; words stay whole."""
+    rows: list[str] = []
+    for word in text.split():
+        longer = f"{rows[-1]} {word}" if rows else word
+        if rows and text_width(longer, height, bold=bold) <= width:
+            rows[-1] = longer
+        else:
+            rows.append(word)
+    return "\n".join(rows)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Label:
+    """Lines of text, centred.
+
+    Attributes:
+        at: the centre [m].
+        lines: (text, height of capitals [m]) from top to bottom, the first in bold; a line break parts the rows of a
+            line.
+        angle: [rad] counter-clockwise.
+        leader: 2 by 2 [m], from a label beside its piece to the cloth; None where the label stands on the piece.
+    """
+
+    at: FloatArray
+    lines: tuple[tuple[str, float], ...]
+    angle: float = 0.0
+    leader: FloatArray | None = None
+
+    @property
+    def rows(self) -> list[tuple[str, float, bool]]:
+        """(text, height of capitals [m], whether it is bold) from top to bottom."""
+        return [(row, height, k == 0) for k, (text, height) in enumerate(self.lines) for row in text.split("\n")]
+
+    @property
+    def height(self) -> float:
+        """Height of the whole block [m], at right angles to its lines."""
+        return sum(height * LEADING for _, height, _ in self.rows)
+
+    @property
+    def width(self) -> float:
+        """Width of the widest row [m]."""
+        return max(text_width(text, height, bold=bold) for text, height, bold in self.rows)
+
+    @property
+    def box(self) -> FloatArray:
+        """Corners of the block, 4 by 2 [m]."""
+        half = np.array([self.width, self.height]) / 2
+        return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ rotation(self.angle).T
+
+    def words(self) -> list[Words]:
+        """Return each row at its place."""
+        words, y = [], self.height / 2
+        for text, height, bold in self.rows:
+            y -= height * LEADING
+            at = self.at + rotation(self.angle) @ [0.0, y + height * LEADING / 2]
+            words.append(Words(text=text, at=at, height=height, angle=self.angle, bold=bold))
+        return words
+
+    def scaled(self, factor: float) -> Label:
+        """Return the label in another size, about its centre."""
+        return replace(self, lines=tuple((text, height * factor) for text, height in self.lines))
+
+
+def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
+    """Return what a label says: name, size, how to cut the piece, cloth, included allowances, garment."""
+    lines = [piece.printed_name.upper()]
+    if piece.size:
+        words = printed_size(piece.size)
+        lines.append(words[0].upper() + words[1:])
+    lines.append(cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
+    lines += [
+        f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
+    ]
+    # The legs of a dart that is cut away are sewn as a seam, and what is turned in has as much.
+    allowances = []
+    for kind in ("seam", "hem"):
+        alike = [
+            e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind in ("dart", "cut") and e.width > 0)
+        ]
+        values = [length_words(width, piece.units) for width in sorted({round(e.width, 4) for e in alike})]
+        if values:
+            # The unit once: "6/10 mm".
+            numbers = [value.removesuffix(f" {piece.units}") for value in values]
+            widths = f"{'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}"
+            allowances.append(translate(f"{kind} {{widths}}", widths=widths))
+    if allowances:
+        lines.append(translate("Includes {allowances}", allowances=", ".join(allowances)))
+    title = garment.replace("_", " ")
+    if title.upper() != lines[0]:
+        lines.append(title)
+    return tuple(lines)
+
+
+def cutting_words(piece: Piece) -> str:
+    """Return how often a piece is cut, and how."""
+    if piece.on_fold:
+        return translate("Cut {count} on fold", count=piece.quantity)
+    if piece.quantity % 2 == 0 and piece.paired:
+        return translate("Cut {count}, {mirrored} mirrored", count=piece.quantity, mirrored=piece.quantity // 2)
+    return translate("Cut {count}", count=piece.quantity)
+
+
+def printed_size(size: str) -> str:
+    """Return the words for a size as they are printed."""
+    return translate("size {size}", size=size) if size_words(size) != size else translate(size)
+
+
+def rotation(angle: float) -> FloatArray:
+    """Return the 2 by 2 matrix of a turn by an angle [rad], counter-clockwise."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, -sine], [sine, cosine]])

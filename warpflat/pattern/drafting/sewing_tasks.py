@@ -1,0 +1,531 @@
+"""What has to be sewn of a garment: its seams, and what finishes each free edge, each as a task with its technique and its notions."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from typing import Any
+
+from warpflat.core.polyline import polyline_length
+from warpflat.core.text import other_side, without_side
+from warpflat.core.toml_file import read_toml
+from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.measures import length_words
+from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.words import listed, translate, translate_name
+
+__all__ = ["BANDS", "GATHERED", "Place", "SewingTasks", "Task", "piece_titles", "pieces_of", "techniques"]
+
+#: A piece and an edge of it, by their names.
+Place = tuple[str, str]
+#: Techniques by the roles of the pieces on both sides of a seam; those of the shell alone follow from the garment.
+_BY_ROLES: tuple[tuple[set[str], str], ...] = (
+    ({"facing"}, "facing_join"),
+    ({"facing", "shell"}, "facing"),
+    ({"lining"}, "lining_join"),
+    ({"facing", "lining"}, "lined_edge"),
+    ({"strip"}, "strip_join"),
+    ({"waistband"}, "strip_join"),
+    ({"strip", "shell"}, "strip"),
+    ({"waistband", "shell"}, "waistband"),
+    ({"strip", "waistband"}, "waistband"),
+    ({"cuff"}, "cuff"),
+    ({"cuff", "shell"}, "cuff"),
+    ({"hood"}, "hood_join"),
+    ({"hood", "shell"}, "hood"),
+    ({"collar"}, "collar"),
+    ({"collar", "shell"}, "collar_on"),
+    ({"pocket"}, "pocket_rim"),
+    ({"pocket", "shell"}, "pocket_opening"),
+)
+#: Techniques that sew a strip, a band or a collar to the garment, and use up its other edges.
+_ON = (
+    *("rib", "binding", "ruffle", "waistband_ends", "waistband_ring", "waistband_layers", "cuff", "hood"),
+    *("collar_on", "collar_stand_on", "collar_between", "collar_under_facing", "facing", "stand_and_fall", "collar"),
+)
+#: Those of them that lengthen an edge.
+BANDS = ("rib", "waistband_ends")
+#: How the edges of a facing that is grown on begin, which lie beyond the line on which it is folded.
+_GROWN_ON = "facing "
+# What is longer by more than this share is gathered; less is eased in.
+GATHERED = 0.15
+
+
+@functools.cache
+def techniques() -> Mapping[str, Mapping[str, Any]]:
+    """Return what things are sewn by: the turn, the text and the drawing of each technique."""
+    with resources.as_file(resources.files("warpflat.pattern.drafting") / "data/techniques.toml") as path:
+        return read_toml(path)
+
+
+@dataclass(kw_only=True, eq=False)
+class Task:
+    """What is sewn at once: a seam with its mirror image, or edges and pieces that are finished.
+
+    Attributes:
+        technique: "" of a seam of the shell, whose technique follows from what is sewn before.
+        seams: mirror images of each other.
+        places: where it is sewn.
+        uses: free and folded edges that it uses up.
+        pieces: that are at work besides.
+        values: what is filled into its text.
+        notions: what it takes.
+        needs: tasks that come before it.
+        like: the task of the other side of the body, if that has an opening and this one has none.
+    """
+
+    technique: str
+    seams: list[Seam] = field(default_factory=list)
+    places: list[Place] = field(default_factory=list)
+    uses: list[Place] = field(default_factory=list)
+    pieces: list[str] = field(default_factory=list)
+    values: dict[str, Any] = field(default_factory=dict)
+    notions: list[str] = field(default_factory=list)
+    needs: set[Task] = field(default_factory=set)
+    like: Task | None = None
+
+    @property
+    def sewn(self) -> list[Place]:
+        """Pieces and edges of its seams."""
+        return [(side.piece, side.edge) for seam in self.seams for row in seam.sides for side in row]
+
+    @property
+    def turn(self) -> int:
+        return int(techniques()[self.technique or "flat"]["turn"])
+
+
+def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
+    """Return what each piece is called: as it is printed, with its side where two would be called alike."""
+    plain = [piece.printed_name for piece in pieces]
+    return {
+        piece.name: title if plain.count(title) == 1 or piece.title else translate_name(piece.name.replace("_", " "))
+        for piece, title in zip(pieces, plain, strict=True)
+    }
+
+
+class SewingTasks:
+    """What has to be sewn of a garment in one size.
+
+    Attributes:
+        units: of lengths in words.
+        drafted, pieces, titles: the pieces by name, and what they are called.
+        order: the edges of each piece in their order.
+        seams: of the garment.
+        above: the half that lies above where it buttons, "right" or "left".
+        lengths: of both sides of each seam [mm].
+        tasks: each seam with its mirror images, and each finishing; every free edge is used up by one of them.
+    """
+
+    def __init__(self, garment: DraftedGarment, size: str) -> None:
+        self.size, self.units = size, garment.garment.units
+        self.drafted = {piece.name: piece for piece in garment.pieces[size]}
+        # Whole ones, also where halves on the fold are printed.
+        self.pieces = {piece.name: piece for piece in garment.garment.pieces[size]}
+        self.titles = piece_titles(list(self.pieces.values()))
+        self.seams = garment.garment.seams
+        self.above = "right" if garment.garment.worn is None else garment.garment.worn.buttonholes
+        self.order = {name: [edge.name for edge in piece.edges] for name, piece in self.pieces.items()}
+        self.lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
+        self.tasks = [Task(technique=self._technique(group), seams=group) for group in _mirror_groups(self.seams)]
+        # Of halves on the fold the seam of one side stands for both, and a zip lies in one of them.
+        for task in [task for task in self.tasks if task.seams[0].openings and self.stands_for_both(task.seams)]:
+            other = replace(task.seams[0], name=other_side(task.seams[0].name), openings=())
+            self.tasks.append(Task(technique=self._technique([other]), seams=[other], like=task))
+        self._finish(garment)
+
+    def stands_for_both(self, group: Sequence[Seam]) -> bool:
+        """Return whether a seam of halves on the fold, or of pairs, is sewn on both sides of the body."""
+        seam, other = group[0], other_side(group[0].name)
+        joined = [self.pieces[side.piece] for row in seam.sides for side in row]
+        within = not any(side.mirrored or side.copy for row in seam.sides for side in row)
+        if within and all(piece.quantity == 2 and not piece.on_fold for piece in joined):
+            return len(group) == 1
+        both = all(piece.on_fold or piece.is_pair for piece in joined)
+        return both and len(group) == 1 and other != seam.name and other not in {each.name for each in self.seams}
+
+    def called(self, names: Iterable[str]) -> str:
+        """Return pieces in words."""
+        return ", ".join(dict.fromkeys(self.titles[name] for name in names))
+
+    def edges_called(self, places: Sequence[Place], technique: str) -> str:
+        """Return edges in words: hems by their width, others by their names, raw ones with their lengths."""
+        rows: dict[str, list[Place]] = {}
+        for piece, edge in places:
+            width = length_words(self.pieces[piece].edge(edge).width, self.units)
+            name = translate_name(without_side(edge).rstrip(" 0123456789"))
+            rows.setdefault(width if technique == "hem" else name, []).append((piece, edge))
+        if technique == "bind_raw":
+            counts = {row: sum(self._length(place) for place in places) for row, places in rows.items()}
+            return ", ".join(f"{row} {length_words(length, self.units)}" for row, length in counts.items())
+        return ", ".join(f"{row} ({self.called(pieces_of(places))})" for row, places in rows.items())
+
+    def _length(self, place: Place) -> float:
+        """Return the length of an edge on all that is cut by its piece [m]."""
+        piece = self.pieces[place[0]]
+        return piece.edge(place[1]).length * piece.quantity * (2 if piece.on_fold else 1)
+
+    def _technique(self, group: Sequence[Seam]) -> str:
+        """Return how seams are sewn, by the roles of their pieces and by what these are like; "" for seams of the shell."""
+        seam = group[0]
+        rows = [[self._role(side) for side in row] for row in seam.sides]
+        roles = {role for row in rows for role in row}
+        if not any(set(row) == {"pocket"} for row in rows):
+            # What of a pocket lies in another seam is sewn with that.
+            roles -= {"pocket"}
+        technique = next((technique for known, technique in _BY_ROLES if known == roles), "")
+        joined = [self.pieces[side.piece] for row in seam.sides for side in row]
+        strips = [piece for piece in joined if piece.role in ("strip", "waistband")]
+        folded = any("fold line" in strip.internal_lines for strip in strips)
+        if technique == "strip_join" and (len(group) > 1 or any(side.copy for row in seam.sides for side in row)):
+            return "panel_join"
+        if technique == "strip":
+            hemmed = any(edge.kind == "hem" for strip in strips for edge in strip.edges)
+            return "ruffle" if hemmed else "rib" if folded else "binding"
+        if technique == "waistband":
+            ring = any({side.piece for row in each.sides for side in row} == {strips[0].name} for each in self.seams)
+            return ("waistband_ring" if ring else "waistband_ends") if folded else "waistband_layers"
+        if technique == "collar":
+            falls = [each for each in self.seams if self._is_fall(each)]
+            stands = {side.piece for each in falls for side in each.sides[1]}
+            return "stand_and_fall" if seam in falls or joined[0].name in stands else "collar"
+        if technique == "collar_on":
+            faced = {side.piece for row in seam.sides for side in row if self._grown_on(side.piece)}
+            if faced and all(self._free_beside_fold(piece) for piece in faced):
+                return "collar_between"
+            if self._turned_over(seam):
+                return "collar_under_facing"
+            return "collar_stand_on" if any("stand" in piece.name for piece in joined) else "collar_on"
+        if technique == "pocket_rim" and any(
+            edge.kind == "cut" and edge.name == "opening" for piece in joined for edge in piece.edges
+        ):
+            return "inseam_rim"
+        if technique in ("", "hood") or roles == {"shell"}:
+            zips = [opening for opening in seam.openings if opening.kind == "zip"]
+            if zips:
+                fly = any(piece.role == "fly" for piece in self.pieces.values()) and zips[0].style == "lapped"
+                return "fly" if fly else f"{zips[0].style or 'invisible'}_zip"
+            if any(opening.kind == "buttons" for opening in seam.openings):
+                return "buttoned"
+        return technique
+
+    def _role(self, side: SeamSide) -> str:
+        role = self.pieces[side.piece].role
+        return "facing" if role == "shell" and side.edge.startswith(_GROWN_ON) else role
+
+    def _is_fall(self, seam: Seam) -> bool:
+        """Return whether a seam joins the fall of a collar to its stand."""
+        sides = [row[0] for row in seam.sides]
+        return all(self._role(side) == "collar" for side in sides) and sides[0].piece != sides[1].piece
+
+    def _grown_on(self, piece: str) -> list[str]:
+        """Return the edges of a facing that is grown on to a piece of the shell."""
+        known = self.pieces[piece]
+        return [edge.name for edge in known.edges if known.role == "shell" and edge.name.startswith(_GROWN_ON)]
+
+    def _free_beside_fold(self, piece: str) -> list[str]:
+        """Return the edges beside a grown-on facing that no seam takes: the upper end of a button stand beside a collar."""
+        taken = {(side.piece, side.edge) for seam in self.seams for row in seam.sides for side in row}
+        order, grown = self.order[piece], self._grown_on(piece)
+        beside = [order[(order.index(edge) + step) % len(order)] for edge in grown for step in (-1, 1)]
+        return [
+            edge
+            for edge in dict.fromkeys(beside)
+            if edge not in grown and (piece, edge) not in taken and self.pieces[piece].edge(edge).kind == "seam"
+        ]
+
+    def _turned_over(self, seam: Seam) -> list[Place]:
+        """Return what no seam takes beside a collar: ends of facings, which are turned over its ends, and of button stands."""
+
+        def stem(edge: str) -> str:
+            return without_side(edge).rstrip(" 0123456789")
+
+        taken = {(side.piece, side.edge) for each in self.seams for row in each.sides for side in row}
+        shell = [side for row in seam.sides for side in row if self.pieces[side.piece].role == "shell"]
+        facings = {
+            side.piece
+            for each in self.seams
+            if {other.piece for row in each.sides for other in row} & {other.piece for other in shell}
+            for row in each.sides
+            for side in row
+            if self.pieces[side.piece].role == "facing"
+        }
+        along = {stem(side.edge) for side in shell}
+        return [
+            (piece, edge)
+            for piece in [*sorted(facings), *(pieces_of((side.piece, "") for side in shell) if facings else ())]
+            for edge in self.order[piece]
+            if (piece, edge) not in taken and stem(edge) in along
+        ]
+
+    def _finish(self, garment: DraftedGarment) -> None:
+        """Add the tasks that finish edges and pieces, until every free edge is used up by one of them."""
+        drafted, units = list(self.drafted.values()), self.units
+        sewn = {(side.piece, side.edge) for seam in self.seams for row in seam.sides for side in row}
+        # What is cut twice is drawn for one side.
+        sewn |= {(of, other_side(edge)) for piece, edge in sewn for of in (piece, other_side(piece))}
+        free = {
+            (piece.name, edge.name): edge.kind
+            for piece in self.pieces.values()
+            for edge in piece.edges
+            if edge.kind not in ("fold", "dart") and (piece.name, edge.name) not in sewn
+        }
+        joined = {piece for piece, _ in sewn}
+
+        def take(places: Iterable[Place]) -> list[Place]:
+            return [place for place in places if free.pop(place, None) is not None]
+
+        def of(names: Collection[str], kinds: Collection[str] = ("seam", "hem", "cut")) -> list[Place]:
+            return take([place for place, kind in free.items() if place[0] in names and kind in kinds])
+
+        def add(technique: str, pieces: Iterable[str], uses: Sequence[Place] = (), **values: Any) -> None:
+            names = list(pieces)
+            if names or uses:
+                self.tasks.append(Task(technique=technique, pieces=names, uses=list(uses), values=values))
+
+        role = {name: piece.role for name, piece in self.pieces.items()}
+        fused = [name for name, piece in self.pieces.items() if piece.also or role[name] == "interfacing"]
+        add("fuse", fused, of([name for name in fused if role[name] == "interfacing"]))
+        ties = [name for name in role if role[name] == "tie"]
+        tied = [name for name, piece in self.pieces.items() if "tie" in piece.marks]
+        add("tie", [*ties, *tied], of(ties))
+        add("tie_on", tied)
+        for technique in ("dart", "pleat"):
+            for piece in drafted:
+                legs = _dart_legs(piece, pleats=technique == "pleat")
+                if legs:
+                    add(technique, [piece.name], darts=f"{self.titles[piece.name]}: {listed(list(legs))}")
+                    self.tasks[-1].places = [(piece.name, leg) for row in legs.values() for leg in row]
+        # A pocket of a first project is a panel like others, but nothing is sewn to its edges.
+        loose = [name for name in role if name not in joined]
+        pockets = [name for name in loose if role[name] == "pocket" or name.endswith("pocket")]
+        patches = [name for name in pockets if any(edge.kind == "hem" for edge in self.pieces[name].edges)]
+        add("patch_pocket", patches, of(patches))
+        welts = [name for name in pockets if name not in patches]
+        add("welt_pocket", welts, of(welts))
+        bags = [name for name in joined if role.get(name) == "pocket"]
+        inseam = [place[0] for place in free if place[0] in bags and place[1] == "opening"]
+        add("inseam_bag", inseam, of(inseam, ("cut",)))
+        self._use("pocket_rim", of(bags))
+        straps = [
+            name
+            for name in loose
+            if role[name] == "shell" and all(edge.kind == "cut" for edge in self.pieces[name].edges)
+        ]
+        add("strap", straps, of(straps))
+        plackets = [name for name in loose if role[name] == "placket"]
+        buttoned = [name for name in plackets if "button" in self.pieces[name].marks]
+        add("neck_placket", buttoned, of(buttoned), strip=translate(f"{self.above} strip"))
+        slits = [name for name in plackets if name not in buttoned]
+        add("bound_slit", slits, of(slits))
+        fly = [name for name in role if role[name] == "fly"]
+        fly_places = of(fly)
+        for task in self.tasks:
+            if task.technique == "fly":
+                task.pieces, task.uses = fly, fly_places
+        # Facings that are grown on; beside a collar that ends at the centre they are sewn with that.
+        grown = [name for name in role if self._grown_on(name)]
+        ends = {name: self._free_beside_fold(name) for name in grown}
+        between = [task for task in self.tasks if task.technique == "collar_between"]
+        for name in grown:
+            own = [(name, edge) for edge in (*self._grown_on(name), *ends[name])]
+            faced = [each for each in self.tasks if each.technique == "facing" and set(own) & set(each.sewn)]
+            places = take([(p, e) for p, e in own if not faced or self.pieces[p].edge(e).kind != "hem"])
+            if faced:
+                faced[0].uses += places
+            elif between:
+                between[0].uses += places
+                between[0].pieces.append(name)
+            else:
+                add("grown_facing", [name], places)
+        for task in self.tasks:
+            if task.technique == "collar_under_facing":
+                task.uses += take(self._turned_over(task.seams[0]))
+        # Linings and facings end at a zip, or are caught in a band or binding, where the shell's edge of the same name is.
+        zipped, bound = set[str](), set[str]()
+        for task in self.tasks:
+            edges = {without_side(edge) for piece, edge in task.sewn if role[piece] == "shell"}
+            zipped |= edges if any(opening.kind == "zip" for seam in task.seams for opening in seam.openings) else set()
+            bound |= edges if task.technique in _ON and task.technique not in ("facing", "hood") else set()
+        inner = [name for name in role if role[name] in ("lining", "facing")]
+        for technique, known in (("at_zip", zipped), ("baste_lining", bound)):
+            places = [
+                (p, e) for (p, e), kind in free.items() if p in inner and kind == "seam" and without_side(e) in known
+            ]
+            add(technique, [], take(places))
+        open_seams = [task for task in self.tasks if task.technique == "lining_join" and task.seams[0].openings]
+        zips = [task for task in open_seams if any(each.kind == "zip" for each in task.seams[0].openings)]
+        for task in self.tasks:
+            if task.technique == "at_zip":
+                task.places = [place for each in zips for place in each.sewn]
+        # Strips, collars and facings: what their own seam to the garment leaves.
+        ruffles = [
+            name for name in role if role[name] == "strip" and any(e.kind == "hem" for e in self.pieces[name].edges)
+        ]
+        add("ruffle_hem", ruffles, of(ruffles, ("hem",)))
+        pleated = [name for name in ruffles if any("pleat fold" in line for line in self.pieces[name].internal_lines)]
+        add("ruffle_pleats", pleated)
+        longer = {s.piece for seam in self.seams if seam.ease > GATHERED for s in seam.sides[1]}
+        add("ruffle_gathers", [name for name in ruffles if name in longer and name not in pleated])
+        hoods = [name for name in role if role[name] == "hood"]
+        hood_hems = of(hoods, ("hem",))
+        width = max((self.pieces[p].edge(e).width for p, e in hood_hems), default=0.0)
+        add("hood_hem", [], hood_hems, width=length_words(width, units))
+        for name in role:
+            if role[name] in ("facing", "strip", "waistband", "cuff", "collar", "hood"):
+                places = [(p, e) for (p, e), kind in free.items() if p == name and kind != "hem"]
+                on = [t for t in self.tasks if t.technique in _ON and name in pieces_of(t.sewn)]
+                if on and places:
+                    max(on, key=lambda task: task.turn).uses.extend(take(places))
+        # Vents and slits, in the shell and in its lining.
+        for kind in ("vent", "slit"):
+            own = [place for place in free if free[place] == "hem" and kind in place[1].split(" ")]
+            for task in [task for task in self.tasks if task.seams]:
+                found = [each for each in task.seams[0].openings if each.kind == kind]
+                sides = task.sewn
+                if found and role[sides[0][0]] != "lining":
+                    places = [(p, e) for p, e in own if (p, e.removesuffix(f" {kind}")) in sides]
+                    add(kind, [], take(places), length=length_words(found[0].length, units), of=task.seams)
+                    if not places:
+                        self.tasks.append(
+                            Task(
+                                technique=kind,
+                                values={"length": length_words(found[0].length, units), "of": task.seams},
+                            )
+                        )
+                    self.tasks[-1].needs.add(task)
+            lined = take([place for place in own if place in free and role[place[0]] == "lining"])
+            add("lined_opening", [], lined, kind=translate(kind))
+        for elastic in garment.garment.elastics:
+            along = [
+                (piece.name, edge.name)
+                for piece in self.pieces.values()
+                for edge in piece.edges
+                if without_side(edge.name).rstrip(" 0123456789") == elastic.edge
+            ]
+            cased = take([place for place in along if free.get(place) == "hem"])
+            values = {
+                "edge": translate_name(elastic.edge),
+                "width": length_words(elastic.width, units),
+                "length": length_words(elastic.lengths[self.size], units),
+            }
+            add("casing" if cased else "elastic_band", pieces_of(along), cased, **values)
+            self.tasks[-1].notions.append(
+                translate(
+                    f"{{count}} {'elastic' if elastic.count == 1 else 'elastics'} of {{length}}, at most {{width}} wide",
+                    count=elastic.count,
+                    **values,
+                )
+            )
+        add("hang", [name for name, piece in self.pieces.items() if role[name] == "shell" and _is_flounce(piece)])
+        for technique, kind in (("hem", "hem"), ("bind_raw", "seam"), ("raw", "cut")):
+            add(technique, [], of(role, (kind,)))
+        self._close(drafted)
+
+    def _close(self, drafted: Sequence[DraftedPiece]) -> None:
+        """Add what closes the garment, with its notions: zips, buttons, hooks."""
+        zipped = False
+        for task in self.tasks:
+            found = [opening for seam in task.seams for opening in seam.openings if opening.kind == "zip"]
+            if not found or not task.technique.endswith(("_zip", "fly")):
+                continue
+            zipped, opening = True, found[0]
+            length = length_words(opening.length, self.units)
+            count = len(task.seams)
+            words = f"{{count}} {opening.style} {'zip' if count == 1 else 'zips'} of {{length}}"
+            task.notions.append(translate(words, count=count, length=length))
+            where = "from the upper edge down to the end of its line"
+            if opening.begin > 0.0:
+                where = "from {begin} below the upper edge down to the end of its line"
+            below = [each.kind for each in task.seams[0].openings if each.kind in ("slit", "vent")]
+            closed = f"Then close the seam below it{', down to the ' + below[0] if below else ''}."
+            task.values = {
+                "length": length,
+                "where": translate(
+                    "all along" if opening.whole else where, begin=length_words(opening.begin, self.units)
+                ),
+                "below": "" if opening.whole else translate(closed),
+                "front": translate(f"{self.above} front"),
+            }
+        ended = [piece for piece in drafted if _buttons_at_one_end(piece)]
+        counts: dict[str, list[DraftedPiece]] = {}
+        for piece in drafted:
+            if piece not in ended and sum(name.startswith("button") for name in piece.piece.marks) > 1:
+                counts.setdefault(self.titles[piece.name], []).append(piece)
+        for pieces in counts.values():
+            count = sum(name.startswith("button") for name in pieces[-1].piece.marks)
+            holes = [piece.internal_lines["buttonhole"] for piece in pieces if "buttonhole" in piece.internal_lines]
+            words = translate("{count} buttons", count=count)
+            if holes:
+                length = length_words(polyline_length(holes[0]), self.units)
+                words += translate(", for buttonholes of {length}", length=length)
+            values = {"count": count, "half": translate(f"{self.above} half")}
+            self.tasks.append(
+                Task(technique="buttonholes", pieces=[p.name for p in pieces], values=values, notions=[words])
+            )
+        if ended:
+            # Both layers of a collar have one button.
+            count = sum(p.piece.quantity // (2 if p.piece.role == "collar" else 1) for p in ended)
+            words = translate("{count} small buttons" if count > 1 else "1 small button", count=count)
+            self.tasks.append(Task(technique="end_button", pieces=[p.name for p in ended], notions=[words]))
+        bands = [p.name for p in drafted if p.piece.role == "waistband" and not _buttons_at_one_end(p)]
+        if zipped and bands:
+            self.tasks.append(Task(technique="hook", pieces=bands, notions=[translate("1 hook and bar")]))
+
+    def _use(self, technique: str, places: Sequence[Place]) -> None:
+        """Let the first task of a technique that is sewn at a piece use up its free edges."""
+        for place in places:
+            task = next(
+                t
+                for t in self.tasks
+                if t.technique in (technique, "inseam_rim", "pocket_opening") and place[0] in pieces_of(t.sewn)
+            )
+            task.uses.append(place)
+
+
+def _is_flounce(piece: Piece) -> bool:
+    """Return whether a piece is a panel of a flounce."""
+    return "flounce" in re.split("[ _]", piece.name)
+
+
+def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
+    """Return seams that are each other's mirror images together, which are sewn alike."""
+    groups: dict[object, list[Seam]] = {}
+    copied = {(s.piece, s.edge) for seam in seams for row in seam.sides for s in row if s.copy}
+    alike: dict[tuple[str, str], object] = {}
+    for seam in seams:
+        # Edges of equal pieces, of which one is drawn, have the notches of one seam.
+        own = [(s.piece, s.edge) for row in seam.sides for s in row if (s.piece, s.edge) in copied]
+        if own:
+            key = next((alike[edge] for edge in own if edge in alike), own[0])
+            alike |= dict.fromkeys(own, key)
+            groups.setdefault(key, []).append(seam)
+            continue
+        sides = sorted(
+            tuple(sorted((without_side(s.piece), without_side(s.edge)) for s in side)) for side in seam.sides
+        )
+        # A zip in one side alone makes it another seam than the other side.
+        groups.setdefault((without_side(seam.name), tuple(sides), seam.openings), []).append(seam)
+    return list(groups.values())
+
+
+def _buttons_at_one_end(piece: DraftedPiece) -> bool:
+    """Return whether a strip buttons upon itself: a cuff, or the stand of a collar."""
+    return piece.piece.role in ("cuff", "collar", "waistband") and "button" in piece.piece.marks
+
+
+def pieces_of(places: Iterable[Place]) -> list[str]:
+    return list(dict.fromkeys(piece for piece, _ in places))
+
+
+def _dart_legs(piece: DraftedPiece, *, pleats: bool) -> dict[str, list[str]]:
+    """Return the edges of a piece's darts, or of its pleats, by the names that are printed; a fisheye dart is its own line."""
+    legs: dict[str, list[str]] = {}
+    for dart in (each.dart for each in piece.darts):
+        if (dart.pleat is not None) == pleats:
+            legs.setdefault(translate_name(without_side(dart.name)), []).extend([dart.left, dart.right])
+    for name in () if pleats else piece.fisheyes:
+        legs.setdefault(translate_name(without_side(name)), []).append(name)
+    return legs

@@ -1,0 +1,86 @@
+"""Geometry that exporters need of a mesh: areas, outline edges, lines. Every division is guarded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.flat.surface.normals import area_vectors
+from warpflat.flat.surface.triangles import triangulate
+
+__all__ = [
+    "Polylines",
+    "corner_average",
+    "corner_mean",
+    "face_areas",
+    "outline_edges",
+    "polylines_of",
+]
+
+Polylines = list[IntArray]
+
+
+def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
+    """Return lines by name as lists of vertex-index arrays, one per polyline; single points are dropped."""
+    result: dict[str, Polylines] = {}
+    for name, line in (lines or {}).items():
+        single = len(line) > 0 and np.ndim(line[0]) == 0
+        parts = [np.asarray(part, dtype=np.int32) for part in ([line] if single else line)]
+        result[name] = [part for part in parts if len(part) > 1]
+    return {name: parts for name, parts in result.items() if parts}
+
+
+def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the area [m2] of each face (#F by 4) over positions (#V by 2 or 3); quads are split along corners 0-2."""
+    triangles, face = triangulate(faces)
+    areas = np.linalg.norm(area_vectors(positions, triangles), axis=1)
+    return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
+
+
+def corner_mean(values: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the mean of the values (#V) at the corners of each face (#F by 4, -1 as the fourth of a triangle), #F."""
+    used = faces >= 0
+    return np.asarray(np.where(used, values[faces], 0.0).sum(axis=1) / used.sum(axis=1))
+
+
+def corner_average(
+    values: FloatArray,
+    weights: FloatArray,
+    face: IntArray,
+    vertex: IntArray,
+    count: int,
+) -> FloatArray:
+    """Return the mean of the face values around each vertex, weighted by face (#V); 0 where no face is.
+
+    Args:
+        values, weights: #F.
+        face, vertex: #C, the face and the vertex of each corner.
+        count: the number of vertices.
+    """
+    # A sliver without area still counts a little, so that a vertex among slivers only has a colour.
+    weights = weights + (1e-9 * float(weights.max(initial=0.0)) or 1.0)
+    share = np.bincount(vertex, weights=weights[face], minlength=count)
+    summed = np.bincount(vertex, weights=(values * weights)[face], minlength=count)
+    return np.asarray(summed / np.where(share > 0.0, share, 1.0))
+
+
+def outline_edges(faces: IntArray) -> IntArray:
+    """Return the edges with one face only (#B by 2), as (lower, higher) vertex: border, holes, sides of cracks.
+
+    These are the edges of ``warpflat.flat.surface.half_edges.border_edges`` without their direction, which costs a sort of one
+    array instead of an indexed one: it matters at a million faces.
+    """
+    keys = []
+    is_quad = faces[:, 3] >= 0
+    stride = np.int64(faces.max(initial=0)) + 1
+    for part, sides in ((faces[is_quad], 4), (faces[~is_quad], 3)):
+        for side in range(sides):
+            a, b = part[:, side].astype(np.int64), part[:, (side + 1) % sides].astype(np.int64)
+            keys.append(np.minimum(a, b) * stride + np.maximum(a, b))
+    ordered = np.sort(np.concatenate(keys))
+    same = ordered[1:] == ordered[:-1]
+    alone = ordered[~(np.append(same, False) | np.insert(same, 0, False))] if len(ordered) else ordered
+    return np.column_stack([alone // stride, alone % stride]).astype(np.int32)

@@ -1,0 +1,562 @@
+"""Patterns as PDF in true size: tiled on A4 or US Letter for home printers, whole on A0 for copy shops.
+
+Every tile repeats a strip of its neighbours. Thin lines with half diamonds show where the next sheet goes; rows are
+letters from the top, columns numbers from the left. The first page has test squares, an overview and instructions. The
+file asks the printer not to scale.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.output import atomic_path, optional_file
+from warpflat.pattern.drafting.draft import nest_label, relabelled
+from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.drawing import Drawing, OnPaper, Stroke, draw_nest
+from warpflat.pattern.drafting.half_pieces import halved
+from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, Words, embedded_font, text_width
+from warpflat.pattern.drafting.layout import Placed, Sheet, lay_out, nests, occupied_points
+from warpflat.pattern.drafting.sewing_order import seam_letters
+from warpflat.pattern.drafting.tile_nesting import nest_on_tiles
+from warpflat.pattern.drafting.words import printed_in, translate
+from warpflat.pattern.export.pdf_guide import guide_pages
+from warpflat.pattern.export.pdf_legend import draw_legend, legend_page
+from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, Paper, Tiling, make_tiling
+from warpflat.pattern.export.svg import OF_SIZE, STYLE
+
+__all__ = ["PAPERS", "draw_sheet", "sheet_names", "too_many_sheets", "write_pdf"]
+
+
+#: Points per metre: a PDF's unit is 1/72 inch.
+POINT = 72 / 0.0254
+
+
+PAPERS = {
+    "A4": Paper(name="A4", width=0.210, height=0.297, margin=0.010, overlap=0.010),
+    "Letter": Paper(name="US Letter", width=0.2159, height=0.2794, margin=0.010, overlap=0.010),
+    "A0": Paper(name="A0", width=0.841, height=1.189, margin=0.015, overlap=0.010),
+    # The page of a projector is as large as all pieces need.
+    "Projector": Paper(
+        name="Projector", width=1.0, height=1.0, margin=0.010, overlap=0.0, endless=True, line_width=2.0
+    ),
+}
+#: Width [m] of the page of a projector: that of a cutting table.
+PROJECTED_WIDTH = 0.9
+#: Size [pt] of a sheet's name, its distance [m] from the sheet's joints, and the least one from lines and words.
+SHEET_NAME, NAME_INSIDE, NAME_CLEAR = 26, 0.006, 0.0015
+#: A strip slants if the box around it is so many times as large as the strip.
+SLANTING = 3.0
+# A label beside its piece that a joint of two sheets would cut is moved by up to so much, in such steps [m].
+_REACH, _STEP = 0.06, 0.004
+# Nobody glues more sheets than these together.
+MOST_SHEETS = 1000
+#: Roles whose strokes lie on the layer of their size in a nest.
+OF_LAYER = (*OF_SIZE, "dart_fold", "drill", "cutout")
+
+
+def write_pdf(
+    garment: DraftedGarment,
+    path: str | os.PathLike[str],
+    *,
+    paper: str = "A4",
+    sizes: Sequence[str] | None = None,
+) -> Tiling:
+    """Write the pattern for a printer; pieces that are their own mirror images lie half on the fold.
+
+    Args:
+        garment: drafted.
+        path: of the file.
+        paper: "A4", "Letter" (tiled), "A0" (whole pieces wherever they fit) or
+            "Projector" (everything on one page, in wide lines). The first pages of the latter two are A4.
+        sizes: those to print; several lie upon each other as a nest, told apart by dashes and colour, each on a layer
+            of its own that readers can hide; None prints all.
+
+    Returns:
+        Which tiles were printed: tiles without any part of a piece are left out. A guide that cannot be drawn is left out, too.
+
+    Raises:
+        InputError: unknown paper or size.
+    """
+    with printed_in(garment.garment.words):
+        if paper not in PAPERS:
+            raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
+        chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
+        for size in chosen:
+            garment.garment.check_size(size)
+        whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
+        printed = halved(whole)
+        if fault := too_many_sheets(printed, paper):
+            raise InputError(f"{path}: {fault}")
+        tiling, drawings = draw_sheet(printed, paper)
+        content, guided = b"", list[str]()
+        with optional_file(path, guided, part="the guide"):
+            content = _pages(whole, printed, tiling, drawings, guide=True)
+        if not guided:
+            content = _pages(whole, printed, tiling, drawings, guide=False)
+        with atomic_path(path) as temporary:
+            Path(temporary).write_bytes(content)
+        return tiling
+
+
+def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[Drawing, ...]]]:
+    """Lay the pieces of a garment, in all its sizes, on sheets of a paper, and draw them there.
+
+    Args:
+        printed: the garment with halves on the fold.
+        paper: a key of `PAPERS`.
+
+    Returns:
+        The tiling, and what is drawn of each `Placed` of its sheet, in the coordinates of its pieces.
+    """
+    import shapely
+
+    sheet, tiling = _arranged(nests(printed), PAPERS[paper])
+    # Labels move to where no joint of two sheets crosses them, where there is room for that.
+    placed = []
+    for place in sheet.placed:
+        joints = [place.on_piece(joint) for joint in tiling.joints]
+        pieces = tuple(relabelled(piece, printed.name, joints) for piece in place.pieces) if joints else place.pieces
+        if any(piece.label.leader is not None for piece in pieces):
+            pieces = place.pieces
+            if joints and all(piece.label.leader is not None for piece in pieces):
+                others = [each for each in sheet.placed if each is not place]
+                pieces = _beside_on_one_sheet(place, others, tiling)
+        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
+    tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
+    drawings = []
+    for place in placed:
+        joints = [place.on_piece(joint) for joint in tiling.joints]
+        outside = shapely.transform(tiling.outside, place.on_piece)
+        drawings.append(draw_nest(place.pieces, OnPaper(joints=joints, outside=outside, letters=letters)))
+    return tiling, drawings
+
+
+def _beside_on_one_sheet(place: Placed, others: Sequence[Placed], tiling: Tiling) -> tuple[DraftedPiece, ...]:
+    """Return the pieces of a place with their label, which stands beside them, moved to where one sheet shows each of its rows."""
+    import shapely
+
+    corners = [tiling.corner(*tile) for tile in tiling.tiles]
+    windows = [shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap)) for corner in corners]
+    taken = [shapely.Polygon(place.on_sheet(piece.cut_line)) for piece in place.pieces]
+    taken += [shapely.convex_hull(shapely.MultiPoint(each.on_sheet(occupied_points(each.pieces)))) for each in others]
+    cloth, label = shapely.union_all(taken), nest_label(place.pieces)
+    steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
+    shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    for shift in shifts[np.argsort(np.linalg.norm(shifts, axis=1), kind="stable")]:
+        moved = replace(label, at=label.at + shift)
+        rows = [shapely.Polygon(place.on_sheet(row.box())) for row in moved.words()]
+        if all(any(window.covers(row) for window in windows) for row in rows) and (
+            not shift.any() or not shapely.Polygon(place.on_sheet(moved.box)).intersects(cloth)
+        ):
+            break
+    else:
+        return place.pieces
+    # The leader begins where the label stands, and ends on the cloth where it did.
+    labels = [
+        replace(own, at=own.at + shift, leader=None if own.leader is None else own.leader + np.outer([1.0, 0.0], shift))
+        for own in (piece.label for piece in place.pieces)
+    ]
+    return tuple(replace(piece, label=own) for piece, own in zip(place.pieces, labels, strict=True))
+
+
+def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
+    """Return why nobody would print a pattern on sheets of this paper, "" where one would: cloth of a wrong unit takes thousands."""
+    if paper not in PAPERS or not PAPERS[paper].tiled:
+        return ""
+    import shapely
+
+    area = sum(shapely.Polygon(piece.cut_line).area for row in garment.pieces.values() for piece in row)
+    sheets = area / float(np.prod(PAPERS[paper].step))
+    return f"it would take some {sheets:,.0f} sheets; check the units, or take A0 paper" if sheets > MOST_SHEETS else ""
+
+
+def _pages(
+    whole: DraftedGarment,
+    printed: DraftedGarment,
+    tiling: Tiling,
+    drawings: Sequence[tuple[Drawing, ...]],
+    *,
+    guide: bool,
+) -> bytes:
+    """Return the pages of the pattern, after those of legend and guide if these are wanted.
+
+    Args:
+        whole, printed: the garment, and as it is printed, with pieces on the fold.
+        tiling, drawings: of the pieces (see :func:`draw_sheet`).
+        guide: whether the legend and the guide come first.
+    """
+    from reportlab import rl_config
+    from reportlab.pdfbase import pdfmetrics
+    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
+    from reportlab.pdfgen.canvas import Canvas
+
+    kind, stream, chosen = tiling.paper, BytesIO(), tuple(whole.pieces)
+    # Streams in bytes: as text they are a quarter longer, and take as long to write as all strokes.
+    rl_config.useA85 = 0
+    canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
+    for name in (FONT, BOLD):
+        pdfmetrics.registerFont(embedded_font(name))
+    canvas.setTitle(f"{whole.name}, {' / '.join(chosen)}")
+    canvas.setCreator("warpflat")
+    canvas.setViewerPreference("PrintScaling", "None")
+    # The whole sheet is drawn once, as a form; every page shows its part of it.
+    border, sheet = 0.05, tiling.sheet
+    low, high = np.array([-border, -3.0]), sheet.size + 3.0
+    widen = tiling.paper.line_width
+    canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
+    for placed, sizes in zip(sheet.placed, drawings, strict=True):
+        nested = len(placed.pieces) > 1
+        for index, drawing in enumerate(sizes):
+            of_size: list[Stroke] = []
+            shared: list[Stroke] = []
+            for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
+                (of_size if nested and stroke.role in OF_LAYER else shared).append(stroke)
+            for stroke in shared:
+                _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
+            if nested:
+                canvas._code.append(f"/OC /size{chosen.index(drawing.piece.size)} BDC")
+            for stroke in of_size:
+                _stroke(canvas, stroke, placed.matrix, index, widen)
+            if nested:
+                canvas._code.append("EMC")
+    if sheet.reserved is not None:
+        draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
+    canvas.endForm()
+    # Words are drawn on the sheets that show them whole; on all, if none does.
+    forms = _word_forms(canvas, tiling, drawings, chosen)
+    if guide:
+        if kind.tiled:
+            legend_page(canvas, printed, chosen, tiling.sheet, tiling)
+        # What is read at the machine is small, whatever the pattern is printed on.
+        small = kind if kind.tiled else PAPERS["A4"]
+        canvas.setPageSize((small.width * POINT, small.height * POINT))
+        guide_pages(canvas, whole, printed, small)
+        canvas.setPageSize((kind.width * POINT, kind.height * POINT))
+    names = sheet_names(tiling, drawings) if tiling.joined else {}
+    for row, column in tiling.tiles:
+        title = whole.name.replace("_", " ")
+        paper = tiling.paper
+        inner = np.array([paper.width, paper.height]) - 2 * paper.margin
+        corner = tiling.corner(row, column)
+        canvas.saveState()
+        window = canvas.beginPath()
+        window.rect(paper.margin * POINT, paper.margin * POINT, *(inner * POINT))
+        canvas.clipPath(window, stroke=0, fill=0)
+        canvas.translate(*((paper.margin - corner) * POINT))
+        canvas.doForm("sheet")
+        canvas.doForm(forms[row, column])
+        canvas.restoreState()
+        if tiling.joined:
+            _joining_marks(canvas, tiling, row, column)
+            canvas.setFillColor("#bbbbbb")
+            canvas.setFont(BOLD, SHEET_NAME)
+            canvas.drawString(*((names[row, column] - corner + paper.margin) * POINT), tiling.name(row, column))
+        canvas.setFillColor("#555555")
+        canvas.setFont(FONT, 7)
+        number = translate("sheet {name}", name=tiling.name(row, column))
+        page = f"{title}  -  {number}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
+        canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
+        canvas.showPage()
+    if len(chosen) > 1:
+        # The layers of the sheet, one a size, are optional content that readers list and can hide.
+        document = canvas._doc
+        groups = {
+            f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
+            for k, size in enumerate(chosen)
+        }
+        for name in ("sheet", *forms.values()):
+            form = document.idToObject[xObjectName(name)]
+            form.Resources = PDFResourceDictionary(Properties=groups)
+            form.Resources.basicFonts()
+        order = PDFArray(list(groups.values()))
+        catalog = document.Catalog
+        catalog.OCProperties = PDFDictionary(
+            {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
+        )
+        catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
+    canvas.save()
+    return stream.getvalue()
+
+
+def _word_forms(
+    canvas: Any, tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]], sizes: Sequence[str]
+) -> dict[tuple[int, int], str]:
+    """Draw the words of each sheet as a form, and return the names of the forms by row and column."""
+    written = []
+    for placed, of_piece in zip(tiling.sheet.placed, drawings, strict=True):
+        for index, drawing in enumerate(of_piece):
+            layer = f"size{sizes.index(drawing.piece.size)}" if len(placed.pieces) > 1 else ""
+            written += [(words, placed, layer if words.tag else "", index) for words in drawing.words]
+    boxes = np.array([placed.on_sheet(words.box()) for words, placed, _, _ in written]).reshape(-1, 4, 2)
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    inner = np.array([tiling.paper.width, tiling.paper.height]) - 2 * tiling.paper.margin
+    corners = {tile: tiling.corner(*tile) for tile in tiling.tiles}
+    whole = {tile: ((low >= corner) & (high <= corner + inner)).all(axis=1) for tile, corner in corners.items()}
+    nowhere = ~np.any(list(whole.values()), axis=0)
+    names = {}
+    for tile in tiling.tiles:
+        names[tile] = f"words{tile[0]}_{tile[1]}"
+        canvas.beginForm(names[tile], *((corners[tile] - 0.05) * POINT), *((corners[tile] + inner + 0.05) * POINT))
+        for k in np.flatnonzero(whole[tile] | nowhere).tolist():
+            words, placed, layer, index = written[k]
+            colour = SIZE_COLOURS[index % len(SIZE_COLOURS)] if words.tag else "#000000"
+            canvas._code += [f"/OC /{layer} BDC"] if layer else []
+            _words(canvas, words, placed.matrix, colour)
+            canvas._code += ["EMC"] if layer else []
+        canvas.endForm()
+    return names
+
+
+def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict[tuple[int, int], FloatArray]:
+    """Return where the name of each tile is written: its lower left on the sheet [m], clear of lines and words if there is room.
+
+    The upper left is preferred, then the other corners, then the place with the most room.
+    """
+    import shapely
+
+    lines, words = [], []
+    for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True):
+        for drawing in sizes:
+            lines += [
+                shapely.LineString(
+                    placed.on_sheet(np.vstack([each.points, each.points[:1]] if each.closed else [each.points]))
+                )
+                for each in drawing.strokes
+                if not each.hidden
+            ]
+            words += [shapely.Polygon(placed.on_sheet(each.box())) for each in drawing.words]
+    taken = shapely.STRtree([*lines, *words])
+    height, found = SHEET_NAME * CAPITALS / POINT, {}
+    for tile in tiling.tiles:
+        width = text_width(tiling.name(*tile), height, bold=True)
+        size = np.array([width, height])
+        low = tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap])
+        room = tiling.paper.step - size - 2 * NAME_INSIDE
+        shares = [(0.0, 1.0), (1.0, 1.0), (0.0, 0.0), (1.0, 0.0)]
+        shares += [(x / 8, y / 12) for y in range(12, -1, -1) for x in range(9)]
+        places = low + NAME_INSIDE + room * np.array(shares)
+        # A corner is clear nearly always.
+        for tried in (places[:4], places):
+            boxes = shapely.box(*tried.T, *(tried + size).T)
+            apart = shapely.distance(boxes, taken.geometries[taken.nearest(boxes)])
+            clear = np.flatnonzero(apart > NAME_CLEAR)
+            if len(clear):
+                break
+        found[tile] = tried[int(clear[0]) if len(clear) else int(apart.argmax())]
+    return found
+
+
+def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
+    """Return a layout that needs few pages."""
+    import shapely
+
+    if paper.tiled:
+        # Pieces, turned where that helps, on the tiles of a grid, of which they take few.
+        shapes = []
+        for group in groups:
+            label = nest_label(group)
+            parts = [shapely.Polygon(piece.cut_line) for piece in group]
+            # A label beside its piece belongs to it, with all between.
+            shape = shapely.union_all(parts)
+            if label.leader is not None:
+                shape = shapely.union_all([*parts, shapely.Polygon(label.box)]).convex_hull
+            shapes.append(shape)
+        places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
+        placed = []
+        for group, shape, place in zip(groups, shapes, places, strict=True):
+            quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+            turn = np.linalg.matrix_power(quarter, place.quarters)
+            corners = np.asarray(shapely.get_coordinates(shape)) @ turn.T
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            matrix = np.column_stack([turn, place.corner - low])
+            box = np.stack([place.corner, place.corner + high - low])
+            placed.append(Placed(pieces=group, matrix=matrix, box=box))
+        sheet = Sheet(placed=tuple(placed), size=size)
+        return sheet, make_tiling(sheet, paper)
+    if paper.endless:
+        widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
+        sheet = lay_out(groups, width=max(PROJECTED_WIDTH, widest + 0.05), gap=0.016, reserved=LEGEND_SIZE)
+        width, height = sheet.size + 2 * paper.margin + paper.overlap
+        paper = replace(paper, width=float(width), height=float(height))
+        return sheet, make_tiling(sheet, paper)
+    packed = _on_pages(groups, paper)
+    if packed is not None:
+        sheet = packed
+    else:  # a piece is larger than the paper
+        width = paper.step[0] + paper.overlap
+        sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
+    return sheet, make_tiling(sheet, paper)
+
+
+def _on_pages(groups: Sequence[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet | None:
+    """Lay pieces and the legend on few pages, the largest first: each where its box lies clear of the pieces that are there.
+
+    A strip that slants, as a binding on the bias does, is stood upright. None where a piece has no room on a page.
+    """
+    import shapely
+
+    gap, step = 0.012, paper.step
+    turns, boxes, shapes = [], [], []
+    for group in groups:
+        points = occupied_points(group)
+        around = shapely.MultiPoint(points).minimum_rotated_rectangle
+        turn = np.eye(2)
+        if around.geom_type == "Polygon" and float(np.prod(np.ptp(points, axis=0))) > SLANTING * around.area:
+            sides = np.diff(np.asarray(around.exterior.coords), axis=0)[:2]
+            x, y = max(sides, key=lambda side: float(np.linalg.norm(side)))
+            x, y = np.array([x, y]) / np.hypot(x, y) * (1.0 if y >= 0 else -1.0)
+            turn = np.array([[y, -x], [x, y]])
+        lines = [piece.cut_line @ turn.T for piece in group]
+        label = nest_label(group)
+        lines += [] if label.leader is None else [label.box @ turn.T]
+        turns.append(turn)
+        boxes.append(np.stack([np.concatenate(lines).min(axis=0), np.concatenate(lines).max(axis=0)]))
+        shapes.append(shapely.union_all([shapely.Polygon(line) for line in lines]))
+    legend = len(groups)
+    boxes.append(np.array([(0.0, 0.0), LEGEND_SIZE]))
+    shapes.append(shapely.box(0.0, 0.0, *LEGEND_SIZE))
+    pages: list[Any] = []
+    places: dict[int, tuple[int, FloatArray]] = {}
+    for number in sorted(range(len(boxes)), key=lambda k: (k == legend, -float(np.prod(np.ptp(boxes[k], axis=0))), k)):
+        extent = np.ptp(boxes[number], axis=0)
+        room = step - extent - 2 * gap
+        if (room < 0.0).any():
+            return None
+        # From the upper left, down and then to the right.
+        shares = np.array([(x / 40, 1.0 - y / 40) for x in range(41) for y in range(41)])
+        corners = gap + shares * room
+        around = shapely.box(*(corners - gap).T, *(corners + extent + gap).T)
+        for page in range(len(pages) + 1):
+            if page == len(pages):
+                pages.append(shapely.Polygon())
+            free = np.flatnonzero(shapely.disjoint(around, pages[page]))
+            if len(free):
+                break
+        corner = corners[free[0]]
+        places[number] = (page, corner)
+        shift = corner - boxes[number][0]
+        pages[page] = pages[page].union(shapely.transform(shapes[number], lambda points, shift=shift: points + shift))
+    size = np.array([step[0], len(pages) * step[1]]) + paper.overlap
+    corners_on_sheet = {
+        number: corner + np.array([0.0, (len(pages) - page - 1) * step[1] + paper.overlap])
+        for number, (page, corner) in places.items()
+    }
+    placed = []
+    for number, group in enumerate(groups):
+        corner, low = corners_on_sheet[number], boxes[number][0]
+        matrix = np.column_stack([turns[number], corner - low])
+        box = np.stack([corner, corner + np.ptp(boxes[number], axis=0)])
+        placed.append(Placed(pieces=tuple(group), matrix=matrix, box=box))
+    return Sheet(placed=tuple(placed), size=size, reserved=corners_on_sheet[legend])
+
+
+def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
+    """Return a piece whose label is turned round where it would stand on its head on the sheet."""
+    turn = float(np.degrees(piece.label.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
+    if -89.5 < (turn + 180.0) % 360.0 - 180.0 < 90.5:
+        return piece
+    return replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
+
+
+def _stroke(canvas: Any, stroke: Stroke, matrix: FloatArray, size_index: int | None, widen: float = 1.0) -> None:
+    """Draw one line under a 2 by 3 matrix."""
+    colour, width, dashes = STYLE[stroke.role]
+    if size_index is not None:
+        colour = SIZE_COLOURS[size_index % len(SIZE_COLOURS)] if stroke.role in OF_SIZE else colour
+        dashes = SIZE_DASHES[size_index % len(SIZE_DASHES)] if stroke.role == "cut" else dashes
+    canvas.setStrokeColor(colour)
+    canvas.setLineWidth(widen * width / 1000 * POINT)
+    canvas.setDash([widen * d / 1000 * POINT for d in dashes])
+    canvas.setLineJoin(1)
+    path = canvas.beginPath()
+    if stroke.curve is not None:
+        control = stroke.curve.transformed(matrix).bezier * POINT
+        path.moveTo(*control[0, 0])
+        for segment in control:
+            path.curveTo(*segment[1], *segment[2], *segment[3])
+    else:
+        points = (stroke.points @ matrix[:, :2].T + matrix[:, 2]) * POINT
+        path.moveTo(*points[0])
+        for point in points[1:]:
+            path.lineTo(*point)
+        if stroke.closed:
+            path.close()
+    canvas.drawPath(path)
+
+
+def _words(canvas: Any, words: Words, matrix: FloatArray, colour: str) -> None:
+    """Draw one line of text, never upside down."""
+    font, size = (BOLD if words.bold else FONT), words.height / CAPITALS * POINT
+    angle = float(np.degrees(words.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
+    angle = (angle + 89.5) % 180.0 - 89.5
+    canvas.saveState()
+    canvas.translate(*((matrix[:, :2] @ words.at + matrix[:, 2]) * POINT))
+    canvas.rotate(angle)
+    if words.tag:
+        half = canvas.stringWidth(words.text, font, size) / 2 + 2
+        canvas.setFillColor("#ffffff")
+        canvas.rect(-half, -words.height * POINT * 0.75, 2 * half, words.height * POINT * 1.5, stroke=0, fill=1)
+    canvas.setFillColor(colour)
+    canvas.setFont(font, size)
+    canvas.drawCentredString(0, -words.height / 2 * POINT, words.text)
+    canvas.restoreState()
+
+
+def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
+    """Draw thin lines where sheets meet, a half diamond with its number in the middle of each, a cross at each corner.
+
+    The right and lower strips lie under the neighbours: a sheet is cut along its left and upper line and laid upon the
+    lines of the sheets that are already there.
+    """
+    paper = tiling.paper
+    low = np.array([paper.margin, paper.margin])
+    high = low + paper.step
+    canvas.setDash([])
+    canvas.setLineWidth(0.3)
+    canvas.setStrokeColor("#888888")
+    neighbours = {
+        "left": (row, column - 1),
+        "right": (row, column + 1),
+        "bottom": (row + 1, column),
+        "top": (row - 1, column),
+    }
+    bottom, top = low[1] + paper.overlap, high[1] + paper.overlap
+    middle_x, middle_y = (low[0] + high[0]) / 2, (bottom + top) / 2
+    lines = {
+        "left": ((low[0], bottom), (low[0], top), (low[0], middle_y)),
+        "right": ((high[0], bottom), (high[0], top), (high[0], middle_y)),
+        "bottom": ((low[0], bottom), (high[0], bottom), (middle_x, bottom)),
+        "top": ((low[0], top), (high[0], top), (middle_x, top)),
+    }
+    for side, (start, end, middle) in lines.items():
+        canvas.line(*(np.array(start) * POINT), *(np.array(end) * POINT))
+        r, c = neighbours[side]
+        if 0 <= r < tiling.rows and 0 <= c < tiling.columns and (r, c) in tiling.tiles:
+            # The diamond in which two sheets meet, with their names.
+            at = np.array(middle)
+            first, second = sorted([(row, column), (r, c)])
+            size = 0.004
+            path = canvas.beginPath()
+            path.moveTo(*((at + np.array([size, 0])) * POINT))
+            for dx, dy in ((0, size), (-size, 0), (0, -size)):
+                path.lineTo(*((at + np.array([dx, dy])) * POINT))
+            path.close()
+            canvas.drawPath(path)
+            canvas.setFillColor("#888888")
+            canvas.setFont(FONT, 6)
+            text = f"{tiling.name(*first)} | {tiling.name(*second)}"
+            shift = np.array([0.006, 0.001]) if first[0] != second[0] else np.array([-0.004, 0.006])
+            canvas.drawString(*((at + shift) * POINT), text)
+    for x in (low[0], high[0]):
+        for y in (bottom, top):
+            for dx, dy in ((0.004, 0.0), (0.0, 0.004)):
+                canvas.line(*(np.array([x - dx, y - dy]) * POINT), *(np.array([x + dx, y + dy]) * POINT))

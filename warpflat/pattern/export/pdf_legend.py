@@ -1,0 +1,202 @@
+"""The first page of a printed pattern: test squares, instructions, meaning of the lines, overview of the sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.pattern.drafting.drafted import DraftedGarment
+from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, printed_size, text_width
+from warpflat.pattern.drafting.layout import Sheet
+from warpflat.pattern.drafting.placement import fit_label
+from warpflat.pattern.drafting.sewing_tasks import piece_titles
+from warpflat.pattern.drafting.words import translate
+from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE
+from warpflat.pattern.export.svg import STYLE
+
+if TYPE_CHECKING:
+    from warpflat.pattern.export.pdf_tiling import Paper, Tiling
+
+__all__ = ["TEST_INCHES", "TEST_MM", "draw_legend", "legend_page", "page_footer"]
+
+
+#: Sides of the test squares: 50 mm and 1 inch [m].
+TEST_MM, TEST_INCHES = 0.050, 0.0254
+
+POINT = 72 / 0.0254
+#: Height of capitals [m] of the names in the overview.
+NAME_HEIGHT = 0.00155
+
+_KEY = (
+    ("cut", "cutting line"),
+    ("sew", "sewing line"),
+    ("hem", "hem line"),
+    ("fold", "fold of the cloth"),
+    ("dart", "dart leg"),
+    ("dart_fold", "fold of a dart"),
+    ("internal", "level or line of the body"),
+    ("grain", "grain: along the warp"),
+    ("drill", "point to mark: dart, button, pocket"),
+    ("notch", "notch: clip; letter of its seam"),
+)
+
+
+def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
+    """Draw title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
+    from warpflat.pattern.export.pdf_tiling import SIZE_COLOURS, SIZE_DASHES
+
+    x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
+    _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)
+    if any(sizes):
+        words = printed_size(sizes[0]) if len(sizes) == 1 else translate("sizes {sizes}", sizes=", ".join(sizes))
+        _text(canvas, x, top - 0.016, words[0].upper() + words[1:], 11)
+    _text(canvas, x, top - 0.025, translate("Print at 100 % (actual size). Do not fit to the page."), 10, bold=True)
+    _text(
+        canvas,
+        x,
+        top - 0.031,
+        translate("Paper: {paper}. Measure both squares before you cut anything.", paper=paper),
+        8,
+    )
+    _square(canvas, x + 0.001, top - 0.037 - TEST_MM, TEST_MM, "5 cm")
+    _square(canvas, x + 0.058, top - 0.037 - TEST_INCHES, TEST_INCHES, translate("1 inch"))
+    y = top - 0.037
+    for role, meaning in _KEY:
+        y -= 0.0052
+        _sample(canvas, x + 0.117, y, *STYLE[role])
+        if role == "grain":
+            for tip, back in ((0.117, 0.003), (0.136, -0.003)):
+                for up in (0.001, -0.001):
+                    canvas.line((x + tip) * POINT, y * POINT, (x + tip + back) * POINT, (y + up) * POINT)
+        if role == "drill":
+            canvas.circle((x + 0.1265) * POINT, y * POINT, 0.002 * POINT)
+            canvas.line((x + 0.1265) * POINT, (y - 0.003) * POINT, (x + 0.1265) * POINT, (y + 0.003) * POINT)
+        _text(canvas, x + 0.139, y - 0.0009, translate(meaning), 7)
+    if len(sizes) > 1:
+        for index, size in enumerate(sizes):
+            column, row = divmod(index, 4)
+            y = top - 0.097 - 0.006 * row
+            dashes = SIZE_DASHES[index % len(SIZE_DASHES)]
+            _sample(canvas, x + 0.001 + 0.045 * column, y, SIZE_COLOURS[index % len(SIZE_COLOURS)], 0.5, dashes)
+            _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, translate("size {size}", size=size), 8)
+
+
+def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
+    """Draw the first page of a tiled pattern, and end the page."""
+    paper = tiling.paper
+    low = np.array([paper.margin + 0.005, paper.height - paper.margin - LEGEND_SIZE[1] - 0.002])
+    draw_legend(canvas, low, garment, sizes, paper.name)
+    # Unused room for the sizes' lines is not left empty.
+    y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 else 0.0)
+    lines = [
+        translate(
+            "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that"
+        ),
+        translate(
+            "the half diamonds meet, and glue. {sheets} sheets; empty ones are left out.", sheets=len(tiling.tiles)
+        ),
+    ]
+    if len(tiling.tiles) == 1:
+        lines = [translate("One sheet holds all pieces; nothing is glued.")]
+    for words in lines:
+        _text(canvas, float(low[0]), y, words, 7.5)
+        y -= 0.0042
+    # All sheets and pieces, small.
+    width = LEGEND_SIZE[0]
+    step, overlap = tiling.paper.step, tiling.paper.overlap
+    total = np.array([tiling.columns * step[0] + overlap, tiling.rows * step[1] + overlap])
+    scale = float(min(width / total[0], (y - paper.margin - 0.010) / total[1]))
+    left = float(low[0]) + (width - scale * total[0]) / 2
+    origin = np.array([left, (paper.margin + 0.004) + scale * (total[1] - float(sheet.size[1]))])
+    canvas.setDash([])
+    for row, column in tiling.tiles:
+        corner = tiling.corner(row, column) + np.array([0.0, overlap])
+        canvas.setStrokeColor("#999999")
+        canvas.setLineWidth(0.4)
+        canvas.rect(*((origin + scale * corner) * POINT), *(scale * step * POINT))
+        canvas.setFillColor("#999999")
+        canvas.setFont(FONT, 7)
+        name_at = origin + scale * (corner + np.array([0.006, step[1]])) - np.array([0.0, 0.003])
+        canvas.drawString(*(name_at * POINT), tiling.name(row, column))
+    canvas.setStrokeColor("#000000")
+    canvas.setLineWidth(0.6)
+    for number, placed in enumerate(sheet.placed, 1):
+        for piece in placed.pieces:
+            for line in (piece.cut_line, *(cutout.cut_line for cutout in piece.cutouts.values())):
+                points = (origin + scale * placed.on_sheet(line)) * POINT
+                path = canvas.beginPath()
+                path.moveTo(*points[0])
+                for point in points[1:]:
+                    path.lineTo(*point)
+                path.close()
+                canvas.drawPath(path)
+        _name(canvas, sheet, number, origin, scale)
+    page_footer(canvas, garment.name, paper, translate("print this page first and measure both squares"))
+    canvas.showPage()
+
+
+def _name(canvas: Any, sheet: Sheet, number: int, origin: FloatArray, scale: float) -> None:
+    """Write a piece's name in its drawing, or its number in the list above where there is no room."""
+    import shapely
+
+    placed = sheet.placed[number - 1]
+    piece = placed.pieces[len(placed.pieces) // 2]
+    holes = [shapely.Polygon(placed.on_sheet(cutout.cut_line)).buffer(0) for cutout in piece.cutouts.values()]
+    cloth = (
+        shapely.Polygon(placed.on_sheet(piece.cut_line)).buffer(-0.0005 / scale).difference(shapely.union_all(holes))
+    )
+    title = piece_titles([p.pieces[0].piece for p in sheet.placed])[piece.name]
+    for text, least in ((title, 0.7), (str(number), 0.5)):
+        label = fit_label(cloth, [(text, NAME_HEIGHT / scale)], least=least)
+        if label is not None:
+            break
+    else:
+        return
+    canvas.setFillColor("#000000")
+    for words in label.words():
+        canvas.saveState()
+        canvas.translate(*((origin + scale * words.at) * POINT))
+        canvas.rotate(np.degrees(words.angle))
+        size = words.height * scale * POINT / CAPITALS
+        canvas.setFont(FONT, size)
+        canvas.drawCentredString(0, -words.height * scale * POINT / 2, words.text)
+        canvas.restoreState()
+
+
+def page_footer(canvas: Any, name: str, paper: Paper, words: str) -> None:
+    """Write what a page is of at its foot."""
+    canvas.setFillColor("#555555")
+    canvas.setFont(FONT, 7)
+    line = f"{name.replace('_', ' ')}  -  {words}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
+    canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, line)
+
+
+def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:
+    """Draw a test square."""
+    canvas.setDash([])
+    canvas.setLineWidth(0.4)
+    canvas.setStrokeColor("#000000")
+    canvas.rect(x * POINT, y * POINT, side * POINT, side * POINT)
+    canvas.setFillColor("#000000")
+    canvas.setFont(FONT, 9)
+    canvas.drawCentredString((x + side / 2) * POINT, (y + side / 2) * POINT, text)
+
+
+def _sample(canvas: Any, x: float, y: float, colour: str, width: float, dashes: Sequence[float]) -> None:
+    """Draw a short line in the style of its kind."""
+    canvas.setStrokeColor(colour)
+    canvas.setLineWidth(width / 1000 * POINT)
+    canvas.setDash([d / 1000 * POINT for d in dashes])
+    canvas.line(x * POINT, y * POINT, (x + 0.019) * POINT, y * POINT)
+    canvas.setDash([])
+
+
+def _text(canvas: Any, x: float, y: float, text: str, size: float, *, bold: bool = False) -> None:
+    """Write a text, smaller where it would be wider than the legend."""
+    wide = text_width(text, size * CAPITALS / POINT, bold=bold)
+    canvas.setFillColor("#000000")
+    canvas.setFont(BOLD if bold else FONT, size * min(1.0, LEGEND_SIZE[0] / max(wide, 1e-9)))
+    canvas.drawString(x * POINT, y * POINT, text)
