@@ -69,10 +69,15 @@ def check_sewn(
         )
     for opening, limb, found in zip(openings, limbs, around, strict=True):
         # A hole in the cloth, as of a pocket, goes around nothing.
-        if limb and opening.turn > -np.pi and (abs(found[limb]) != 1 or sum(map(bool, found.values())) > 1):
+        wrong = (
+            abs(found[limb]) != 1 or sum(map(bool, found.values())) > 1
+            if limb
+            else not (any(found.values()) or buttoned)
+        )
+        if wrong and opening.turn > -np.pi:
             raise StepError(
-                f"piece {min(opening.pieces)!r}: its opening of {1e3 * opening.length:.0f} mm was sewn beside the {limb} instead of "
-                f"around it: {_REMEDY}"
+                f"piece {min(opening.pieces)!r}: its opening of {1e3 * opening.length:.0f} mm was sewn beside the "
+                f"{limb or 'body'} instead of around it: {_REMEDY}"
             )
     hit, edges = pierced_edges(cloth, positions)
     corner, _, _, area = cloth.cells()
