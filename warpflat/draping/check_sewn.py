@@ -20,7 +20,7 @@ from warpflat.kernels.pierced import find_pierced
 __all__ = ["check_sewn", "pierced_edges"]
 
 # Cloth is tangled if more than this share of its edges pierce it elsewhere, or more than this share of it is stretched by so much.
-_PIERCED, _TORN = 0.1, (0.05, 0.5)
+_PIERCED, _TORN = 0.1, (0.25, 0.5)
 _REMEDY = 'say in [[pieces]] where it is, as at = "left arm", and in top how high it hangs, or draw it where it is worn'
 
 
@@ -69,10 +69,15 @@ def check_sewn(
         )
     for opening, limb, found in zip(openings, limbs, around, strict=True):
         # A hole in the cloth, as of a pocket, goes around nothing.
-        if limb and opening.turn > -np.pi and (abs(found[limb]) != 1 or sum(map(bool, found.values())) > 1):
+        wrong = (
+            abs(found[limb]) != 1 or sum(map(bool, found.values())) > 1
+            if limb
+            else not (any(found.values()) or buttoned)
+        )
+        if wrong and opening.turn > -np.pi:
             raise StepError(
-                f"piece {min(opening.pieces)!r}: its opening of {1e3 * opening.length:.0f} mm was sewn beside the {limb} instead of "
-                f"around it: {_REMEDY}"
+                f"piece {min(opening.pieces)!r}: its opening of {1e3 * opening.length:.0f} mm was sewn beside the "
+                f"{limb or 'body'} instead of around it: {_REMEDY}"
             )
     hit, edges = pierced_edges(cloth, positions)
     corner, _, _, area = cloth.cells()
