@@ -17,6 +17,7 @@ from warpflat.app.scene.surface import scene_surface
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
 from warpflat.flat.flattening.applied_cut import measure_cut
+from warpflat.flat.flattening.fit_report import garment_wear
 from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.flattening.verdict import Verdict, judge
@@ -65,7 +66,8 @@ class Solution:
         """Whether it fits, and why not; None where no cloth is judged."""
         if self.garment is not None:
             return judge(self.garment.metrics())
-        return judge({"pieces": {name: piece.measures for name, piece in self.pieces.items()}})
+        measures = {name: piece.measures for name, piece in self.pieces.items()}
+        return judge({"pieces": measures, "wear": garment_wear(measures)})
 
     @property
     def at_rest(self) -> bool:
