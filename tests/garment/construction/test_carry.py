@@ -146,6 +146,20 @@ def test_ease_is_measured_by_level_and_changed():
     assert level_ease(body, opened) == {}
 
 
+def test_a_tape_passes_by_sleeves():
+    body = _person()
+    tunic = _tunic(body, 0.02)
+    # One section goes around trunk and arms, as where armholes reach below the bust.
+    cape, arms = tunic.vertices.copy(), np.abs(body.vertices[:, 0]).max()
+    out = np.abs(cape[:, 0]) > 0.6 * np.abs(cape[:, 0]).max()
+    cape[out, 0] = np.sign(cape[out, 0]) * (arms + 0.02)
+    whole = max(
+        Slicer(cape, _layers(tunic)[0][1]).cut(np.array([0.0, 1.0, 0.0]), body.level("bust")), key=lambda s: s.length
+    )
+    around = level_ease(body, [(cape, _layers(tunic)[0][1])])["bust"][0]
+    assert around < level_ease(body, _layers(tunic))["bust"][0] < whole.length - 0.3
+
+
 def test_a_body_is_fitted_inside_a_garment():
     wearer = _person(first=0.7, scale=1.68)
     rows = (wearer.vertices[:, 1] > 0.75) & (wearer.vertices[:, 1] < 1.38)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray
 from warpflat.flat.surface.normals import vertex_normals
@@ -30,26 +31,27 @@ def level_ease(
 ) -> dict[str, tuple[float, float]]:
     """Return by level the girths of the garment and of the body [m]; without levels at which it is open, or that it does not cover.
 
+    Where armholes reach below a level, the section runs on into the sleeves: a tape lies on the cloth of the trunk alone.
+
     Args:
         body: on which it is worn.
         layers: of the garment, vertices (#V by 3 [m]) and triangles (#T by 3).
     """
     skin = Slicer(body.vertices, finer_body()[1])
     slicers = [Slicer(vertices, triangles) for vertices, triangles in layers]
-    found = {}
+    places, nearest, found = model_places(), cKDTree(body.vertices), {}
+    of_arm = places.strips["arm left"] | places.strips["arm right"]
     for name in EASE_LEVELS:
         height = body.level(name)
         parts = [part.points[:, [0, 2]] for part in skin.cut(_UP, height)]
         trunk = max(parts, key=lambda points: float(np.ptp(points, axis=0).prod()))
         middle = 0.5 * (trunk.min(axis=0) + trunk.max(axis=0))
-        rings = [
-            part.length
-            for slicer in slicers
-            for part in slicer.cut(_UP, height)
-            if part.closed
-            and (part.points[:, [0, 2]].min(axis=0) < middle).all()
-            and (part.points[:, [0, 2]].max(axis=0) > middle).all()
-        ]
+        rings = []
+        for part in (part for slicer in slicers for part in slicer.cut(_UP, height) if part.closed):
+            sleeve = of_arm[nearest.query(part.points)[1]]
+            points = part.points[~sleeve][:, [0, 2]]
+            if len(points) > 2 and (points.min(axis=0) < middle).all() and (points.max(axis=0) > middle).all():
+                rings.append(convex_girth(points) if sleeve.any() else part.length)
         if rings:
             found[name] = max(rings), convex_girth(trunk)
     return found
