@@ -91,8 +91,9 @@ def test_cloth_that_hangs_is_taken_off_its_weight() -> None:
     at = np.arange(2651).reshape(241, 11)
     faces = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
     worn = np.column_stack([u, y + 0.5 * hang * y**2, np.zeros(len(u))])
-    panel = SewnPanel(surface=make_surface(worn, faces), cut=np.column_stack([u, y]), unit="m", polygons=np.arange(len(faces), dtype=np.int32),
-        corners=faces.astype(np.int32), of_file=at.ravel().astype(np.int32),
+    panel = SewnPanel(
+        surface=make_surface(worn, faces), cut=np.column_stack([u, y]), unit="m",
+        polygons=np.arange(len(faces), dtype=np.int32), corners=faces.astype(np.int32), of_file=at.ravel().astype(np.int32),
     )  # fmt: skip
     (freed,) = truth.unhung([panel], hang)
     # The weight is that of the worn area, which is longer than the cloth by a share of the second order.
