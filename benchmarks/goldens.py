@@ -177,7 +177,9 @@ def command(arguments: Sequence[str], folder: Path, *, seed: int | None) -> Reco
     return record
 
 
-def flatten_mesh(mesh: Path, fabric: str, folder: Path, *, which: str = "all", seed: int | None) -> Record:
+def flatten_mesh(
+    mesh: Path, fabric: str, folder: Path, *, which: Sequence[str] = ("--component", "all"), seed: int | None
+) -> Record:
     """Flatten all pieces of a mesh, or its largest one with the seams that are found.
 
     The suits are in decimetres, which is no unit of the program.
@@ -188,7 +190,7 @@ def flatten_mesh(mesh: Path, fabric: str, folder: Path, *, which: str = "all", s
         mesh = folder / mesh.name
         mesh.write_text("".join(f"{' '.join(row)}\n" for row in rows), encoding="utf-8")
     units = [] if mesh.suffix == ".usd" else ["--units", "m"]
-    how = ["--component", which, "--fabric", fabric, "--frames", "0", "--no-picture"]
+    how = [*which, "--fabric", fabric, "--frames", "0", "--no-picture"]
     return command(["flatten", str(mesh), *units, *how], folder, seed=seed)
 
 
@@ -350,7 +352,7 @@ def all_cases(seed: int | None) -> dict[str, Callable[[Path], Record]]:
     if DATA:
         for name, fabric in FOUND.items():
             mesh = Path(DATA) / name
-            cases[f"found {mesh.stem}"] = partial(flatten_mesh, mesh, fabric, which="largest", seed=seed)
+            cases[f"found {mesh.stem}"] = partial(flatten_mesh, mesh, fabric, which=("--seams", "auto"), seed=seed)
         for name, size in FITTED.items():
             mesh = Path(DATA) / "garments" / name
             cases[f"fit {mesh.stem}"] = partial(command, ["fit", str(mesh), "--units", "m", "--to", size], seed=seed)
