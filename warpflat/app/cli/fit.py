@@ -8,7 +8,15 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, RUN_FILES, ComputingCommand, output_options, shear_limit_option
+from warpflat.app.cli.options import (
+    DONE,
+    EXIT_CODES,
+    RUN_FILES,
+    ComputingCommand,
+    fabric_file_option,
+    output_options,
+    shear_limit_option,
+)
 from warpflat.app.cli.run import report_run, start_warp_silently
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name
@@ -66,13 +74,7 @@ _FILES = """\b
     "with the cloth.",
 )
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
-@click.option(
-    "--fabric-file",
-    "fabric_files",
-    multiple=True,
-    metavar="FILE",
-    help="A fabric file of your own; its only fabric needs no --fabric.",
-)
+@fabric_file_option
 @shear_limit_option
 @click.option("--bands", metavar="HOW", help="As for warpflat flatten.")
 @click.option("--name", metavar="NAME", help="Name of the files.  [default: the garment's]")

@@ -9,7 +9,14 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import EXIT_CODES, RUN_FILES, ComputingCommand, output_options, shear_limit_option
+from warpflat.app.cli.options import (
+    EXIT_CODES,
+    RUN_FILES,
+    ComputingCommand,
+    fabric_file_option,
+    output_options,
+    shear_limit_option,
+)
 from warpflat.app.cli.run import run_and_report
 from warpflat.core.errors import InputError
 from warpflat.core.text import plain_letters, quote_value
@@ -84,13 +91,7 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
 @click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
 @click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
 @click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
-@click.option(
-    "--fabric-file",
-    "fabric_files",
-    multiple=True,
-    metavar="FILE",
-    help="A fabric file of your own; its only fabric needs no --fabric.",
-)
+@fabric_file_option
 @shear_limit_option
 @click.option(
     "--datum",

@@ -18,6 +18,7 @@ __all__ = [
     "NOT_CONVERGED",
     "RUN_FILES",
     "ComputingCommand",
+    "fabric_file_option",
     "output_options",
     "shear_limit_option",
 ]
@@ -70,6 +71,16 @@ shear_limit_option = click.option(
     help="How far warp and weft may be off the right angle; tailors trust 5 to 8.  [default: the fabric's]",
 )
 """The option `--shear-limit` of commands that take a fabric."""
+
+
+fabric_file_option = click.option(
+    "--fabric-file",
+    "fabric_files",
+    multiple=True,
+    metavar="FILE",
+    help="A fabric file of your own; its only fabric needs no --fabric.",
+)
+"""The option `--fabric-file` of commands that flatten a mesh."""
 
 
 class ComputingCommand(click.Command):
