@@ -123,10 +123,10 @@ def _fair_lines(
     weighed = basis.T * weight
     near, bent, wanted = weighed @ basis, bend.T @ bend, weighed @ even
     # A free point meets only those near it in the row: the equations have a band.
-    rows, columns = np.nonzero((near != 0.0) | (bent != 0.0))
-    width = int(np.abs(rows - columns).max())
+    row, column = np.nonzero((near != 0.0) | (bent != 0.0))
+    width = int(np.abs(row - column).max())
     banded = np.zeros((2, 2 * width + 1, len(near)))
-    banded[:, width + rows - columns, columns] = near[rows, columns], bent[rows, columns]
+    banded[:, width + row - column, column] = near[row, column], bent[row, column]
     for wave in waves:
         stiffness = (wave / (2 * np.pi * places[1])) ** 6
         solved = solve_banded((width, width), banded[0] + stiffness * banded[1], wanted)
