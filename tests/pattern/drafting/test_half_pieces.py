@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.output import LeftOut, listening_to_left_out
+from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved, is_symmetric
 from warpflat.pattern.drafting.piece_parts import Dart, Edge

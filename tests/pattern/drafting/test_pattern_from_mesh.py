@@ -8,7 +8,7 @@ import shapely
 from shapely.affinity import scale
 
 from warpflat.core.errors import InputError
-from warpflat.core.output import LeftOut, listening_to_left_out
+from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.pattern.drafting.draft import draft_piece
 from warpflat.pattern.drafting.drawing import draw_piece
 from warpflat.pattern.drafting.from_mesh import MeshFeatures, piece_from_mesh

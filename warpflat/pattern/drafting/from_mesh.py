@@ -23,9 +23,6 @@ from warpflat.pattern.drafting.placement import default_grain
 __all__ = ["MeshFeatures", "inner_stretches", "line_labels", "piece_from_mesh"]
 
 
-#: A border vertex that turns by more than this [rad] is a corner.
-CORNER = np.radians(35.0)
-
 #: Places in a border of a dart's left mouth, tip and right mouth, in counter-clockwise order.
 DartPlaces = tuple[int, int, int]
 
@@ -104,7 +101,7 @@ def piece_from_mesh(
     flat = flat.copy()
     flat[outer] = parted(flat[outer])
     labels = line_labels(outer, lines)
-    corners = find_corners(flat[outer], CORNER)
+    corners = find_corners(flat[outer])
     # The places in the loop of each dart's left mouth, tip and right mouth; cracks that are found are darts, too.
     where = {vertex: place for place, vertex in enumerate(outer.tolist())}
     darts = {}
