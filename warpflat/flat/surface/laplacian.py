@@ -17,7 +17,7 @@ from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.cells import make_cells
 from warpflat.flat.surface.mesh import Surface, once_per_surface
 
-__all__ = ["Laplacian", "factor_pays", "held_laplacian", "laplacian_of", "laplacian_solver", "cotangent_matrix"]
+__all__ = ["Laplacian", "cotangent_matrix", "factor_pays", "held_laplacian", "laplacian_of", "laplacian_solver"]
 
 # The most vertices of a surface that is factored: a factor takes 0.3 to 0.7 KB a vertex. L-BFGS over it is as fast as multigrid cycles on
 # isotropic grids of up to 10,000 vertices, and in other cloth, on triangles and on ragged pieces up to ten times as fast.
