@@ -20,7 +20,7 @@ from .promise import Case, Verdict, Worker, broken_promise
 from .regressions import cases_of, regression_files
 
 # A few of each kind; `python -m tests.fuzz` runs thousands.
-EXAMPLES = {kind: max(1, share // 3) for kind, share in SHARES.items()}
+EXAMPLES = {kind: max(1, share // 6) for kind, share in SHARES.items()}
 
 
 @pytest.fixture(scope="module")
