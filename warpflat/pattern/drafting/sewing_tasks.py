@@ -17,7 +17,7 @@ from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.drafting.words import listed, translate, translate_name
 
-__all__ = ["BANDS", "GATHERED", "Place", "SewingTasks", "Task", "piece_titles", "pieces_of", "techniques"]
+__all__ = ["BANDS", "GATHERED", "Place", "SewingTasks", "Task", "is_flounce", "piece_titles", "pieces_of", "techniques"]
 
 #: A piece and an edge of it, by their names.
 Place = tuple[str, str]
@@ -419,7 +419,7 @@ class SewingTasks:
                     **values,
                 )
             )
-        add("hang", [name for name, piece in self.pieces.items() if role[name] == "shell" and _is_flounce(piece)])
+        add("hang", [name for name, piece in self.pieces.items() if role[name] == "shell" and is_flounce(piece)])
         for technique, kind in (("hem", "hem"), ("bind_raw", "seam"), ("raw", "cut")):
             add(technique, [], of(role, (kind,)))
         self._close(drafted)
@@ -485,7 +485,7 @@ class SewingTasks:
             task.uses.append(place)
 
 
-def _is_flounce(piece: Piece) -> bool:
+def is_flounce(piece: Piece) -> bool:
     """Return whether a piece is a panel of a flounce."""
     return "flounce" in re.split("[ _]", piece.name)
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import Polygon
 
 from warpflat.core.arrays import FloatArray
+from warpflat.flat.surface.mesh import Surface
 from warpflat.pattern.export.figure import GREY, INK, Pen
 from warpflat.pattern.export.picture_page import draw_scale_bar, pack_rows
 
@@ -27,10 +28,12 @@ class DraftedOutline:
     Attributes:
         name: that is written above it.
         points: #P by 2 [m], its sewing line, closed, the first point not repeated.
+        worn: its copies where they are worn; none of what lies within the garment.
     """
 
     name: str
     points: FloatArray
+    worn: Sequence[Surface] = ()
 
 
 class DraftedRows:
