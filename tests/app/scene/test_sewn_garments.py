@@ -124,11 +124,12 @@ def test_a_seam_comes_after_those_that_end_on_its_line(drafted: DraftedGarment):
 
 
 def test_facings_that_are_sewn_to_a_lining_are_not_neatened():
-    texts = [
-        " ".join(step.words for step in sewing_steps(drafted_garment("jacket", {"lining": lining}), ""))
-        for lining in ("none", "full")
-    ]
-    assert ["Neaten the inner edges of the facings" in text for text in texts] == [True, False]
+    for name, chosen, neatened in (("shift_dress", {}, True), ("jacket", {"lining": "full"}, False)):
+        words = [step.words for step in sewing_steps(drafted_garment(name, chosen), "") if step.technique == "facing"]
+        assert words
+        assert [each.startswith("Neaten the inner edges of the facings. Sew") for each in words] == [neatened] * len(
+            words
+        )
 
 
 def test_bands_and_flounces_belong_to_the_finished_length_and_an_overlap_counts_once():

@@ -16,7 +16,7 @@ from warpflat.pattern.drafting.words import translate, translate_name
 __all__ = ["finished_lengths"]
 
 # What is sewn on so near to the end of a line lengthens it [m].
-_AT_END = 0.005
+_AT_END = 0.02
 #: Lines along the body and what they measure; a garment has those that its pieces have.
 _LINES = {
     "centre back": "length at the centre back",
