@@ -49,11 +49,11 @@ def meshes(film: Path) -> Iterator[tuple[np.ndarray, np.ndarray, tuple[float, fl
 
 def main(file: str, folder: Path) -> None:
     """Write the figure to `file`, of a shirt that lies in a folder."""
-    figure = new_figure(11.0, 4.6, dpi=100)
+    figure = new_figure(11.0, 3.5, dpi=110)
     shown = list(meshes(folder / "worn" / "frames.usdc"))
-    low, high = shown[1][0].min(axis=0) - 0.06, shown[1][0].max(axis=0) + 0.1
+    low, high = shown[1][0].min(axis=0) - 0.03, shown[1][0].max(axis=0) + 0.06
     for number, sign in enumerate((1.0, -1.0)):
-        axes = figure.add_axes((0.01 + 0.3 * number, 0.02, 0.29, 0.96))
+        axes = figure.add_axes((0.35 * number, 0.01, 0.34, 0.98))
         corners, shades = [], []
         for points, triangles, colour in shown:
             turned = points * [sign, 1.0, sign]
@@ -72,7 +72,7 @@ def main(file: str, folder: Path) -> None:
         axes.set_ylim(low[1], high[1])
         axes.set_aspect("equal")
         axes.axis("off")
-    axes = figure.add_axes((0.62, 0.02, 0.37, 0.96))
+    axes = figure.add_axes((0.71, 0.02, 0.28, 0.96))
     sheet = lay_out(nests(read_pattern_json(folder / "shirt" / "pattern.json")), width=1.25)
     for placed in sheet.placed:
         for piece in placed.pieces:

@@ -19,7 +19,7 @@ from warpflat.pattern.export.colours import SMALLEST_SCALE, energy_colours, ener
 from warpflat.pattern.export.figure import DPI, GREY, MARGIN, PAGE_WIDTH, POINT, Pen, Pixels, new_figure, write_figure
 from warpflat.pattern.export.geometry import polylines_of
 from warpflat.pattern.export.letters import all_letters, is_drawn, titles
-from warpflat.pattern.export.picture_drafted import DraftedOutline, DraftedRows
+from warpflat.pattern.export.picture_drafted import DraftedOutline, DraftedRows, worn_words
 from warpflat.pattern.export.picture_garment import Body, GarmentViews
 from warpflat.pattern.export.picture_page import CAPTIONS_ALONE, STRIP, Cell, draw_cell, draw_scale_bar, lay_out
 from warpflat.pattern.export.picture_views import make_facets, pattern_view, surface_view
@@ -127,7 +127,13 @@ def draw_figure(
             break
     worn = None
     if body is not None:
-        worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells], drafted)
+        worn = GarmentViews(
+            body,
+            [piece.surface for piece in pieces],
+            [cell.density for cell in cells],
+            [surface for each in drafted for surface in each.worn],
+            worn_words(drafted),
+        )
     left = MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR)
     words = pen.measure(_bar_words(scale, density, quantity), _WORDS_SIZE)[0]
     narrowest = left + (

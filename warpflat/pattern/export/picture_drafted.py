@@ -13,7 +13,7 @@ from warpflat.flat.surface.mesh import Surface
 from warpflat.pattern.export.figure import GREY, INK, Pen
 from warpflat.pattern.export.picture_page import draw_scale_bar, pack_rows
 
-__all__ = ["DraftedOutline", "DraftedRows"]
+__all__ = ["DraftedOutline", "DraftedRows", "worn_words"]
 
 _CLOTH = (0.95, 0.94, 0.91)
 # Heading, room for a name above each outline, and gaps between outlines [in].
@@ -34,6 +34,13 @@ class DraftedOutline:
     name: str
     points: FloatArray
     worn: Sequence[Surface] = ()
+
+
+def worn_words(pieces: Sequence[DraftedOutline]) -> str:
+    """Return what the body shows of drafted pieces, in words, and which lie within the garment."""
+    within = dict.fromkeys(each.name.partition(", ")[0] for each in pieces if not each.worn)
+    shown = ["grey: drafted for its edges, laid by its seams"] if any(each.worn for each in pieces) else []
+    return "; ".join([*shown, *([f"not shown on the body: {', '.join(within)}"] if within else [])])
 
 
 class DraftedRows:

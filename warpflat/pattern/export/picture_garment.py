@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from warpflat.pattern.export.colours import energy_colours
 from warpflat.pattern.export.figure import GREY, Pen
 from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.picture_views import SIDES, DrawnView, Silhouette, make_facets, view_from_side
-
-if TYPE_CHECKING:
-    from warpflat.pattern.export.picture_drafted import DraftedOutline
 
 __all__ = ["Body", "GarmentViews", "crop_body"]
 
@@ -56,26 +52,21 @@ class GarmentViews:
         body: Body,
         surfaces: Sequence[Surface],
         densities: Sequence[FloatArray],
-        drafted: Sequence[DraftedOutline] = (),
+        drafted: Sequence[Surface] = (),
+        words: str = "",
     ) -> None:
         """
         Args:
             body: under it.
             surfaces: the pieces in space.
             densities: #F [J/m2] for each piece.
-            drafted: pieces without a surface of their own, as collars and flounces; a line below says which lie within the garment.
+            drafted: pieces that were not flattened, as collars and flounces.
+            words: in a line below.
         """
         self._density = np.concatenate(densities)
-        added = [surface for each in drafted for surface in each.worn]
-        surfaces = [*surfaces, *added]
-        self._drafted_faces = sum(len(surface.faces) for surface in added)
-        within = dict.fromkeys(each.name.partition(", ")[0] for each in drafted if not each.worn)
-        self._words = "; ".join(
-            [
-                *(["grey: drafted for its edges, laid by its seams"] if added else []),
-                *([f"not shown on the body: {', '.join(within)}"] if within else []),
-            ]
-        )
+        self._words = words
+        self._drafted_faces = sum(len(surface.faces) for surface in drafted)
+        surfaces = [*surfaces, *drafted]
         worn = np.concatenate([surface.vertices for surface in surfaces])
         near, skin_points = crop_body(body, worn)
         counts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
@@ -94,7 +85,7 @@ class GarmentViews:
         self._views = [(title, view_from_side(points, facets, degrees)) for title, degrees in SIDES]
         for _, view in self._views:
             view.points[: len(worn), 2] += _NEARER
-            view.points[len(worn) - sum(len(surface.vertices) for surface in added) : len(worn), 2] += _OVER
+            view.points[len(worn) - sum(len(surface.vertices) for surface in drafted) : len(worn), 2] += _OVER
         self._width = sum(float(view.size[0]) for _, view in self._views)
         self._tallest = max(float(view.size[1]) for _, view in self._views)
         self._area = sum(Silhouette(view).area for _, view in self._views)
