@@ -231,7 +231,9 @@ def part_solids(
         if len(edges):
             cloth, number = cloth.with_seam(f"{SOLID} {number}", mesh.vertex_of[edges]), number + 1
             x, y, z = (100.0 * mesh.vertices[edges].mean(axis=(0, 1))).tolist()
-            notes.append(f"a piece has handles, as where a lace lies on it: slit open there, about ({x:.0f}, {y:.0f}, {z:.0f}) cm")
+            notes.append(
+                f"a piece has handles, as where a lace lies on it: slit open there, about ({x:.0f}, {y:.0f}, {z:.0f}) cm"
+            )
     left = sum(not is_open(mesh) for mesh in cloth.pieces())
     notes += [f"{left} of its pieces have several holes that no cut has opened"] if left else []
     return cloth, notes
