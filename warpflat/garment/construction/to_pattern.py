@@ -265,7 +265,7 @@ def pattern_of_garment(
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
         notes += equal
     with optional_step(_NO_DRAWING, is_needed=False):
-        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises))
+        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises, pattern.pieces[pattern.sample]))
     return pattern, notes
 
 
