@@ -1,21 +1,18 @@
-"""The openings of a sewn garment, and around which limb each goes."""
+"""The openings of a sewn garment."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops, orient
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, welded_vertices
 
-__all__ = ["Opening", "find_openings", "limbs_of"]
-
-# An opening whose middle lies this far aside, as a share of its width, is that of a limb.
-_ASIDE = 0.3
+__all__ = ["Opening", "find_openings"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,27 +61,3 @@ def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]
         turn = float((np.pi - angle[loop]).sum())
         found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces, turn=turn))
     return sorted(found, key=lambda each: -each.length)
-
-
-def limbs_of(openings: Sequence[Opening], positions: FloatArray, on_arms: Collection[str]) -> list[str]:
-    """Return around which limb each opening goes, such as "left arm"; "" for the trunk and the neck.
-
-    Args:
-        openings: of the garment.
-        positions: #V by 3, where the sewn garment starts [m].
-        on_arms: pieces of sleeves.
-    """
-    middles = [positions[each.vertices, :2].mean(axis=0) for each in openings]
-    widths = [np.ptp(positions[each.vertices, 0]) for each in openings]
-    aside = [abs(middle[0]) > _ASIDE * width for middle, width in zip(middles, widths, strict=True)]
-    sleeved = [bool(each.pieces & set(on_arms)) for each in openings]
-    # Without sleeves arms are above the lowest opening of the trunk, or above the legs.
-    free = [middle[1] for middle, is_aside in zip(middles, aside, strict=True) if is_aside]
-    centred = [middle[1] for middle, is_aside in zip(middles, aside, strict=True) if not is_aside]
-    least = float(np.mean(free)) if len(free) > 2 else min(centred, default=0.0)
-    limbs = []
-    for middle, is_aside, is_sleeve in zip(middles, aside, sleeved, strict=True):
-        side = "left" if middle[0] > 0.0 else "right"
-        is_arm = is_sleeve or (middle[1] > least and not any(sleeved))
-        limbs.append(f"{side} {'arm' if is_arm else 'leg'}" if is_aside or is_sleeve else "")
-    return limbs
