@@ -20,7 +20,7 @@ from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
 from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
 from warpflat.garment.draping.drape_garment import held_vertices, hip_level, thread_elastics
-from warpflat.garment.draping.lay_around import lay_around
+from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
 from warpflat.garment.draping.limbs import limb_lines, on_arm
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces, sewn_places, welded_vertices
@@ -37,7 +37,7 @@ from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
 from warpflat.pattern.drafting.whole_pieces import MIRRORED, whole_pieces
 
-__all__ = ["Placement", "drape_pattern"]
+__all__ = ["Placement", "drape_pattern", "lay_pieces"]
 
 # Where a file's units stand.
 _UNITS = (
@@ -232,10 +232,7 @@ def _sew(
         raise InputError(
             f"the pattern goes {1e3 * around:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {_UNITS} Is a piece missing?"
         )
-    nowhere = {name: np.zeros((len(mesh.points), 3)) for name, mesh in meshes.items()}
-    cloth = _cloth(pieces, meshes, welds, nowhere, fabric, turned)
-    up, hints, top = _hints(pieces, meshes, cloth, openings, body, placement.top)
-    laid = lay_around(cloth, openings, body, lines, up=up, hints=hints, top=top)
+    cloth, laid = lay_pieces(pieces, meshes, welds, openings, body, fabric=fabric, turned=turned, top=placement.top)
     start, limbs = laid.positions, laid.limbs
     solid = _worn_body(body, head=laid.hooded, device=device)
     # What begins below the arms passes through.
@@ -244,7 +241,7 @@ def _sew(
     for rows in cloth.piece_vertices.values():
         below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
     thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
-    sewn = sew_around(cloth, start, thin)
+    sewn = sew_around(cloth, start, thin, level=laid.level)
     check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(closures(pieces)))
     lifts = {
         name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
@@ -354,17 +351,23 @@ def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh],
     return ""
 
 
-def _hints(
+def lay_pieces(
     pieces: Mapping[str, Piece],
     meshes: Mapping[str, FlatMesh],
-    cloth: SewnCloth,
+    welds: Sequence[Sequence[Weld]],
     openings: Sequence[Opening],
     body: Mannequin,
-    top: str | float | None,
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return how high vertices lie (#V), which lie to the left and in front (#V by 3), and where what hangs from no shoulder hangs [m].
+    *,
+    fabric: Fabric,
+    turned: frozenset[str] = frozenset(),
+    top: str | float | None = None,
+) -> tuple[SewnCloth, Laid]:
+    """Return the sewn cloth of pieces, and how it is laid around a body: see `lay_around`.
 
-    A file's own places say so, or how pieces are drawn, what is told of them, and their names.
+    What lies in front and high is told by the places of a file, else by `at`, names, and how pieces are drawn.
+
+    Raises:
+        InputError: as there, or the level `top` is unknown.
     """
     heights = {name: level.height for name, level in body.levels().items()}
     if isinstance(top, str) and top not in heights:
@@ -374,26 +377,31 @@ def _hints(
         for name, mesh in meshes.items()
         if (place := pieces[name].placement) is not None
     }
-    up, hints, high = np.zeros(len(cloth.designed)), np.zeros((len(cloth.designed), 3)), heights["waist"]
     is_hung = len(hung) == len(meshes)
-    everything = np.concatenate(list(hung.values())) if is_hung else np.zeros((1, 3))
+    everything = np.concatenate([*hung.values(), np.zeros((0, 3))]) if is_hung else np.zeros((1, 3))
     middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
+    cloth = _cloth(
+        pieces, meshes, welds, {name: np.zeros((len(m.points), 3)) for name, m in meshes.items()}, fabric, turned
+    )
+    up, hints = np.zeros(len(cloth.designed)), np.zeros((len(cloth.designed), 3))
     for name, rows in cloth.piece_vertices.items():
-        own = cloth.welded[rows]
-        up[own] = hung[name][:, 1] if is_hung else meshes[name].points[:, 1] - meshes[name].points[:, 1].mean()
+        own, flat = cloth.welded[rows], meshes[name].points
         told = pieces[name].at or next((side for side in ("front", "back") if side in name.lower()), "")
+        up[own] = hung[name][:, 1] if is_hung else flat[:, 1] - flat[:, 1].mean()
         hints[own] = np.sign(hung[name] - middle) * [1.0, 0.0, 1.0] if is_hung else _LOOKS.get(told, np.zeros(3))
-    if is_hung:
-        border = max(float(up[each.vertices].mean()) for each in openings)
-        levels = [
-            (heights[level], float(hung[name][meshes[name].edges[edge], 1].mean()))
-            for name in hung
-            for edge, level in pieces[name].levels.items()
-        ]
-        # At its own levels, or as high as its file hangs it on the trunk.
-        shoulder = max(float(body.line(f"shoulder {side}")[:, 1].max()) for side in ("left", "right"))
-        if levels:
-            high = border + float(np.mean([own - its for own, its in levels]))
-        elif heights["hip"] < border < shoulder:
-            high = border
-    return up, hints, high if top is None else heights[top] if isinstance(top, str) else float(top)
+    # A file's own levels, where it has some.
+    off = [
+        heights[level] - float(hung[name][meshes[name].edges[edge], 1].mean())
+        for name in hung
+        for edge, level in pieces[name].levels.items()
+    ]
+    shoulder = max(float(body.line(f"shoulder {side}")[:, 1].max()) for side in ("left", "right"))
+
+    def hangs_at(high: float) -> float:
+        if top is not None:
+            return heights[top] if isinstance(top, str) else float(top)
+        if is_hung and off:
+            return high + float(np.mean(off))
+        return high if is_hung and heights["hip"] < high < shoulder else heights["waist"]
+
+    return cloth, lay_around(cloth, openings, body, limb_lines(body), up=up, hints=hints, top=hangs_at)

@@ -8,7 +8,7 @@ to its flat shape as it goes without the body (as rigid as possible, Sorkine and
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -50,11 +50,13 @@ class Laid:
         positions: #V by 3 [m].
         limbs: around which limb each opening goes, such as "left arm"; "" for the trunk and the neck.
         hooded: whether it has a hood.
+        level: #V, what hangs from no shoulder.
     """
 
     positions: FloatArray
     limbs: Sequence[str]
     hooded: bool
+    level: BoolArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,7 +92,7 @@ def lay_around(
     *,
     up: FloatArray,
     hints: FloatArray,
-    top: float,
+    top: Callable[[float], float],
 ) -> Laid:
     """Lay sewn cloth around a body.
 
@@ -101,7 +103,7 @@ def lay_around(
         lines: the body's limbs: see :func:`warpflat.garment.draping.limbs.limb_lines`.
         up: #V, how high each vertex lies in its piece [m].
         hints: #V by 3, where each vertex is said to lie: x is 1 to the left and z in front, -1 to the right and behind, 0 if unknown.
-        top: the height [m] at which a garment hangs that does not hang from the shoulders.
+        top: the height [m] at which what does not hang from the shoulders hangs, by that of its highest opening in `up`.
 
     Raises:
         InputError: the openings are not those of a garment.
@@ -116,23 +118,27 @@ def lay_around(
     handed = 1.0 if sum(tuple(pair) in sides for pair in pairs) >= 0.5 * len(pairs) else -1.0
     _, part = connected_components(graph, directed=False)
     laid, limbs, hooded, rings = np.zeros((len(cloth.designed), 3)), [""] * len(openings), False, list[_Ring]()
+    level = np.zeros(len(laid), dtype=bool)
     for own in np.unique(part):
         rows = [k for k, each in enumerate(openings) if part[each.vertices[0]] == own]
         parted = [openings[k] for k in rows]
         far = np.array([dijkstra(graph, directed=False, indices=each.vertices, min_only=True) for each in parted])
         kinds = _kinds(parted, far, up, polyline_length(body.line("waist"), closed=True))
+        highest = parted[kinds.index("neck" if "neck" in kinds else "waist")].vertices
+        high = float(body.line("collar")[:, 1].mean()) if "neck" in kinds else top(float(up[highest].mean()))
+        # Without another sign the highest edge is deeper in front, nearer to the lowest ones.
+        looks = hints * (part == own)[:, None]
+        if not looks.any():
+            looks[highest, 2] = -far[[k for k, kind in enumerate(kinds) if kind in ("hem", "leg")]].min(axis=0)[highest]
         trials = []
         for swapped in (False, True):
             named, hood = _name_limbs(kinds, parted, far, swapped=swapped)
-            found = _rings(graph, parted, far, named, hood, body, lines, hints=hints, top=top, handed=handed)
+            found = _rings(graph, parted, far, named, hood, body, lines, hints=hints, high=high, handed=handed)
             places = _harmonic(rigid, found, part == own)
-            # Without another sign the neck is deeper in front, nearer to the hem.
-            depth = np.zeros_like(places)
-            depth[:, 2] = -np.nan_to_num(far[-1], posinf=0.0)
-            own_hints = hints if hints[part == own].any() else depth
-            trials.append((float((own_hints * places)[part == own].sum()), places, found, named, hood))
+            trials.append((float((looks * places).sum()), places, found, named, hood))
         _, places, found, named, hood = max(trials, key=lambda trial: trial[0])
         laid[part == own] = places[part == own]
+        level |= (part == own) & ("neck" not in kinds)
         rings += found
         hooded |= hood
         for k, name in zip(rows, named, strict=True):
@@ -146,7 +152,7 @@ def lay_around(
             for ring in rings:
                 target[ring.vertices] = ring.nearest_places(laid[ring.vertices])
             laid = rigid.step(laid, target)
-    return Laid(positions=laid, limbs=limbs, hooded=hooded)
+    return Laid(positions=laid, limbs=limbs, hooded=hooded, level=level)
 
 
 def _edges(cloth: SewnCloth) -> csr_array:
@@ -250,13 +256,13 @@ def _rings(
     lines: Mapping[str, FloatArray],
     *,
     hints: FloatArray,
-    top: float,
+    high: float,
     handed: float,
 ) -> list[_Ring]:
     """Return the rings of a garment."""
     highest = named.index("neck" if "neck" in named else "waist")
     edge, waist, collar = openings[highest].vertices, body.line("waist"), body.line("collar").mean(axis=0)
-    middle, high = 0.5 * (waist.min(axis=0) + waist.max(axis=0)), float(collar[1]) if "neck" in named else top
+    middle = 0.5 * (waist.min(axis=0) + waist.max(axis=0))
     left, ahead = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
     # How much nearer vertices are to the left limb than to the right one, or to the front than to the back.
     limb = next((each for each in ("arm", "leg") if f"left {each}" in named), "")

@@ -25,12 +25,17 @@ _GATHER, _GROW, _SETTLE, _RENEWED, _NEW_CONTACT = 60, 60, 30, 5, 0.02
 _OFF, _REACH = 0.002, 0.12
 # Stiffness over the cloth's: of inertia, of contact, of what stays, and of bending.
 _INERTIA, _HOLD, _STAY, _BEND = 0.02, 1.0, 1e3, 0.02
-# Heights go back to those of the start by this share, until the body has grown. What hangs free falls by so much in a round [m].
+# What hangs from no shoulder goes back to its height by this share until the body has grown. What hangs free falls by so much [m] a round.
 _KEEP, _FALL = 0.1, 0.003
 
 
 def sew_around(
-    cloth: SewnCloth, start: FloatArray, body: Body | ThinBody, *, fixed: BoolArray | None = None
+    cloth: SewnCloth,
+    start: FloatArray,
+    body: Body | ThinBody,
+    *,
+    fixed: BoolArray | None = None,
+    level: BoolArray | None = None,
 ) -> FloatArray:
     """Draw sewn cloth together around a body, nearly without strain.
 
@@ -39,13 +44,14 @@ def sew_around(
         start: #V by 3, where its vertices are [m].
         body: what it stays outside of; a thin one grows.
         fixed: #V, the vertices that stay there.
+        level: #V, those that keep their height until the body has grown.
 
     Returns:
         #V by 3 [m].
     """
     rigid = AsRigid(cloth)
     gather, grow = (_GATHER, _GROW) if isinstance(body, ThinBody) else (0, 0)
-    stays = np.zeros(len(start), bool) if fixed is None else fixed
+    stays, kept = (np.zeros(len(start), bool) if given is None else given for given in (fixed, level))
     x, touching = start.copy(), np.zeros(len(start), bool)
     for number in range(gather + grow + _SETTLE):
         if isinstance(body, ThinBody) and number <= gather + grow:
@@ -58,8 +64,9 @@ def sew_around(
             rigid.hold(_INERTIA + _HOLD * touching + _STAY * stays)
         target = np.where((near & touching)[:, None], x + (_OFF - depth)[:, None] * normal, x)
         if grow:
+            grown = number >= gather + grow
             target[:, 1] += (
-                _KEEP * (start[:, 1] - x[:, 1]) * (number < gather + grow) - _FALL * (number >= gather // 2) * ~near
+                _KEEP * (start[:, 1] - x[:, 1]) * (kept & (not grown)) - _FALL * (number >= gather // 2) * ~near
             )
         target[stays] = start[stays]
         x = rigid.step(x, target)
