@@ -13,6 +13,7 @@ import warpflat
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops, join_labels
+from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
 from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
 from warpflat.garment.draping.moved_pattern import moved_outlines
@@ -20,7 +21,6 @@ from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.garment.draping.wrap_pieces import continue_pieces, hood_beside_head
 from warpflat.garment.mannequin.head import head_of
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Elastic, Pattern, Piece, Seam, SeamSide

@@ -33,8 +33,11 @@ _HOLE, _LONG = -1.9 * np.pi, 0.4
 # An opening that is longer than so many times the body's waist, beside those of two limbs, runs along a front that is open.
 _OPEN_FRONT = 2.0
 # The edge of a hood rises so far [m] from the throat to the crown (hoods .22 and .34, a collar with its placket .16, necks up to .06), and
-# starts so far [m] before the middle of the head.
-_HOOD, _BEFORE_FACE = 0.19, 0.02
+# starts so far [m] before and below the middle of the face.
+_HOOD, _BEFORE_FACE, _LOWER = 0.19, 0.02, 0.06
+# The shortest way from a sleeve's end to the hem, but for this share, runs along the underarm. It is laid below the arm, from so far [m]
+# below the armpit on.
+_UNDERARM, _BESIDE_ARMPIT = 1.03, 0.1
 # A leg ends at least so far [m] below the crotch.
 _BELOW = 0.03
 # How the rings hold the cloth, over its own stiffness, and for how many rounds.
@@ -118,11 +121,12 @@ def lay_around(
     handed = 1.0 if sum(tuple(pair) in sides for pair in pairs) >= 0.5 * len(pairs) else -1.0
     _, part = connected_components(graph, directed=False)
     laid, limbs, hooded, rings = np.zeros((len(cloth.designed), 3)), [""] * len(openings), False, list[_Ring]()
-    level = np.zeros(len(laid), dtype=bool)
+    level, under = np.zeros(len(laid), dtype=bool), dict[str, IntArray]()
     for own in np.unique(part):
         rows = [k for k, each in enumerate(openings) if part[each.vertices[0]] == own]
         parted = [openings[k] for k in rows]
         far = np.array([dijkstra(graph, directed=False, indices=each.vertices, min_only=True) for each in parted])
+        far[~np.isfinite(far)] = 0.0  # of other garments
         kinds = _kinds(parted, far, up, polyline_length(body.line("waist"), closed=True))
         highest = parted[kinds.index("neck" if "neck" in kinds else "waist")].vertices
         high = float(body.line("collar")[:, 1].mean()) if "neck" in kinds else top(float(up[highest].mean()))
@@ -143,14 +147,25 @@ def lay_around(
         hooded |= hood
         for k, name in zip(rows, named, strict=True):
             limbs[k] = name if name.endswith(("arm", "leg")) else ""
+        low = [k for k, kind in enumerate(kinds) if kind in ("hem", "leg")]
+        for k, name in enumerate(named):
+            if name.endswith("arm"):
+                armpit = float(body.line(f"armhole {name.removesuffix(' arm')}")[:, 1].min())
+                both = np.where(part == own, far[k] + far[low].min(axis=0), np.inf)
+                under[name] = np.flatnonzero((both < _UNDERARM * both.min()) & (places[:, 1] > armpit - _BESIDE_ARMPIT))
     for weight, rounds in _HOLDS:
         held = np.zeros(len(laid))
-        held[np.concatenate([ring.vertices for ring in rings])] = weight
+        held[np.concatenate([ring.vertices for ring in rings] + list(under.values()))] = weight
         rigid.hold(held + 1e-6)
         for _ in range(rounds):
             target = laid.copy()
             for ring in rings:
                 target[ring.vertices] = ring.nearest_places(laid[ring.vertices])
+            for arm, rows in under.items():
+                _, armhole, wrist, _ = lines[arm]
+                drop = armhole[1] - body.line(f"armhole {arm.removesuffix(' arm')}")[:, 1].min()
+                below = np.interp(np.abs(laid[rows, 0]), np.abs([armhole[0], wrist[0]]), [armhole[1], wrist[1]]) - drop
+                target[rows, 1] = np.minimum(target[rows, 1], below)
             laid = rigid.step(laid, target)
     return Laid(positions=laid, limbs=limbs, hooded=hooded, level=level)
 
@@ -273,7 +288,9 @@ def _rings(
         radius = each.length / (2.0 * np.pi)
         value, looks = (aside, left) if aside is not None else (hints[:, 2], ahead)
         if name == "neck":
-            centre, out = (collar, _UP) if not hooded else (lines["head"][2] + _BEFORE_FACE * ahead, ahead)
+            centre, out = (
+                (collar, _UP) if not hooded else (lines["head"][2] - _LOWER * _UP + _BEFORE_FACE * ahead, ahead)
+            )
         elif name.endswith("arm"):
             line = np.array([collar, *lines[name][1:]])
             # From the edge of the neck along the shoulder.
@@ -304,13 +321,15 @@ def _rings(
         step = np.asarray(
             graph[each.vertices, np.roll(each.vertices, -1)] + graph[np.roll(each.vertices, -1), each.vertices]
         )
-        circle = np.exp(2j * np.pi * np.cumsum(step) / step.sum())
+        circle = np.exp(2j * np.pi * (np.cumsum(step) - step) / step.sum())
         ring = _Ring(vertices=each.vertices, circle=circle, centre=centre, axes=axes)
         if aside is None and rings:
             # What is nearest to the foremost place of the waist.
             foremost = rings[0].vertices[[rings[0].places()[:, 2].argmin(), rings[0].places()[:, 2].argmax()]]
-            value = np.subtract(*dijkstra(graph, directed=False, indices=foremost))
-        rings.append(ring.turned(value[each.vertices], looks))
+            behind, before = dijkstra(graph, directed=False, indices=foremost)[:, each.vertices]
+            rings.append(ring.turned(behind - before, looks))
+        else:
+            rings.append(ring.turned(value[each.vertices], looks))
     return rings
 
 
