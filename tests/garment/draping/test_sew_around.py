@@ -44,9 +44,9 @@ def joined(first: str, second: str) -> Seam:
 
 
 def shirt() -> Pattern:
-    """A top of two equal pieces and two sleeves, whose names tell nothing; one sleeve is drawn upside down."""
+    """A top of two equal pieces, of which one is said to lie in front, and two sleeves; one sleeve is drawn upside down."""
     sleeve = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.25), (0.0, 0.25)]
-    pieces = [piece("p", TOP), piece("q", TOP), piece("l", sleeve), piece("r", sleeve)]
+    pieces = [replace(piece("p", TOP), at="front"), piece("q", TOP), piece("l", sleeve), piece("r", sleeve)]
     seams = [joined(f"p.e{k}", f"q.e{8 - k}") for k in (1, 3, 5, 7)]
     seams += [joined("l.e1", "l.e3"), joined("r.e1", "r.e3")]
     seams += [joined("p.e2 + q.e6", "l.e2"), joined("q.e2 + p.e6", "r.e0")]

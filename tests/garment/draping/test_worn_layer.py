@@ -500,6 +500,8 @@ def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
         return np.column_stack([-radius * np.sin(angle), height, -radius * np.cos(angle)])
 
     monkeypatch.setattr("warpflat.garment.draping.drape_pattern.sew_around", kept)
+    # The shell, a bare cylinder, is worn where it is.
+    monkeypatch.setattr("warpflat.garment.draping.drape_pattern._elsewhere", lambda *_: "")
     for role in ("hood", "collar"):
         pattern = replace(pattern, pieces={"": [shell, replace(hood, role=role)]})
         worn, _ = drape_pattern(

@@ -367,7 +367,7 @@ def test_what_garmentcode_does_not_know_is_named(command: Command):
 
 
 def test_panels_hang_where_the_body_is():
-    """A top hangs from the shoulders and a skirt of its own from the waist; sleeves of two halves go around the arms, fronts in front."""
+    """A top hangs from the shoulders and a skirt of its own from the waist; fronts are in front."""
     top = [
         (0.0, 0.0),
         (50.0, 0.0),
@@ -380,7 +380,6 @@ def test_panels_hang_where_the_body_is():
         (0.0, 30.0),
     ]
     skirt = [(0.0, 0.0), (50.0, 0.0), (45.0, 60.0), (5.0, 60.0)]
-    sleeve = [(0.0, 0.0), (20.0, 0.0), (20.0, 25.0), (0.0, 40.0)]
 
     def other_side(panel_of: dict[str, Any]) -> dict[str, Any]:
         """The panel behind: its edges run the other way, and keep their numbers where k becomes -2 - k."""
@@ -392,15 +391,11 @@ def test_panels_hang_where_the_body_is():
     panels: dict[str, Any] = {"top_f": panel(top, translation=[-25.0, 300.0, 30.0])}
     panels["skirt_f"] = panel(skirt, translation=[-25.0, 0.0, 30.0])
     panels["skirt_f"]["edges"][2]["label"] = "lower_interface"
-    for side, x in (("left", 40.0), ("right", -40.0)):
-        # The seam over the arm, the longer one, is on the far side from the body.
-        shape = [(-a, b) for a, b in sleeve[::-1]] if side == "left" else sleeve
-        panels[f"{side}_sleeve_f"] = panel(shape, translation=[x, 90.0, 20.0], label="arm")
     for name in list(panels):
         panels[name.replace("_f", "_b")] = other_side(panels[name])
     count = {name: len(each["edges"]) for name, each in panels.items()}
     stitches = [f"{f}.{k} {f.replace('_f', '_b')}.{count[f] - 1 - k}"
-                for f, ks in (("top_f", (1, 3, 6, 8)), ("skirt_f", (1, 3)), ("left_sleeve_f", (1, 3)), ("right_sleeve_f", (1, 3)))
+                for f, ks in (("top_f", (1, 3, 6, 8)), ("skirt_f", (1, 3)))
                 for k in ks]  # fmt: skip
     pattern = garmentcode_pattern(file_of(panels, stitches), "p")
     pieces, seams, _ = whole_pieces(pattern.pieces[""], pattern.seams)
@@ -413,16 +408,15 @@ def test_panels_hang_where_the_body_is():
     # The skirt, a garment of its own, keeps its height, which is that of the waist at its upper edge.
     skirts = np.unique(np.concatenate([cloth.welded[cloth.piece_vertices[f"skirt_{side}"]] for side in "fb"]))
     np.testing.assert_array_equal(np.flatnonzero(laid.level), skirts)
-    waist = laid.positions[cloth.lines["skirt_f.lower_interface"]]
+    rows = cloth.piece_vertices["skirt_f"]
+    waist = laid.positions[cloth.welded[rows][cloth.flat[rows, 1] > cloth.flat[rows, 1].max() - 1e-6]]
     assert waist[:, 1].mean() == pytest.approx(body.levels()["waist"].height, abs=0.02)
 
     def middle(name: str) -> np.ndarray:
         return np.asarray(laid.positions[cloth.welded[cloth.piece_vertices[name]]].mean(axis=0))
 
-    for name in ("top", "skirt", "left_sleeve", "right_sleeve"):
+    for name in ("top", "skirt"):
         assert middle(f"{name}_f")[2] > middle(f"{name}_b")[2] + 0.05
-    assert middle("left_sleeve_f")[0] > 0.15
-    assert middle("right_sleeve_f")[0] < -0.15
 
 
 @needs_data

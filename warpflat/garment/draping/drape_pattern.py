@@ -223,7 +223,8 @@ def _sew(
         meshes, welds = mesh_pieces(pieces, seams, spacing, closures(pieces))
     except InputError:
         meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
-    openings, lines = find_openings(meshes, welds), limb_lines(body)
+    buttons, lines = closures(pieces), limb_lines(body)
+    openings = find_openings(meshes, welds, welds[-1] if buttons else ())
     girth, around = (
         polyline_length(body.line("waist"), closed=True),
         max((each.length for each in openings), default=0.0),
@@ -234,7 +235,8 @@ def _sew(
         )
     cloth, laid = lay_pieces(pieces, meshes, welds, openings, body, fabric=fabric, turned=turned, top=placement.top)
     start, limbs = laid.positions, laid.limbs
-    solid = _worn_body(body, head=laid.hooded, device=device)
+    is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
+    solid = _worn_body(body, head=is_hooded, device=device)
     # What begins below the arms passes through.
     armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
     below = np.zeros(len(start), dtype=bool)
@@ -242,7 +244,7 @@ def _sew(
         below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
     thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
     sewn = sew_around(cloth, start, thin, level=laid.level)
-    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(closures(pieces)))
+    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(buttons))
     lifts = {
         name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
         for name, mesh in meshes.items()

@@ -32,8 +32,18 @@ class Opening:
     turn: float
 
 
-def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> list[Opening]:
-    """Return the openings of pieces that are sewn together, the longest first; none where their seams make no surface."""
+def find_openings(
+    meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], buttons: Sequence[Weld] = ()
+) -> list[Opening]:
+    """Return the openings of pieces that are sewn together, the longest first; none where their seams make no surface.
+
+    A border that runs along both fronts of a buttoned garment is two: one beyond the first button, one beyond the last.
+
+    Args:
+        meshes: the pieces.
+        welds: for each seam the vertices that it joins.
+        buttons: those of them that join points inside two pieces.
+    """
     welded, begins = welded_vertices(meshes, welds)
     faces = np.concatenate([welded[mesh.triangles + begins[name]] for name, mesh in meshes.items()])
     try:
@@ -55,9 +65,35 @@ def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]
         pairs = np.sort(welded[edges + begins[name]], axis=1).tolist()
         lengths |= {(a, b): (length, name) for (a, b), length in zip(pairs, along, strict=True)}
     found = []
-    for loop in loops:
-        on = [lengths[a, b] for a, b in np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()]
+    for loop in [part for whole in loops for part in _between_buttons(whole, meshes, welded, begins, buttons)]:
+        sides = np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()
+        on = [lengths[a, b] for a, b in sides if (a, b) in lengths]
         pieces = frozenset(name for _, name in on)
         turn = float((np.pi - angle[loop]).sum())
         found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces, turn=turn))
     return sorted(found, key=lambda each: -each.length)
+
+
+def _between_buttons(
+    loop: IntArray,
+    meshes: Mapping[str, FlatMesh],
+    welded: IntArray,
+    begins: Mapping[str, int],
+    buttons: Sequence[Weld],
+) -> list[IntArray]:
+    """Return the parts of a border that lie beyond the first and the last of the buttons that join it to itself."""
+    parts, ends = [loop], list[tuple[int, ...]]()
+    for layers in buttons:
+        nearest = []
+        for name, vertex in layers:
+            own = welded[begins[name] : begins[name] + len(meshes[name].points)]
+            far = np.linalg.norm(meshes[name].points - meshes[name].points[vertex], axis=1)
+            nearest.append(int(own[np.where(np.isin(own, loop), far, np.inf).argmin()]))
+        for k, part in enumerate(parts):
+            if len({name for name, _ in layers}) == 2 and nearest[0] != nearest[1] and np.isin(nearest, part).all():
+                first, last = sorted(int(np.flatnonzero(part == end)[0]) for end in nearest)
+                parts[k : k + 1] = [part[first : last + 1], np.concatenate([part[last:], part[: first + 1]])]
+                ends.append(tuple(nearest))
+                break
+    # What lies between two buttons is sewn to neither.
+    return [part for part in parts if sum(bool(np.isin(pair, part).all()) for pair in ends) < 2]
