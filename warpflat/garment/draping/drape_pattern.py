@@ -227,7 +227,7 @@ def _sew(
     openings = find_openings(meshes, welds, welds[-1] if buttons else ())
     girth, around = (
         polyline_length(body.line("waist"), closed=True),
-        max((each.length for each in openings), default=0.0),
+        max((each.length for each in openings), default=np.inf),
     )
     if around < _LEAST_GIRTH * girth:
         raise InputError(

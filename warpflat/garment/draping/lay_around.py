@@ -121,7 +121,7 @@ def lay_around(
     handed = 1.0 if sum(tuple(pair) in sides for pair in pairs) >= 0.5 * len(pairs) else -1.0
     _, part = connected_components(graph, directed=False)
     laid, limbs, hooded, rings = np.zeros((len(cloth.designed), 3)), [""] * len(openings), False, list[_Ring]()
-    level, under = np.zeros(len(laid), dtype=bool), dict[str, IntArray]()
+    level, under = np.zeros(len(laid), dtype=bool), dict[str, NDArray[np.intp]]()
     for own in np.unique(part):
         rows = [k for k, each in enumerate(openings) if part[each.vertices[0]] == own]
         parted = [openings[k] for k in rows]
@@ -161,11 +161,13 @@ def lay_around(
             target = laid.copy()
             for ring in rings:
                 target[ring.vertices] = ring.nearest_places(laid[ring.vertices])
-            for arm, rows in under.items():
+            for arm, below_arm in under.items():
                 _, armhole, wrist, _ = lines[arm]
                 drop = armhole[1] - body.line(f"armhole {arm.removesuffix(' arm')}")[:, 1].min()
-                below = np.interp(np.abs(laid[rows, 0]), np.abs([armhole[0], wrist[0]]), [armhole[1], wrist[1]]) - drop
-                target[rows, 1] = np.minimum(target[rows, 1], below)
+                below = (
+                    np.interp(np.abs(laid[below_arm, 0]), np.abs([armhole[0], wrist[0]]), [armhole[1], wrist[1]]) - drop
+                )
+                target[below_arm, 1] = np.minimum(target[below_arm, 1], below)
             laid = rigid.step(laid, target)
     return Laid(positions=laid, limbs=limbs, hooded=hooded, level=level)
 
