@@ -122,6 +122,7 @@ def lay_around(
     _, part = connected_components(graph, directed=False)
     laid, limbs, hooded, rings = np.zeros((len(cloth.designed), 3)), [""] * len(openings), False, list[_Ring]()
     level, under = np.zeros(len(laid), dtype=bool), dict[str, NDArray[np.intp]]()
+    tops = list[tuple[BoolArray, _Ring]]()
     for own in np.unique(part):
         rows = [k for k, each in enumerate(openings) if part[each.vertices[0]] == own]
         parted = [openings[k] for k in rows]
@@ -144,6 +145,7 @@ def lay_around(
         laid[part == own] = places[part == own]
         level |= (part == own) & ("neck" not in kinds)
         rings += found
+        tops.append((part == own, found[0]))
         hooded |= hood
         for k, name in zip(rows, named, strict=True):
             limbs[k] = name if name.endswith(("arm", "leg")) else ""
@@ -169,6 +171,9 @@ def lay_around(
                 )
                 target[below_arm, 1] = np.minimum(target[below_arm, 1], below)
             laid = rigid.step(laid, target)
+    # Ways along a mesh are longer than in the cloth, so that lower rings drew the highest one down.
+    for hung, ring in tops:
+        laid[hung, 1] += ring.centre[1] - laid[ring.vertices, 1].mean()
     return Laid(positions=laid, limbs=limbs, hooded=hooded, level=level)
 
 
