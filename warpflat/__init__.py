@@ -1,7 +1,7 @@
 """warpflat: flat sewing patterns from 3D garment surfaces, by minimum strain energy on NVIDIA Warp.
 
 >>> import warpflat
->>> result = warpflat.flatten("bodice.obj", units="m", fabric="woven")
+>>> result = warpflat.flatten(warpflat.read_surface("bodice.obj", units="m"), fabric="woven")
 >>> warpflat.save_piece(result, "out")
 
 Every name that a script needs is `warpflat.NAME`; it is loaded when it is first used.

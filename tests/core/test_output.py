@@ -10,10 +10,9 @@ import pytest
 
 from warpflat.core.environment import require_environment
 from warpflat.core.errors import CannotWriteError, InputError, StepError
+from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.core.output import (
-    LeftOut,
     atomic_path,
-    listening_to_left_out,
     optional_step,
     output_folder,
     write_report,

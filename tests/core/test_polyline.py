@@ -53,8 +53,8 @@ def test_turns_to_the_left_are_positive() -> None:
 
 def test_the_nearest_point_lies_inside_a_segment_or_at_an_end() -> None:
     share, distance = project_on_segments(np.array([0.25, 0.5]), SQUARE[:-1], SQUARE[1:])
-    assert share.tolist() == [0.25, 0.5, 0.75]
-    assert distance.tolist() == [0.5, 0.75, 0.5]
+    assert share == pytest.approx([0.25, 0.5, 0.75])
+    assert distance == pytest.approx([0.5, 0.75, 0.5])
     assert nearest_on_polyline(np.array([2.0, -1.0]), SQUARE).tolist() == [1.0, 0.0]
     assert nearest_on_polyline(np.array([2.0, -1.0]), SQUARE[:1]).tolist() == [0.0, 0.0]
 

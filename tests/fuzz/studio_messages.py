@@ -238,11 +238,14 @@ class Studio:
         """Say something in a connection that has been let in; return whether any of it was refused."""
         from websockets.exceptions import ConnectionClosed
 
-        before, first = self.state(), len(self.told)
         raw = [self._encoded(message) for message in messages]
         with self.connect() as page:
+            page.send(self._encoded(CAMERA))
+            # A page that is loaded begins without marks, whatever it says then.
+            self._mark(page)
+            self._come_to_rest()
+            before, first = self.state(), len(self.told)
             try:
-                page.send(self._encoded(CAMERA))
                 for content in raw:
                     page.send(content)
                 went_on = self._mark(page)

@@ -309,7 +309,7 @@ def test_a_piece_whose_name_a_cut_gives():
 
 def test_a_result_is_not_saved_over_its_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     Path("front.obj").write_text(SQUARE)
-    result = flatten("front.obj", units="m")
+    result = flatten(read_surface("front.obj", units="m"))
     for save in (
         lambda: save_piece(result, tmp_path, picture=False, frames=False),
         lambda: write_pieces([result], tmp_path, picture=False, frames=False),

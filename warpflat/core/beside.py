@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar
 
 from warpflat.core.activity import activity_listener, report_activity
 from warpflat.core.input_files import listening_to_reads, note_read
-from warpflat.core.output import LeftOut, leave_out, listening_to_left_out
+from warpflat.core.left_out import LeftOut, leave_out, listening_to_left_out
 from warpflat.core.threads import thread_count
 
 __all__ = ["Beside", "two_at_a_time", "work_beside"]

@@ -29,7 +29,7 @@ import re
 import shutil
 import time
 import uuid
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -41,11 +41,11 @@ import numpy as np
 from warpflat.core.errors import SIGNALS, CannotWriteError, InputError, expect, system_reason
 from warpflat.core.file_names import check_file_name
 from warpflat.core.input_files import file_digest, listening_to_reads, read_result
+from warpflat.core.left_out import LeftOut, is_heard, leave_out, listening_to_left_out
 from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.text import one_line
 
 __all__ = [
-    "LeftOut",
     "NotOursError",
     "atomic_path",
     "expect_files",
@@ -53,8 +53,6 @@ __all__ = [
     "has_seal",
     "hidden_file",
     "latest_file",
-    "leave_out",
-    "listening_to_left_out",
     "optional_file",
     "optional_step",
     "output_folder",
@@ -94,25 +92,6 @@ _NAMELESS = (
     "frames.usdc", "picture.png", "wear.png", "drape.png", "drape.webp", "corrected.png", "walked.png", "pattern.pdf", "pattern.json",
     "review.html", "film.webp", "contact_sheet.png", "worn.usdc",
 )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class LeftOut:
-    """A step that was left out.
-
-    Attributes:
-        note: what was left out, and why: one sentence.
-        folder: of the run; None outside of one.
-        is_needed: whether the pattern is not complete without it.
-    """
-
-    note: str
-    folder: Path | None
-    is_needed: bool
-
-
-#: Called with each step that is left out.
-Listener = Callable[[LeftOut], object]
 
 
 class NotOursError(CannotWriteError):
@@ -165,6 +144,11 @@ class _Run:
         self.sources.add(source)
         _refuse_to_replace((self.folder / name for name in self.expected), [source])
 
+    def keep(self, step: LeftOut) -> None:
+        """A step was left out; one of this folder belongs in its report."""
+        if step.folder is not None and (step.folder == self.folder or _is_among(step.folder, [self.folder])):
+            self.left_out[step] = None
+
     def commit(self) -> None:
         """Make the new files those of the folder, `metrics.json` at last; what fails here is undone when the hidden folder is cleared."""
         complete = (path.name for path in self.new.iterdir() if not _HIDDEN.fullmatch(path.name))
@@ -203,7 +187,6 @@ class _Run:
 
 
 _runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
-_listeners: ContextVar[tuple[Listener, ...]] = ContextVar("left_out", default=())
 # The folders into which this process has written.
 _written: list[Path] = []
 # Hidden files and folders that this process has made or is about to make, and the folders that go with each if nothing is left in them.
@@ -257,7 +240,7 @@ def output_folder(
         except OSError as error:
             raise _no_output_folder(folder, error) from error
         _runs.set((*before, run))
-        with listening_to_reads(run.protect):
+        with listening_to_reads(run.protect), listening_to_left_out(run.keep):
             yield folder
         run.commit()
     finally:
@@ -486,7 +469,7 @@ def optional_step(
         ):
             raise
         run = next(reversed(_going_on()), None) if folder is None else _run_into(folder)
-        if folder is None and run is None and not _listeners.get():
+        if folder is None and run is None and not is_heard():
             raise  # nobody would hear of it
         notes.append(one_line(f"{words}: {error}" if foreseen else f"{words}: {type(error).__name__}: {error}"))
         leave_out(LeftOut(note=notes[0], folder=folder if run is None else run.folder, is_needed=is_needed))
@@ -511,24 +494,6 @@ def optional_file(path: str | os.PathLike[str], files: list[str], *, part: str =
         yield path
     if not left_out:
         files.append(path.name)
-
-
-def leave_out(step: LeftOut) -> None:
-    """Keep a step that was left out, for `metrics.json` and for whoever listens."""
-    if step.folder is not None and (run := _run_into(step.folder)):
-        run.left_out[step] = None
-    for listener in _listeners.get():
-        listener(step)
-
-
-@contextmanager
-def listening_to_left_out(listener: Listener) -> Iterator[None]:
-    """Call `listener` with each step that is left out in the block."""
-    before = _listeners.set((*_listeners.get(), listener))
-    try:
-        yield
-    finally:
-        _listeners.reset(before)
 
 
 # --- what is not replaced

@@ -141,6 +141,7 @@ def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
     settings = {
         "mannequin": {"size": "EU 38", "resolution_mm": 20},
         "form": "bodice",
+        "finishing": [{"kind": "band", "edge": "waist", "width_mm": 40}],
         "output": {"frames": 3, "picture": False},
         "pattern": {"formats": []},
     }
@@ -159,11 +160,17 @@ def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
     # The page of the review shows the same body.
     packed = pack_film(open_film(folder / "frames.usdc"))
     assert packed is not None
-    told = packed["body"]
+    told, band = packed["still"]
+    assert (told["kind"], band["kind"]) == ("body", "drafted")
     data = np.frombuffer(zlib.decompress(base64.b64decode(told["data"])), dtype=np.uint8)
     planes = data[12 * told["triangles"] :].reshape(2, 3, -1).astype(np.uint16)
     points = np.array(told["space"][:3]) + (planes[0] + 256 * planes[1]).T / 65535 * told["space"][3]
     np.testing.assert_allclose(points, np.array(shown.GetPointsAttr().Get())[np.unique(faces)], atol=2e-5)
+    # The band, which has no frames, hangs below the waist, 40 mm high.
+    (hung,) = film.GetPrimAtPath("/World/drafted").GetChildren()
+    worn = np.array(UsdGeom.Mesh(hung).GetPointsAttr().Get())
+    assert 0.03 < np.ptp(worn[:, 1]) < 0.06
+    assert np.abs(worn[:, [0, 2]].mean(axis=0)).max() < 0.05
     # The patterns lie beside the body, and each mesh says whose it is.
     corners = UsdGeom.BBoxCache(Usd.TimeCode(1), [UsdGeom.Tokens.default_])
     body_box = corners.ComputeWorldBound(shown.GetPrim()).ComputeAlignedRange()

@@ -13,6 +13,7 @@ import pytest
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.plan import plan_scene
 from warpflat.app.scene.wardrobe import garment_offer, offers, scene_text
+from warpflat.core.polyline import polyline_length
 from warpflat.core.text import other_side
 from warpflat.flat.fabric.library import load_library
 from warpflat.garment.construction.linings import add_interfacing, add_lining
@@ -120,6 +121,31 @@ def test_a_seam_comes_after_those_that_end_on_its_line(drafted: DraftedGarment):
             for one, other in pairwise(row):
                 crossing = ends.get(frozenset((corner(one, end=True), corner(other, end=False))))
                 assert crossing is None or number[crossing] <= number[seam.name], (crossing, seam.name)
+
+
+def test_facings_that_are_sewn_to_a_lining_are_not_neatened():
+    for name, chosen, neatened in (("shift_dress", {}, True), ("jacket", {"lining": "full"}, False)):
+        words = [step.words for step in sewing_steps(drafted_garment(name, chosen), "") if step.technique == "facing"]
+        assert words
+        assert [each.startswith("Neaten the inner edges of the facings. Sew") for each in words] == [neatened] * len(
+            words
+        )
+
+
+def test_bands_and_flounces_belong_to_the_finished_length_and_an_overlap_counts_once():
+    hoodie = drafted_garment("hoodie", {})
+    pieces = {piece.name: piece for piece in hoodie.pieces[""]}
+    lengths = finished_lengths(hoodie, "")
+    (fold,) = [edge.line for edge in pieces["back"].edges if edge.kind == "fold"] or [
+        pieces["back"].internal_lines["centre back"]
+    ]
+    band = 0.5 * pieces["hip_band"].edge("left end").length
+    assert lengths["length at the centre back"] == pytest.approx(polyline_length(fold) + band, abs=1e-3)
+    assert lengths["sleeve"] > 0.5
+    shirt = drafted_garment("shirt", {})
+    assert shirt.garment.worn is not None
+    (hip,) = [each for each in shirt.garment.worn.measures[""] if each.name == "hip"]
+    assert finished_lengths(shirt, "")["hem at the hip"] == pytest.approx(hip.finished, abs=0.015)
 
 
 def test_a_shirt_and_trousers_are_as_long_as_their_pieces_say():

@@ -252,7 +252,8 @@ def test_a_joined_network_has_the_energies_and_forces_of_its_parts(models: str, 
             )
             for number, part in enumerate(parts)
         ]
-    starts = [0.8 * part.surface.vertices[:, :2] for part in parts]
+    # Flat cells are worn by a third longer: at a quarter, of 0.8, the guard's stiffness begins to count, and rounding would decide.
+    starts = [0.75 * part.surface.vertices[:, :2] for part in parts]
     joined = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
     alone = [Relaxation(part, RelaxOptions(), start=start) for part, start in zip(parts, starts, strict=True)]
     forces = joined.forces()

@@ -529,7 +529,7 @@ def test_arguments_of_a_wrong_type_are_one_line(options: dict[str, Any], message
 def test_what_is_no_surface_and_no_pattern_is_one_line():
     dome = make_shape("dome", resolution=5)
     wrong: list[tuple[Callable[..., object], tuple[Any, ...], str]] = [
-        (flatten, (3,), "surface is of type int; it must be a Surface or the path of a mesh file"),
+        (flatten, (3,), "surface is of type int; it must be a Surface, as read_surface or make_surface gives it"),
         (flatten_all, (3,), "surfaces is of type int; it must be a list"),
         (flatten_all, ("front.obj",), "surfaces is of type str; it must be a list"),
         (flatten_all, ([dome, None],), r"surfaces\[1\] is of type NoneType; it must be a Surface"),

@@ -101,6 +101,13 @@ def test_line_inside_is_carried_on_to_the_border():
     assert np.abs(y - (surface.vertices[:, 1] - surface.vertices[part[0], 1])).max() < 1e-12
 
 
+def test_where_cloth_is_folded_flat_no_line_is_carried_on():
+    """There is no tangent plane in which the way ahead could be straight: the normals around the vertex add up to nothing."""
+    vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.9, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    surface = make_surface(vertices, [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
+    assert extend_to_border(surface, np.array([4, 0], dtype=np.int32))[0].tolist() == [4, 0]
+
+
 def test_beyond_the_ends_of_a_line_that_stays_inside_nothing_folds():
     surface = make_surface(*grid(41, 41))
     part = np.arange(12, 29, dtype=np.int32) * 41 + 20

@@ -112,7 +112,7 @@ def test_a_copy_that_is_not_cut_is_refused() -> None:
 
 
 def test_prices_of_seams_are_printed_and_kept_in_the_file(tmp_path: Path) -> None:
-    from warpflat.pattern.drafting.pieces import FoundSeam
+    from warpflat.pattern.drafting.piece_parts import FoundSeam
     from warpflat.pattern.export.pdf import write_pdf
 
     found = [

@@ -365,3 +365,13 @@ def test_a_garment_on_own_measures_says_so(tmp_path: Path, size: str, title: str
     assert f"SIZE: {title}\n" in (tmp_path / "out" / "skirt.dxf").read_text()
     label = f">Size {title}<" if size else ">Made to measure<"
     assert label in (tmp_path / "out" / "skirt.svg").read_text()
+
+
+def test_arms_and_legs_have_the_ease_that_is_asked_for(mannequin: Mannequin):
+    garment = flatten_form(mannequin, mannequin.form("trousers"), fabric="woven", sewn=True, curves_mm=0.0)
+    girths = garment.metrics()["girths"]
+    asked = {
+        level: girth["ease_m"] - girth["ease_wanted_m"] for level, girth in girths.items() if "ease_wanted_m" in girth
+    }
+    assert {"hip", "thigh left", "thigh right", "ankle left"} <= asked.keys()
+    assert max(map(abs, asked.values())) < 2e-3

@@ -14,6 +14,8 @@ from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.garment.construction.openings import Buttons, Opening, part_at_centres
 from warpflat.garment.mannequin.forms import shipped_form
+from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.pattern.drafting.pieces import Piece
 
 
 def skirt(opening: Opening, *, half: bool) -> Garment:
@@ -93,3 +95,23 @@ def test_right_half_of_a_wrap_covers_the_left_one():
     assert float(ring[:, 0].max()) == pytest.approx(0.12, abs=0.01)
     assert float(ring[:, 0].min()) < -0.15
     assert not any(np.abs(line[:, 0]).max() < 0.01 for line in upper.lines)
+
+
+def test_patches_are_drawn_on_their_side_of_the_body():
+    garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=False)
+    sides = {
+        "pocket": [[0.05, 0.4], [0.05, 0.3]], "pocket 2": [[0.05, 0.3], [0.15, 0.3]],
+        "pocket 3": [[0.15, 0.3], [0.15, 0.4]],
+    }  # fmt: skip
+    flat = next(piece for name, piece in garment.pieces.items() if "front" in name)
+    middle = flat.positions.mean(axis=0)
+    lines = {name: np.array(line) - [0.1, 0.35] + middle for name, line in sides.items()}
+    outline = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    edges = [Edge(name=str(k), points=outline[[k, (k + 1) % 3]]) for k in range(3)]
+    marked = Piece(name=flat.surface.name, edges=edges, internal_lines=lines)
+    plain, drawn = (describe_worn({"": garment}, "", pieces=pieces).views for pieces in ((), (marked,)))
+    assert len(drawn["back"]) == len(plain["back"])
+    (patch,) = drawn["front"][-1].lines
+    # Closed where it is left open on the piece, and as large as that.
+    assert np.allclose(patch[0], patch[-1])
+    assert np.ptp(patch, axis=0) == pytest.approx([0.1, 0.1], abs=0.01)

@@ -13,14 +13,22 @@ import warpflat
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops, join_labels
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.form_garment import FormGarment, flatten_form
+from warpflat.garment.construction.pockets import Pocket
+from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
-from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
+from warpflat.garment.draping.drape_pattern import Placement, drape_pattern, place_drafted
+from warpflat.garment.draping.lift import surface_lift
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
 from warpflat.garment.draping.moved_pattern import moved_outlines
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
+from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.garment.mannequin.head import head_of
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Elastic, Pattern, Piece, Seam, SeamSide
@@ -514,3 +522,47 @@ def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
     for name, side in (("hood", -1.0), ("hood mirrored", 1.0)):
         assert np.median(begins[0][name][:, 0]) == pytest.approx(side * far), name
         assert np.abs(begins[1][name][:, 0]).max() > 1.2 * far
+
+
+def placed_on_a_skirt(**more: object) -> tuple[FormGarment, dict[str, list[Surface]]]:
+    """A skirt with finishing or pockets, and where these are worn."""
+    mannequin = body_of_size(30.0)
+    made = flatten_form(mannequin, mannequin.form(shipped_form("skirt")), fabric="woven", sewn=True, curves_mm=0.0)
+    garment = replace(made, **more)  # type: ignore[arg-type]
+    pattern, _ = pattern_of_garment({"": garment}, name="skirt")
+    lifts = {
+        name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
+        for name, flat in garment.pieces.items()
+    }
+    return garment, place_drafted(pattern, lifts, mannequin, next(iter(garment.pieces.values())).fabric)
+
+
+def test_a_flounce_falls_from_its_edge_and_a_waistband_stands_on_it():
+    wishes = [
+        Finishing(kind="waistband", edge="waist", width=0.03),
+        Finishing(kind="flounce", edge="knee", width=0.2, turns=0.5),
+    ]
+    garment, worn = placed_on_a_skirt(finishing=wishes)
+    cloth = np.concatenate([piece.surface.vertices for piece in garment.pieces.values()])
+    low, high = cloth[:, 1].min(), cloth[:, 1].max()
+    (band,) = worn.pop("waistband")
+    assert low < band.vertices[:, 1].min()
+    assert 0.02 < band.vertices[:, 1].max() - high < 0.04
+    skirt = np.concatenate([copy.vertices for copies in worn.values() for copy in copies])
+    assert skirt[:, 1].max() < low + 0.01
+    # It stands out by 0.4 of what it falls, all around.
+    assert low - skirt[:, 1].min() == pytest.approx(0.2 / np.hypot(1.0, 0.4), abs=0.02)
+    hem, edge = skirt[skirt[:, 1] < skirt[:, 1].min() + 0.02], cloth[cloth[:, 1] < low + 0.005]
+    assert (np.ptp(hem, axis=0) - np.ptp(edge, axis=0))[[0, 2]] == pytest.approx(2 * 0.4 * 0.186, abs=0.03)
+
+
+def test_a_patch_lies_on_its_piece():
+    pocket = Pocket(kind="patch", where="front", width=0.12, height=0.1, line="abdomen", below=0.01)
+    garment, worn = placed_on_a_skirt(pockets=[pocket])
+    (name,) = worn
+    assert name == "front_pocket"
+    cloth = garment.pieces["front"].surface.vertices
+    for patch in worn[name]:
+        far = np.linalg.norm(patch.vertices[:, None] - cloth, axis=2).min(axis=1)
+        assert far.max() < 0.03
+        assert np.ptp(patch.vertices[:, 1]) == pytest.approx(0.115, abs=0.01)

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 
 def plane_parts(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
@@ -23,10 +23,11 @@ def plane_parts(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> li
     )
     if not len(ends):
         return []
-    places = np.round(ends * 1e7).astype(np.int64) @ np.array([1, 2**27, 2**54])
-    key = np.unique(places, return_inverse=True)[1].ravel()
-    graph = coo_matrix((np.ones(len(key) // 2), (key[::2], key[1::2])), (key.max() + 1,) * 2)
-    label = connected_components(graph, directed=False)[1][key]
+    # Ends of two faces at one place are apart by rounding; a grid of places would part some of them.
+    pairs = cKDTree(ends).query_pairs(1e-7, output_type="ndarray")
+    own = np.arange(len(ends)).reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(pairs) + len(own)), np.concatenate([pairs, own]).T), (len(ends),) * 2)
+    label = connected_components(graph, directed=False)[1]
     return [ends[label == i] for i in range(label.max() + 1)]
 
 

@@ -66,6 +66,10 @@ def test_basic_block(body: Mannequin) -> None:
     ("lines", "pieces", "heights", "names"),
     [
         (["waist", "waist"], [("front_bodice", "front_skirt"), ("back_bodice", "back_skirt")], None, ["front waist", "back waist"]),
+        (
+            ["abdomen", "abdomen"], [("back_left", "yoke_left"), ("back_right", "yoke_right")], None,
+            ["left yoke", "right yoke"],
+        ),
         (["side left", "knee"], [("front", "back"), ("top", "leg")], None, ["side left", "knee"]),
         (
             ["armhole left", "armhole left"], [("front", "sleeve_left"), ("back", "sleeve_left")], None,

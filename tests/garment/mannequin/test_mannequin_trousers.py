@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -11,6 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.mannequin.forms import form_from_mapping, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.profiles import convex_girth
 from warpflat.garment.mannequin.shapes import shaped_form
 
 SIDES = ("left", "right")
@@ -121,3 +124,14 @@ def test_the_outseam_runs_into_the_straight_leg_without_a_corner(given: dict[str
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     assert np.degrees(np.arccos((ways[1:] * ways[:-1]).sum(axis=1).min())) < 4.0
     assert depth_inside(made, body) < 0.0001
+
+
+def test_straight_legs_have_the_ease_at_the_thigh_that_is_asked_for(body: Mannequin) -> None:
+    """What hangs from the crotch curve would go around 2 to 4 cm more."""
+    layout = body.layout
+    for ease in (3.0, 12.0):
+        made = body.form(replace(shipped_form("trousers"), ease={**shipped_form("trousers").ease, "leg_thigh": ease}))
+        for grid in layout.legs.values():
+            row = grid[layout.leg_row["leg_thigh"]]
+            more = convex_girth(made.vertices[row]) - convex_girth(body.vertices[row])
+            assert more == pytest.approx(0.01 * ease, abs=0.002)

@@ -102,3 +102,21 @@ def test_a_hole_of_many_edges_is_closed() -> None:
     assert len(closed) - len(points) > 200
     assert is_closed(faces)
     assert np.abs(np.linalg.norm(closed[len(points) :], axis=1) - 0.1).max() < 0.002
+
+
+def test_a_hole_whose_rim_crosses_itself_is_closed() -> None:
+    """Of a damaged scan: one place inside its rim, as seen from the front, has triangles outside alone."""
+    rim = 0.003 * np.array([
+        [-3.7, 1.9], [-0.7, 1.9], [0.4, 1.3], [1.3, 0.6], [1.8, 0.0], [2.0, -0.5], [2.1, -1.0], [2.0, -1.3], [1.8, -1.6], [1.3, -1.0],
+        [1.3, -0.9], [-7.2, -1.5], [1.1, -0.3], [0.9, 0.0], [0.2, 0.5], [-0.8, 1.1], [-5.1, 1.3], [1.3, -0.6],
+    ])  # fmt: skip
+    count = len(rim)
+    a, b = np.arange(count), np.roll(np.arange(count), -1)
+    turn = np.pi * (1.0 - 2.0 * a / count)
+    around = 0.3 * np.column_stack([np.cos(turn), np.sin(turn)])
+    points = np.concatenate([np.pad(np.concatenate([rim, around]), ((0, 0), (0, 1))), ball()[0] + [0, 1.4, 0]])
+    ring = np.concatenate([np.stack([a, b, b + count], 1), np.stack([a, b + count, a + count], 1)])
+    closed, faces, holes = close_holes(points, np.concatenate([ring, ball()[1] + 2 * count]))
+    assert holes
+    assert np.isfinite(closed).all()
+    assert np.isin(np.arange(len(points), len(closed)), faces).all()

@@ -72,6 +72,35 @@ def test_a_ring_that_is_sewn_around_its_hole_is_parted() -> None:
     assert [len(border_loops(mesh.faces.astype(np.int32))) for mesh in parted.pieces()] == [1, 1, 1]
 
 
+def test_a_handle_too_small_to_part_anything_is_slit_open() -> None:
+    """A sheet of 20 by 20 cells whose cells (8, 6) and (8, 12) a tube joins, beside a sheet a hundred times as large."""
+    count = 20
+    place = np.arange((count + 1) ** 2).reshape(count + 1, count + 1)
+    cells = np.stack([place[:-1, :-1], place[:-1, 1:], place[1:, 1:], place[1:, :-1]], axis=-1)
+    x, y = np.meshgrid(*2 * [np.linspace(0.0, 0.3, count + 1)])
+    vertices = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    is_whole = np.ones((count, count), bool)
+    is_whole[8, [6, 12]] = False
+    start, end = cells[8, 6], cells[8, 12][[1, 0, 3, 2]]
+    steps = np.linspace(0.0, 1.0, 7)[1:-1, None, None]
+    between = (1.0 - steps) * vertices[start] + steps * vertices[end] + 0.05 * np.sin(np.pi * steps) * [0.0, 0.0, 1.0]
+    rings = np.vstack([start, len(vertices) + np.arange(20).reshape(5, 4), end])
+    after = np.roll(rings, -1, axis=1)
+    tube = np.stack([rings[:-1], after[:-1], after[1:], rings[1:]], axis=-1).reshape(-1, 4)
+    quads = np.concatenate([cells[is_whole], tube, np.arange(4)[None] + len(vertices) + 20])
+    large = [[1.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 3.0, 0.0], [1.0, 3.0, 0.0]]
+    cloth = Cloth(
+        vertices=np.concatenate([vertices, between.reshape(-1, 3), large]),
+        faces=np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]),
+    )
+    assert [euler_characteristic(mesh.faces.astype(np.int32)) for mesh in cloth.pieces()] == [-1, 1]
+    parted, (note,) = part_solids(cloth, shape=False)
+    assert [euler_characteristic(mesh.faces.astype(np.int32)) for mesh in parted.pieces()] == [1, 1]
+    assert note.startswith("a piece has handles, as where a lace lies on it: slit open there, about (")
+    # Around the tube (4 by 15 mm), and along it and back between its ends, and from there to the border.
+    assert parted.seam_length("seam 1") < 0.6
+
+
 def test_a_strip_that_would_lie_over_itself_is_parted_across() -> None:
     turn = np.linspace(0.0, 2.6 * np.pi, 120)
     vertices = [

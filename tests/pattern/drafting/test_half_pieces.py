@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.output import LeftOut, listening_to_left_out
+from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved, is_symmetric
-from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 
 
@@ -39,3 +39,20 @@ def test_a_piece_whose_half_would_cross_itself_is_printed_whole_and_named():
 def test_a_straight_slit_lies_on_the_fold():
     drafted = draft_garment(Pattern(name="suit", pieces={"": [back(0.0)]}))
     assert halved(drafted).pieces[""][0].piece.on_fold
+
+
+def test_a_piece_with_a_dart_in_its_middle_is_printed_whole():
+    corners = np.array([(0.2, 0.0), (0.2, 0.5), (-0.2, 0.5), (-0.2, 0.0)])
+    mouth, tip = np.array([(-0.01, 0.0), (0.01, 0.0)]), (0.0, 0.2)
+    ring = [tip, mouth[1], *corners, mouth[0], tip]
+    names = ["right leg", "hem right", "side right", "top", "side left", "hem left", "left leg"]
+    edges = [
+        Edge(name=name, points=np.array(ring[k : k + 2]), kind="dart" if "leg" in name else "seam")
+        for k, name in enumerate(names)
+    ]
+    piece = Piece(name="back", size="", edges=edges, darts=[Dart(name="dart", left="left leg", right="right leg")])
+    drafted = draft_garment(Pattern(name="suit", pieces={"": [piece]}))
+    heard = list[LeftOut]()
+    with listening_to_left_out(heard.append):
+        assert halved(drafted).pieces[""][0] is drafted.pieces[""][0]
+    assert not heard

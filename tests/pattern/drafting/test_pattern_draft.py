@@ -14,7 +14,7 @@ from matplotlib.textpath import TextPath
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
-from warpflat.core.output import LeftOut, listening_to_left_out
+from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.core.polyline import arc_lengths, turning_angles
 from warpflat.pattern.drafting import draft
 from warpflat.pattern.drafting.curves import fit_curve

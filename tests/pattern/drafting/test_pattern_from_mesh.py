@@ -8,7 +8,7 @@ import shapely
 from shapely.affinity import scale
 
 from warpflat.core.errors import InputError
-from warpflat.core.output import LeftOut, listening_to_left_out
+from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.pattern.drafting.draft import draft_piece
 from warpflat.pattern.drafting.drawing import draw_piece
 from warpflat.pattern.drafting.from_mesh import MeshFeatures, piece_from_mesh
@@ -40,6 +40,16 @@ def cracked(opening=0.02):
         flat[copy, 0] += opening / 2 * share[v]
         flat[v, 0] -= opening / 2 * share[v]
     return faces, flat, lines, path, copies
+
+
+def test_a_crack_that_gapes_where_it_is_worn_is_a_vent_and_no_dart():
+    faces, flat, _, _, _ = cracked()
+    assert len(make_piece(faces, flat, name="panel").darts) == 1
+    vent = make_piece(faces, flat, name="panel", worn=np.pad(flat, ((0, 0), (0, 1))))
+    assert not vent.darts
+    assert {edge.kind for edge in vent.edges} == {"seam"}
+    worn = np.pad(cracked(opening=0.5e-3)[1], ((0, 0), (0, 1)))
+    assert len(make_piece(faces, flat, name="panel", worn=worn).darts) == 1
 
 
 def test_edges_take_the_names_of_the_lines_along_them():

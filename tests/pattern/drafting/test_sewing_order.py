@@ -319,3 +319,27 @@ def test_ring_is_sewn_after_the_seams_that_it_crosses():
     assert "brim" not in steps[2]
     # They are called by their pieces once.
     assert "crown to side: " not in " ".join(steps)
+
+
+def test_hems_of_two_widths_on_one_piece_are_told_by_their_names():
+    pattern = top()
+    pieces = [
+        replace(
+            piece,
+            edges=[
+                replace(edge, kind="hem", allowance=0.03 if edge.name == "hem" else 0.02)
+                if edge.name in ("hem", "neck")
+                else edge
+                for edge in piece.edges
+            ],
+        )
+        if piece.name == "front"
+        else piece
+        for piece in pattern.pieces[""]
+    ]
+    words = {}
+    for name, row in (("two", pieces), ("one", pattern.pieces[""])):
+        steps = sewing_steps(draft_garment(replace(pattern, pieces={"": row})), "")
+        (words[name],) = [step.words for step in steps if step.technique == "hem"]
+    assert "3 cm hem (front, back right, back left), 2 cm neck (front)" in words["two"]
+    assert " hem (" not in words["one"]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -230,6 +231,10 @@ def test_drafted_pieces_stand_below_the_others_with_their_longer_side_across(tmp
     assert {"neck band", "collar, 2 times"} <= words
     worn = draw_figure(pieces, drafted=drafted, body=Body(vertices=dome(9).vertices, faces=dome(9).faces))
     assert "not shown on the body: neck band, collar" in {text.get_text() for text in worn.axes[0].texts}
+    drafted = [replace(drafted[0], worn=[dome(9)]), drafted[1]]
+    worn = draw_figure(pieces, drafted=drafted, body=Body(vertices=dome(9).vertices, faces=dome(9).faces))
+    said = "grey: drafted for its edges, laid by its seams; not shown on the body: collar"
+    assert said in {text.get_text() for text in worn.axes[0].texts}
     # What is as long as three metres is drawn smaller, within the page; its outline is closed.
     shapes = [patch.get_xy() for patch in figure.axes[0].patches if isinstance(patch, Polygon)][-2:]
     assert np.ptp(shapes[0][:, 0]) < figure.get_size_inches()[0]

@@ -282,6 +282,20 @@ def test_freesewing_marks_its_folds(tmp_path: Path) -> None:
     assert piece.edges[0].allowance == pytest.approx(0.010)
 
 
+def test_the_only_piece_of_a_group_has_its_name_though_it_is_one_line(tmp_path: Path) -> None:
+    square = '<path d="M{0},0 h100 v100 h-100 z"/>'
+    inner = '<path d="M210,10 h80 v80 h-80 z"/>'
+    (tmp_path / "a.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="900mm" height="200mm" viewBox="0 0 900 200">'
+        f'<g id="SLEEVE">{square.format(0)}</g><g id="YOKE">{square.format(200)}{inner}</g>'
+        f'<g id="cuffs">{square.format(400)}{square.format(600)}</g></svg>'
+    )
+    pattern = read_svg(tmp_path / "a.svg")
+    names = [piece.name for (row,) in [pattern.pieces.values()] for piece in row]
+    assert {"SLEEVE", "YOKE"} < set(names)
+    assert [name.partition("_")[0] for name in names].count("piece") == 2
+
+
 def test_a_group_that_holds_itself_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="one holds itself"):
         svg(tmp_path, '<g id="q"><use href="#q"/></g>')

@@ -33,8 +33,9 @@ from warpflat.app.cli.run import run
 from warpflat.app.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.app.cli.studio import studio
 from warpflat.core.errors import InputError, system_reason
+from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
-from warpflat.core.output import LeftOut, listening_to_left_out, written_folders
+from warpflat.core.output import written_folders
 from warpflat.core.source_date import source_date
 from warpflat.core.text import one_line
 

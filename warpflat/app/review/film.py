@@ -26,6 +26,7 @@ from warpflat.core.usd_process import UNREADABLE, read_apart
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.pattern.export.colours import VertexColours, energy_colours
 from warpflat.pattern.export.geometry import face_areas, outline_edges
+from warpflat.pattern.export.usd import DRAFTED
 from warpflat.pattern.export.usd_prims import part_path
 
 __all__ = ["MAPS", "FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
@@ -40,6 +41,8 @@ _COLOURS = 256
 MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, 10.0), "gap": ("mm", 1e3, 5.0)}
 # A scale holds this share of the cloth; no value of a map is larger.
 _SHARE, _MOST_OF_MAP = 0.98, 1e9
+# Colours of the body and of drafted pieces on the page.
+_COLOURS_OF = {"body": (0.80, 0.77, 0.73), "drafted": (0.62, 0.64, 0.68)}
 # A body of more vertices than these is not shown.
 _MOST_OF_BODY = 100_000
 # Of zlib: the last level takes eight times as long as this one, and spares a twentieth of the bytes.
@@ -232,7 +235,7 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         parts += [packer.compress(block) for block in blocks]
     parts.append(packer.flush())
     first, computed = pieces[0], set(pieces[0].computed)
-    body = _packed_body(first.stage)
+    still = _packed_still(first.stage)
     table = np.round(255.0 * energy_colours(np.arange(_COLOURS) / (_COLOURS - 1), 1.0)).astype(np.uint8)
     return {
         "frames": shown,
@@ -244,39 +247,49 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         "colours": base64.b64encode(table.tobytes()).decode("ascii"),
         "pieces": entries,
         "maps": maps,
-        **({} if body is None else {"body": body}),
+        "still": still,
         "data": base64.b64encode(b"".join(parts)).decode("ascii"),
     }
 
 
-def _packed_body(stage: Any) -> dict[str, Any] | None:
-    """Return the body of a garment's film for the page; None without one, or where it cannot be shown."""
+def _packed_still(stage: Any) -> list[dict[str, Any]]:
+    """Return what of a garment's film does not move, for the page: its body, and drafted pieces; without what cannot be shown."""
     from pxr import UsdGeom
 
-    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/World/mannequin/body"))
-    if not mesh:
-        return None
-    points = np.array(mesh.GetPointsAttr().Get() or (), dtype=np.float64).reshape(-1, 3)
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or (), dtype=np.int64)
-    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get() or (), dtype=np.int64)
-    usable = len(counts) and counts.sum() == len(corners) and set(counts.tolist()) <= {3, 4}
-    if not usable or corners.min() < 0 or corners.max() >= len(points) or len(points) > _MOST_OF_BODY:
-        return None
-    used, corners = np.unique(corners, return_inverse=True)
-    points = points[used]
-    if not np.abs(points).max() < FARTHEST:
-        return None
-    faces = np.full((len(counts), 4), -1, dtype=np.int32)
-    faces[np.arange(4) < counts[:, None]] = corners
-    triangles, _ = triangulate(faces)
-    box = _Box(points)
-    data = zlib.compress(_planes(triangles.astype(np.uint32)) + _planes(box.steps(points)), _LEVEL)
-    return {
-        "space": box.as_list(),
-        "vertices": len(points),
-        "triangles": len(triangles),
-        "data": base64.b64encode(data).decode("ascii"),
-    }
+    drafted = stage.GetPrimAtPath(DRAFTED)
+    prims = [("body", stage.GetPrimAtPath("/World/mannequin/body"))]
+    prims += [("drafted", prim) for prim in (drafted.GetChildren() if drafted else ())]
+    found = []
+    for kind, prim in prims:
+        mesh = UsdGeom.Mesh(prim)
+        if not mesh:
+            continue
+        points = np.array(mesh.GetPointsAttr().Get() or (), dtype=np.float64).reshape(-1, 3)
+        counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or (), dtype=np.int64)
+        corners = np.array(mesh.GetFaceVertexIndicesAttr().Get() or (), dtype=np.int64)
+        usable = len(counts) and counts.sum() == len(corners) and set(counts.tolist()) <= {3, 4}
+        if not usable or corners.min() < 0 or corners.max() >= len(points) or len(points) > _MOST_OF_BODY:
+            continue
+        used, corners = np.unique(corners, return_inverse=True)
+        points = points[used]
+        if not np.abs(points).max() < FARTHEST:
+            continue
+        faces = np.full((len(counts), 4), -1, dtype=np.int32)
+        faces[np.arange(4) < counts[:, None]] = corners.reshape(-1)
+        triangles, _ = triangulate(faces)
+        box = _Box(points)
+        data = zlib.compress(_planes(triangles.astype(np.uint32)) + _planes(box.steps(points)), _LEVEL)
+        found.append(
+            {
+                "kind": kind,
+                "colour": _COLOURS_OF[kind],
+                "space": box.as_list(),
+                "vertices": len(points),
+                "triangles": len(triangles),
+                "data": base64.b64encode(data).decode("ascii"),
+            }
+        )
+    return found
 
 
 def _packed(

@@ -182,7 +182,8 @@ def _page(
             speeds = "".join(
                 f'<option value="{x:g}"{" selected" if x == 1 else ""}>{x:g} x</option>' for x in (0.25, 0.5, 1, 2)
             )
-            body = '<label><input id="body" type="checkbox" checked> body</label>' if "body" in packed else ""
+            body = '<label><input id="body" type="checkbox" checked> body</label>'
+            body = body if any(still["kind"] == "body" for still in packed["still"]) else ""
             film = (
                 f'<div class="stage"><canvas id="view" role="img" tabindex="0" aria-label="the cloth in space and its pattern, '
                 f'coloured by strain; the tables below have the numbers"></canvas><div class="bar"><button id="play">Play</button>'

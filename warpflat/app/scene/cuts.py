@@ -156,7 +156,8 @@ def plan_automatic_cuts(
     """
     from warpflat.core.errors import InputError
     from warpflat.flat.cutting.cut_plan import CutPlan
-    from warpflat.flat.cutting.ledger import AutoCut, coarse_options, cut_automatically
+    from warpflat.flat.cutting.ledger import AutoCut, cut_automatically
+    from warpflat.flat.solver.options import coarse_options
 
     auto = AutoCut(**table.model_dump())
     # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.

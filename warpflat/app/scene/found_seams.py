@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from warpflat.garment.seams.find import FoundSeams
     from warpflat.garment.seams.layers import GarmentFile
     from warpflat.garment.seams.options import SeamCut
-    from warpflat.pattern.drafting.pieces import FoundSeam
+    from warpflat.pattern.drafting.piece_parts import FoundSeam
 
 __all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry"]
 

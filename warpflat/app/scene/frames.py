@@ -275,6 +275,7 @@ class Film:
         files: after the block: the names of the files that it has written.
         recorders: of the pieces, by name.
         worn: how the pieces lie at the end, by name; set within the block, for the maps of pressure and of the gap to the body.
+        drafted: pieces that are not filmed, such as collars, where they are worn; set within the block.
     """
 
     def __init__(
@@ -289,6 +290,7 @@ class Film:
         """
         self.files: list[str] = []
         self.worn: Mapping[str, Flattening] = {}
+        self.drafted: Sequence[Surface] = ()
         self._mannequin = mannequin
         self._stack = ExitStack()
         self._folder, self._output = folder, output
@@ -354,6 +356,8 @@ class Film:
                     body = Body(self._mannequin.vertices, layout.faces[layout.on_body], device=wp.get_device("cpu"))
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
+                if self.drafted:
+                    writer.show_drafted(self.drafted)
                 for name, piece in self.worn.items():
                     # Worn values are of the pattern's faces, which are those of the filmed surface in its order.
                     if len(piece.faces) != len(self._surfaces[name].faces):

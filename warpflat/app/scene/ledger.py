@@ -14,7 +14,8 @@ from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, 
 from warpflat.core.errors import InputError
 from warpflat.flat.cutting.candidates import Peaks, find_candidates, find_peaks
 from warpflat.flat.cutting.cut_plan import CutPlan
-from warpflat.flat.cutting.ledger import Ledger, LedgerEntry, RankedBy, coarse_options, make_ledger, try_all
+from warpflat.flat.cutting.ledger import Ledger, LedgerEntry, RankedBy, make_ledger, try_all
+from warpflat.flat.solver.options import coarse_options
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.mannequin.bricks import select_bricks

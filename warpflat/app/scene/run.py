@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,6 +38,8 @@ from warpflat.flat.flattening.fit_report import Remedy
 from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.verdict import judge
 from warpflat.flat.surface.io.read import size_words
+from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.triangles import triangulate
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.pattern_files import WrittenPattern, garment_files, pattern_names
@@ -45,6 +47,9 @@ from warpflat.garment.construction.sew_pieces import unsewn_notes
 from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.export.letters import note_on_names
+
+if TYPE_CHECKING:
+    from warpflat.pattern.export.picture_drafted import DraftedOutline
 
 # From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
 _MANY = 500_000
@@ -167,7 +172,10 @@ def _run(
             # What lies beside a seam that was found, such as a hem, is not a border that was forgotten.
             notes = unsewn_notes(garment) if isinstance(plan, MeshPlan) and plan.found is None else []
             fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))
-            pictures = Beside(partial(_write_pictures, plan, garment, folder), "drawing the pictures")
+            drafted = _drafted(plan, garment) if filmed or output.picture else []
+            film.drafted = [copy for piece in drafted for copy in piece.worn]
+            draw = partial(garment.write_files, folder, picture=output.picture, drafted=drafted)
+            pictures = Beside(draw, "drawing the pictures")
             if vertices < _MANY:
                 beside.enter_context(pictures)
             graded = dict[str, Garment]()
@@ -235,26 +243,40 @@ def _run(
     )
 
 
-def _write_pictures(plan: MeshPlan | GarmentPlan, garment: Garment, folder: Path) -> list[str]:
-    """Write the pieces and their picture, with the outlines of those that finishing and pockets add."""
+def _drafted(plan: MeshPlan | GarmentPlan, garment: Garment) -> list[DraftedOutline]:
+    """Return the pieces that finishing and pockets add, and where those of a form are worn."""
     from warpflat.garment.construction.to_pattern import pattern_of_garment
     from warpflat.pattern.export.picture_drafted import DraftedOutline
 
     drafted = list[DraftedOutline]()
-    if plan.scene.settings.output.picture and (garment.finishing or garment.pockets):
-        with optional_step("the picture is without what finishing and pockets add", is_needed=False):
-            pattern, _ = pattern_of_garment(
-                {"": garment}, name=garment.name, rules=plan.drawing.rules, cloth_width=plan.drawing.cloth_width
-            )
-            drafted = [
-                DraftedOutline(
-                    name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
-                    points=piece.outline,
+    if not (garment.finishing or garment.pockets):
+        return drafted
+    with optional_step("the picture is without what finishing and pockets add", is_needed=False):
+        pattern, _ = pattern_of_garment(
+            {"": garment}, name=garment.name, rules=plan.drawing.rules, cloth_width=plan.drawing.cloth_width
+        )
+        worn: Mapping[str, Sequence[Surface]] = {}
+        if isinstance(garment, FormGarment):
+            from warpflat.garment.draping.drape_pattern import place_drafted
+            from warpflat.garment.draping.lift import surface_lift
+
+            lifts = {
+                name: surface_lift(
+                    flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0]
                 )
-                for piece in pattern.pieces[""]
-                if piece.name not in garment.pieces
-            ]
-    return garment.write_files(folder, picture=plan.scene.settings.output.picture, drafted=drafted)
+                for name, flat in garment.pieces.items()
+            }
+            with optional_step("drafted pieces are not shown on the body", is_needed=False):
+                worn = place_drafted(pattern, lifts, garment.mannequin, next(iter(garment.pieces.values())).fabric)
+        drafted = [
+            DraftedOutline(
+                name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
+                points=piece.outline, worn=worn.get(piece.name, ()),
+            )
+            for piece in pattern.pieces[""]
+            if piece.name not in garment.pieces
+        ]  # fmt: skip
+    return drafted
 
 
 def _measure_fit(

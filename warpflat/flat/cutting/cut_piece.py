@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 from warpflat.core.errors import InputError
 from warpflat.flat.cutting.cut_plan import CutPlan, carry_layout, line_part, make_cuts
-from warpflat.flat.flattening.edit import relax_cut, require_unsewn
+from warpflat.flat.flattening.edit import relax_cut
 from warpflat.flat.flattening.progress import Progress
-from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.flattening.result import Flattening, require_unsewn
 from warpflat.flat.solver.options import RelaxOptions, given_options
 
 __all__ = ["cut"]

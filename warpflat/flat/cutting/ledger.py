@@ -21,7 +21,7 @@ from warpflat.flat.cutting.refine_piece import refine_along
 from warpflat.flat.flattening.edit import relax_cut
 from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.solver.options import RelaxOptions, given_options
+from warpflat.flat.solver.options import RelaxOptions, coarse_options, given_options
 from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure
 
 __all__ = [
@@ -29,7 +29,6 @@ __all__ = [
     "Ledger",
     "LedgerEntry",
     "RankedBy",
-    "coarse_options",
     "cut_automatically",
     "evaluate",
     "make_ledger",
@@ -38,9 +37,6 @@ __all__ = [
 
 RankedBy = Literal["per_cm", "released"]
 
-# Coarse options, which are enough to rank candidates: tolerances looser by this factor, and few steps.
-_LOOSER = 10.0
-_COARSE_STEPS = 600
 # A dart that takes in less is not sewn but eased in [m].
 _LEAST_MOUTH = 5e-3
 
@@ -257,18 +253,6 @@ def try_all(
             refused.append((name_of(one), str(reason)))
     entries.sort(key=lambda entry: (not entry.can_be_sewn, -getattr(entry, by)))
     return tuple(entries), tuple(refused)
-
-
-def coarse_options(options: RelaxOptions | None = None) -> RelaxOptions:
-    """Return options for ranking: tolerances ten times looser, few steps, and no contact."""
-    given = given_options(options)
-    return replace(
-        given,
-        energy_tolerance=_LOOSER * given.energy_tolerance,
-        residual_tolerance=_LOOSER * given.residual_tolerance,
-        max_steps=min(_COARSE_STEPS, given.max_steps),
-        gap_mm=0.0,
-    )
 
 
 def make_ledger(

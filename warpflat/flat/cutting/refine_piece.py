@@ -9,8 +9,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flat.cutting.cut_plan import CutPlan, make_cuts
-from warpflat.flat.flattening.edit import require_unsewn
-from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.flattening.result import Flattening, require_unsewn
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.surface.cut.split_faces import split_faces_along
 from warpflat.flat.surface.mesh import Surface

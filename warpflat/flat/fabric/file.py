@@ -81,6 +81,11 @@ class CurveTable(_Origin):
     def _one_of_two(self) -> CurveTable:
         if (self.points is None) == (self.secants is None):
             raise ValueError("give either points = [[strain, tension], ...] or secants = [[strain, stiffness], ...]")
+        strains, stiffnesses = zip(*self.secants or [[0.0, 1.0]], strict=True)
+        if strains[0] < 0.0 or any(b <= a for a, b in itertools.pairwise(strains)) or min(stiffnesses) <= 0.0:
+            raise ValueError(
+                "secants = [[strain, stiffness], ...] begin at a strain of 0 or more, rise, and are above 0"
+            )
         return self
 
 

@@ -9,7 +9,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.cells import make_cells
 from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.laplacian import stiffness_matrix
+from warpflat.flat.surface.laplacian import cotangent_matrix
 from warpflat.flat.surface.mesh import Surface, once_per_surface
 
 __all__ = ["conformal_layout"]
@@ -27,7 +27,7 @@ def conformal_layout(surface: Surface) -> FloatArray:
     # The area is a sum over the border's edges, half of x_begin y_end - x_end y_begin.
     half = np.full(len(begin), 0.5)
     turn = coo_array((np.append(half, -half), (np.append(begin, end), np.append(end, begin))), shape=(count, count))
-    matrix = stiffness_matrix(surface)
+    matrix = cotangent_matrix(surface)
     whole = block_array([[matrix, -turn], [turn, matrix]]).tocsc()
     outer = surface.vertices[loops[0]]
     first = int(np.linalg.norm(outer - outer.mean(axis=0), axis=1).argmax())

@@ -22,7 +22,7 @@ from warpflat.flat.flattening.keep_apart import keep_apart
 from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.relax_piece import relax_piece
 from warpflat.flat.flattening.relaxation_task import RelaxationTask
-from warpflat.flat.flattening.result import Flattening
+from warpflat.flat.flattening.result import Flattening, require_unsewn
 from warpflat.flat.model.membrane import choose_model
 from warpflat.flat.solver.options import RelaxOptions, given_options
 from warpflat.flat.surface.cells import inherit_cells
@@ -33,7 +33,7 @@ from warpflat.flat.surface.repair.slivers import degenerate_faces
 from warpflat.flat.surface.repair.validate import check_positions
 from warpflat.flat.surface.repair.weld import weld_map
 
-__all__ = ["change_fabric", "change_surface", "relax_cut", "require_unsewn"]
+__all__ = ["change_fabric", "change_surface", "relax_cut"]
 
 
 #: A face whose width is no more than this share of the edges around it has no area to be measured by.
@@ -149,19 +149,6 @@ def change_surface(
     chosen, now = (datum_extent(of, result.datum) for of in (before, surface))
     notes = tuple(note.removesuffix(chosen) + now if note.endswith(chosen) else note for note in relaxed.notes)
     return replace(relaxed, surface=surface, cuts=cuts, notes=notes)
-
-
-def require_unsewn(result: Flattening) -> None:
-    """Refuse a piece that has been sewn or given fullness, since other pieces hold it there.
-
-    Raises:
-        InputError: it has been.
-    """
-    if result.unsewn is not None:
-        raise InputError(
-            f"piece {result.surface.name!r} has been sewn: edited alone it would lose its seams, folds and gathers; run the scene or "
-            "flatten_form again with the change, or edit its `unsewn`, the piece as it lay before"
-        )
 
 
 def _refuse_faces(surface: Surface, wrong: NDArray[np.integer], what: str, right: str) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from os import PathLike
-from pathlib import Path
 
 from numpy.typing import ArrayLike
 
@@ -13,7 +11,6 @@ from warpflat.core.errors import InputError, expect_callback, expect_each
 from warpflat.flat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flat.flattening.flatten_piece import (
     DevelopedPiece,
-    as_surface,
     check_settings,
     develop_piece,
     relax_developed,
@@ -29,12 +26,11 @@ __all__ = ["flatten_all"]
 
 
 def flatten_all(
-    surfaces: Sequence[Surface | str | Path],
+    surfaces: Sequence[Surface],
     *,
     fabric: Fabric | str = DEFAULT_FABRIC,
     datum: str | Sequence[str | ArrayLike | None] | None = None,
     grain_angle: float | Sequence[float] = 0.0,
-    units: str | None = None,
     model: ModelChoice = "auto",
     wear: Wear | None = None,
     relax: RelaxOptions | None = None,
@@ -46,8 +42,8 @@ def flatten_all(
     All are developed before the first is relaxed, so that a piece that cannot be flattened is refused at once.
 
     Args:
-        surfaces: a `Surface`, or the path of a mesh file, for each piece.
-        fabric, units, model, wear, relax, device: as :func:`warpflat.flatten` takes them, one for all.
+        surfaces: the pieces.
+        fabric, model, wear, relax, device: as :func:`warpflat.flatten` takes them, one for all.
         datum: one name for all, or a sequence of what `flatten` takes, for each surface one.
         grain_angle: one for all, or a sequence with one for each surface [degrees].
         callback: called with the number of the surface and its `Progress`, for the developments (step 0) and after every step, for one
@@ -59,7 +55,7 @@ def flatten_all(
     Raises:
         InputError: a piece cannot be flattened; one line says which, and why.
     """
-    expect_each(surfaces, (Surface, str, PathLike), "surfaces", "a Surface or the path of a mesh file")
+    expect_each(surfaces, Surface, "surfaces", "a Surface")
     expect_callback(callback)
     count = len(surfaces)
     named = datum is None or isinstance(datum, str)
@@ -80,8 +76,7 @@ def flatten_all(
         for angle in angles
     ]
 
-    def develop(number: int, surface: Surface | str | Path) -> DevelopedPiece:
-        piece = as_surface(surface, units)
+    def develop(number: int, piece: Surface) -> DevelopedPiece:
         try:
             return develop_piece(
                 piece, datums[number], settings[number], None if callback is None else partial(callback, number)

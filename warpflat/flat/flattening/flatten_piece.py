@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
 import warp as wp
@@ -36,7 +34,6 @@ from warpflat.flat.solver.options import RelaxOptions, given_options
 from warpflat.flat.surface.connectivity import border_of
 from warpflat.flat.surface.grid import rows_and_columns
 from warpflat.flat.surface.half_edges import half_edges_of
-from warpflat.flat.surface.io.read import read_surface
 from warpflat.flat.surface.laplacian import factor_pays
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.triangles import triangulate
@@ -51,12 +48,11 @@ _COARSE = 10_000
 
 
 def flatten(
-    surface: Surface | str | Path,
+    surface: Surface,
     *,
     fabric: Fabric | str = DEFAULT_FABRIC,
     datum: str | ArrayLike | None = None,
     grain_angle: float = 0.0,
-    units: str | None = None,
     model: ModelChoice = "auto",
     wear: Wear | None = None,
     start: ArrayLike | None = None,
@@ -72,12 +68,11 @@ def flatten(
     its layout on a coarser mesh. Where it would lie over itself, contact parts it, without steps. Strain energies are eqs. (1) to (3).
 
     Args:
-        surface: a `Surface`, or the path of a mesh file.
+        surface: the piece; `read_surface` reads one from a mesh file.
         fabric: a `Fabric`, or a name of the library (`warpflat fabrics` lists it).
         datum: the line from which it is developed and which becomes the grain: a name in `surface.lines`, or vertex
             indices along mesh edges; if not given, the line along the long axis through the middle.
         grain_angle: of the warp against the datum, degrees; 45 cuts on the bias.
-        units: of a mesh file that carries none: "m", "dm", "cm", "mm", "in", "ft".
         model: "springs", the paper's, exact on quads along the grain, or "membrane", the cloth measured cell by cell, exact on any mesh;
             "auto" takes springs where they are exact. What is minimised is reported as `model_energy_j` for both.
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
@@ -89,7 +84,7 @@ def flatten(
     Raises:
         InputError: what was given cannot be flattened; one line says what, where, and what would be right.
     """
-    surface = as_surface(surface, units)
+    check_surface(surface)
     expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
     developed = develop_piece(surface, datum, settings, callback, start)
@@ -102,16 +97,9 @@ def flatten(
     return relax_developed(developed)
 
 
-def as_surface(surface: Surface | str | Path, units: str | None) -> Surface:
-    """Return the surface, read from a file if a path is given.
-
-    Raises:
-        InputError: it is neither, or cannot be read.
-    """
-    if isinstance(surface, Surface):
-        return surface
-    expect(surface, (str, PathLike), "surface", "a Surface or the path of a mesh file")
-    return read_surface(surface, units=units)
+def check_surface(surface: object) -> None:
+    """Raise InputError for what is no `Surface`."""
+    expect(surface, Surface, "surface", "a Surface, as read_surface or make_surface gives it")
 
 
 @dataclass(frozen=True, kw_only=True)

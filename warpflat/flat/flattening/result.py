@@ -13,6 +13,7 @@ import warp as wp
 
 from warpflat._version import __version__
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.errors import InputError
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.flattening.applied_cut import AppliedCut, cut_sides, measure_cut
 from warpflat.flat.flattening.develop import Development
@@ -29,7 +30,7 @@ from warpflat.flat.surface.energy_map import energy_report
 from warpflat.flat.surface.injective import overlap_area
 from warpflat.flat.surface.mesh import Surface
 
-__all__ = ["Flattening", "run_metrics"]
+__all__ = ["Flattening", "require_unsewn", "run_metrics"]
 
 # What is measured of a layout, and does not change with the advice on it.
 _MEASURED = ("vertex_origin", "_errors", "overlap", "worn", "fit", "stretched_faces", "layout_measures")
@@ -246,3 +247,16 @@ def run_metrics(
         metrics["wear"] = {**garment_wear(pieces), **metrics.get("wear", {})}
     verdict = judge(metrics)
     return metrics if verdict is None else {**metrics, "verdict": verdict.as_dict()}
+
+
+def require_unsewn(result: Flattening) -> None:
+    """Refuse a piece that has been sewn or given fullness, since other pieces hold it there.
+
+    Raises:
+        InputError: it has been.
+    """
+    if result.unsewn is not None:
+        raise InputError(
+            f"piece {result.surface.name!r} has been sewn: edited alone it would lose its seams, folds and gathers; run the scene or "
+            "flatten_form again with the change, or edit its `unsewn`, the piece as it lay before"
+        )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.fabric.fabric import DEFAULT_FABRIC, Fabric
-from warpflat.flat.flattening.flatten_piece import as_surface, check_settings, develop_piece
+from warpflat.flat.flattening.flatten_piece import check_settings, check_surface, develop_piece
 from warpflat.flat.model.membrane import ModelChoice
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.strain import worn_strain
@@ -55,12 +54,11 @@ class RelaxationStep:
 
 
 def relaxation(
-    surface: Surface | str | Path,
+    surface: Surface,
     *,
     fabric: Fabric | str = DEFAULT_FABRIC,
     datum: str | ArrayLike | None = None,
     grain_angle: float = 0.0,
-    units: str | None = None,
     model: ModelChoice = "auto",
     relax: RelaxOptions | None = None,
     device: str | None = None,
@@ -72,7 +70,7 @@ def relaxation(
     L-BFGS, repeated measuring of directions and contact are left to :func:`warpflat.flatten`, which is faster.
 
     Args:
-        surface, fabric, datum, grain_angle, units, model, relax, device: as `flatten` takes them.
+        surface, fabric, datum, grain_angle, model, relax, device: as `flatten` takes them.
         energy_every: energies are measured every so many steps, and convergence with them.
         force: a force of one's own beside those of the cloth: takes the layout, #V by 2 [m], before each step, and gives #V by 2 [N]. What
             of it only turns the piece is left out, since the grain is kept upright. Energies are those of the cloth alone; at rest is where
@@ -85,7 +83,8 @@ def relaxation(
     if not isinstance(energy_every, int) or isinstance(energy_every, bool) or energy_every < 1:
         raise InputError(f"energy_every = {energy_every!r} must be a whole number, at least 1")
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=None, relax=relax, device=device)
-    piece = develop_piece(as_surface(surface, units), datum, settings, None)
+    check_surface(surface)
+    piece = develop_piece(surface, datum, settings, None)
     return _steps(piece.network, piece.development.positions, settings.options, piece.task.datum, energy_every, force)
 
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from warpflat.core.errors import InputError, expect, is_number, nearest
 
-__all__ = ["FORMER_SOLVERS", "SOLVERS", "RelaxOptions", "Solver", "given_options"]
+__all__ = ["FORMER_SOLVERS", "SOLVERS", "RelaxOptions", "Solver", "coarse_options", "given_options"]
 
 Solver = Literal["auto", "paper"]
 SOLVERS: tuple[Solver, ...] = ("auto", "paper")
 #: Names of earlier versions, and what they are read as.
 FORMER_SOLVERS: dict[str, Solver] = {"multilevel": "auto", "plain": "paper"}
+# Coarse options: tolerances looser by this factor, and few steps.
+_LOOSER, _COARSE_STEPS = 10.0, 600
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,3 +99,15 @@ def given_options(options: RelaxOptions | None) -> RelaxOptions:
     expect(options, RelaxOptions, "relax", "a RelaxOptions, such as RelaxOptions(max_steps=5000)")
     options.validate()
     return options
+
+
+def coarse_options(options: RelaxOptions | None = None) -> RelaxOptions:
+    """Return options that are enough to rank cuts: tolerances ten times looser, few steps, and no contact."""
+    given = given_options(options)
+    return replace(
+        given,
+        energy_tolerance=_LOOSER * given.energy_tolerance,
+        residual_tolerance=_LOOSER * given.residual_tolerance,
+        max_steps=min(_COARSE_STEPS, given.max_steps),
+        gap_mm=0.0,
+    )

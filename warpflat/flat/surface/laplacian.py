@@ -17,7 +17,7 @@ from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.cells import make_cells
 from warpflat.flat.surface.mesh import Surface, once_per_surface
 
-__all__ = ["Laplacian", "factor_pays", "held_laplacian", "laplacian_of", "laplacian_solver", "stiffness_matrix"]
+__all__ = ["Laplacian", "cotangent_matrix", "factor_pays", "held_laplacian", "laplacian_of", "laplacian_solver"]
 
 # The most vertices of a surface that is factored: a factor takes 0.3 to 0.7 KB a vertex. L-BFGS over it is as fast as multigrid cycles on
 # isotropic grids of up to 10,000 vertices, and in other cloth, on triangles and on ragged pieces up to ten times as fast.
@@ -69,7 +69,7 @@ def factor_pays(surface: Surface) -> bool:
 def laplacian_of(surface: Surface) -> Laplacian:
     """Return the Laplacian of a surface. Only its factor is kept."""
     # The factor first: most memory is taken while it is made.
-    solve, matrix = laplacian_solver(surface), stiffness_matrix(surface)
+    solve, matrix = laplacian_solver(surface), cotangent_matrix(surface)
     laid, weight, corner = _cotangent_weights(surface)
     rest = np.zeros((len(laid), 3), dtype=np.complex128)
     rest[:, 1], rest[:, 2] = laid[:, 0], laid[:, 1] - 1j * laid[:, 2]
@@ -90,7 +90,7 @@ def laplacian_solver(surface: Surface) -> Solve:
 
 def held_laplacian(surface: Surface) -> csc_array:
     """Return the Laplacian with a spring at one vertex that holds the piece as a whole: forces whose sum is zero do not feel it."""
-    matrix = stiffness_matrix(surface)
+    matrix = cotangent_matrix(surface)
     diagonal = matrix.diagonal()
     mean = diagonal.mean()
     diagonal += _REGULARISATION * mean
@@ -99,7 +99,7 @@ def held_laplacian(surface: Surface) -> csc_array:
     return matrix
 
 
-def stiffness_matrix(surface: Surface) -> csc_array:
+def cotangent_matrix(surface: Surface) -> csc_array:
     """Return the Laplacian as a matrix (#V by #V)."""
     _, weight, corner = _cotangent_weights(surface)
     count = len(surface.vertices)

@@ -15,7 +15,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.falloff import falloff_weights
-from warpflat.flat.surface.laplacian import stiffness_matrix
+from warpflat.flat.surface.laplacian import cotangent_matrix
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.normals import vertex_normals
 from warpflat.flat.surface.triangles import triangulate
@@ -115,7 +115,7 @@ def carry(surface: Surface, before: FloatArray, after: FloatArray, triangles: ND
     normals = vertex_normals(surface.vertices, corners)
     moved, far = carry_points(surface.vertices, normals, before, after, triangles)
     # Least squares of the move against a smooth one; second differences, so that a move that grows evenly is smooth.
-    stiff = stiffness_matrix(surface)
+    stiff = cotangent_matrix(surface)
     a, b, c = surface.vertices[corners].transpose(1, 0, 2)
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     mass = np.maximum(np.bincount(corners.ravel(), np.repeat(area / 3.0, 3), minlength=len(moved)), 1e-12)

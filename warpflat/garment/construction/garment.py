@@ -18,7 +18,6 @@ from warpflat.flat.flattening.result import Flattening, run_metrics
 from warpflat.flat.surface.border_seams import BorderSeam
 from warpflat.flat.surface.mirror import mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
-from warpflat.pattern.export.piece_files import write_pieces
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.finishing import Finishing
@@ -226,6 +225,8 @@ class Garment:
         Raises:
             InputError: the folder cannot be written.
         """
+        from warpflat.pattern.export.piece_files import write_pieces
+
         return write_pieces(
             list(self.parts.values()), folder, picture=picture, frames=False, body=self.drawn_body, drafted=drafted
         )

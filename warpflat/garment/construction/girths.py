@@ -24,7 +24,7 @@ __all__ = ["girth_constraints", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
-    """Return constraints that give every level of the trunk the ease that a form asks for.
+    """Return constraints that give every level of trunk, arms and legs the ease that a form asks for.
 
     Cloth at rest loses some of it to strain, or has more elsewhere.
 
@@ -34,11 +34,12 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
         positions: by piece, #V by 2, at rest without these constraints [m].
     """
     found, piece_edges = [], PieceEdges(mannequin.layout, form)
+    limbs = {name: (row, axis) for (name, _), row, _, axis in body_rows(mannequin)}
     for level, girth in pattern_girths(mannequin, form, positions).items():
-        if "ease_wanted_m" not in girth or level not in RING_LEVELS:
+        if "ease_wanted_m" not in girth:
             continue
         factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
-        edges = piece_edges.along(_row(mannequin.layout, level))
+        edges = piece_edges.along(*([_row(mannequin.layout, level)] if level in RING_LEVELS else limbs[level]))
         assert edges is not None
         found.append(
             KeptGirth(

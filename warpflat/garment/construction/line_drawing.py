@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import arc_lengths
+from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import other_side, without_side
 from warpflat.flat.flattening.verdict import judge
 from warpflat.flat.surface.connectivity import border_loops
@@ -22,7 +22,9 @@ from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import finishing_views
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.girths import pattern_girths
+from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import Buttons, place_opening
+from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
 
 if TYPE_CHECKING:
@@ -46,6 +48,8 @@ _BAR = np.array([[-0.009, 0.0], [0.009, 0.0]])
 _BESIDE = 0.04
 # Half of what shows of a godet's hem, as a share of that.
 _FOLDED = 0.15
+# How far the ends of a tie hang [m], and how much each goes sideways for that.
+_TIE_HANGS, _TIES = 0.22, (-0.25, 0.2)
 _CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos, np.sin)])
 
 
@@ -53,19 +57,22 @@ _CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos
 Rises = Mapping[tuple[str, str], tuple[FloatArray, FloatArray]]
 
 
-def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = MappingProxyType({})) -> Worn:
+def describe_worn(
+    garments: Mapping[str, Garment], sample: str, rises: Rises = MappingProxyType({}), pieces: Sequence[Piece] = ()
+) -> Worn:
     """Return the line drawing of a garment in its sample size, the measures of all sizes, and the openings that it needs.
 
     Args:
         garments: flattened, by size, on their bodies.
         sample: the size that is drawn.
         rises: of its slanted hems.
+        pieces: of the pattern in that size, on which places of pockets are marked.
     """
     garment = garments[sample]
-    pieces, on_form = list(garment.pieces.values()), garment if isinstance(garment, FormGarment) else None
+    cloth, on_form = list(garment.pieces.values()), garment if isinstance(garment, FormGarment) else None
     # What hangs nearer to the viewer hides what lies behind it: the inside of a back shows above the neck of a front.
-    depth = np.array([flat.surface.vertices[:, 2].mean() for flat in pieces])
-    drawn = [_views(flat, half=on_form is not None and on_form.form.half) for flat in pieces]
+    depth = np.array([flat.surface.vertices[:, 2].mean() for flat in cloth])
+    drawn = [_views(flat, half=on_form is not None and on_form.form.half) for flat in cloth]
     views = {}
     for index, (name, sign) in enumerate((("front", 1.0), ("back", -1.0))):
         order = np.argsort(sign * depth, kind="stable").tolist()
@@ -75,6 +82,7 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
             seen = [_with_slanted_hems(on_form, *each, sign, rises) for each in zip(names, seen, strict=True)]
             behind, before = finishing_views(on_form, sign)
             seen = [*behind, *_wrapped(on_form, seen, names, sign), *before, *_openings(on_form, sign)]
+            seen += _pockets(on_form, pieces, sign)
         views[name] = tuple(piece for piece in seen if piece.outlines or piece.lines)
     measures = {}
     for size, each in garments.items():
@@ -98,11 +106,11 @@ def describe_worn(garments: Mapping[str, Garment], sample: str, rises: Rises = M
         for ring in garment.rings
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
-    knits = dict.fromkeys(flat.fabric.name for flat in pieces if flat.fabric.is_knit)
+    knits = dict.fromkeys(flat.fabric.name for flat in cloth if flat.fabric.is_knit)
     verdict = judge(garment.metrics())
     failing = dict.fromkeys(finding.kind for finding in verdict.findings if finding.fails) if verdict else {}
     mens = on_form is not None and re.search(r"\bmen\b", on_form.mannequin.source) is not None
-    fabrics = {flat.fabric.name: flat.fabric for flat in pieces}
+    fabrics = {flat.fabric.name: flat.fabric for flat in cloth}
     cloths = {
         name: ClothKind(
             kind="knit" if fabric.is_knit else "woven", weight=fabric.areal_density,
@@ -161,7 +169,7 @@ def _wrapped(garment: FormGarment, seen: list[ViewedPiece], names: list[str], si
     """Return the pieces as they are seen with those of the right half of a wrap in front, out to their edges on the left half."""
     import shapely
 
-    upper = dict[str, ViewedPiece]()
+    upper, ties = dict[str, ViewedPiece](), list[ViewedPiece]()
     for opening in garment.openings:
         if opening.kind != "wrap":
             continue
@@ -185,7 +193,17 @@ def _wrapped(garment: FormGarment, seen: list[ViewedPiece], names: list[str], si
                 outlines=tuple(np.asarray(each.exterior.coords)[:-1] for each in shapely.get_parts(whole)),
                 lines=(*(np.asarray(each.coords) for each in parts), edge),
             )
-    return [*(view for name, view in zip(names, seen, strict=True) if name not in upper), *upper.values()]
+            if opening.tie and "neck" in garment.form.pieces[part.piece].edges:
+                # The ends of the bow hang from the corner of the half that lies above.
+                corner = edge[edge[:, 1].argmin()]
+                for slope in _TIES:
+                    down = np.array([sign * slope, -1.0]) * _TIE_HANGS
+                    side = 0.5 * TIE_WIDTH * np.array([1.0, 0.0])
+                    ring = np.array(
+                        [corner - 0.3 * side, corner + down - side, corner + down + side, corner + 0.3 * side]
+                    )
+                    ties.append(ViewedPiece(outlines=(ring,), lines=(ring[[0, 1, 2, 3, 0]],)))
+    return [*(view for name, view in zip(names, seen, strict=True) if name not in upper), *upper.values(), *ties]
 
 
 def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
@@ -222,6 +240,30 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
                     lines.append(shape + [np.interp(at, arc, seen[:, axis]) for axis in (0, 1)])
         if lines:
             yield ViewedPiece(outlines=(), lines=tuple(lines))
+
+
+def _pockets(garment: FormGarment, pieces: Sequence[Piece], sign: float) -> Iterator[ViewedPiece]:
+    """Yield the edges of patches and welts, and the slanted openings of hip pockets, on both sides of the body."""
+    import shapely
+    from scipy.interpolate import LinearNDInterpolator
+
+    for piece in (piece for piece in pieces if piece.name in garment.pieces):
+        sides = [line for name, line in piece.internal_lines.items() if name.startswith("pocket")]
+        rings = shapely.get_parts(shapely.line_merge(shapely.MultiLineString(sides)))
+        lines = [np.asarray(shapely.LinearRing(ring.coords).coords) for ring in rings]
+        lines += [edge.points for edge in piece.edges if edge.name.startswith("pocket opening")]
+        if not lines:
+            continue
+        flat, on_fold = garment.pieces[piece.name], garment.form.pieces[piece.name].fold
+        surface = flat.surface
+        normals = vertex_normals(surface.vertices, triangulate(surface.faces)[0])[flat.vertex_origin]
+        lift = LinearNDInterpolator(flat.positions, np.hstack([surface.vertices[flat.vertex_origin], normals]))
+        lifted = [lift(points_at_lengths(line, np.linspace(0.0, arc_lengths(line)[-1], 41))) for line in lines]
+        lifted = [row[np.isfinite(row).all(axis=1)] for row in lifted]
+        if other_side(piece.name) not in {piece.name, *(each.name for each in pieces)} or on_fold:
+            lifted += [row * [-1.0, 1.0, 1.0, -1.0, 1.0, 1.0] for row in lifted]
+        shown = [row[:, :2] * [sign, 1.0] for row in lifted if len(row) > 1 and sign * row[:, 5].mean() > _EDGE_ON]
+        yield ViewedPiece(outlines=(), lines=tuple(shown))
 
 
 def _merged(shown: FloatArray) -> list[Any]:

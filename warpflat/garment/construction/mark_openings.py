@@ -25,8 +25,8 @@ _INSIDE = 0.004
 _CLEAR, _SPACING = 0.030, 0.200
 # A slit or vent closer to the whole seam than this [m] leaves nothing to sew.
 _LEAST_SEWN = 0.02
-# Finished width of the ties of a wrap [m].
-_TIE = 0.025
+#: Finished width of the ties of a wrap [m].
+TIE_WIDTH = 0.025
 
 #: By size and opening, the seams that the opening runs along.
 Placed = Mapping[str, Sequence[Sequence[OpeningPart]]]
@@ -268,9 +268,9 @@ def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
                 piece = replace(piece, internal_lines=lines_inside(piece.internal_lines, piece.outline))
             made.append(piece)
         if opening.tie and not any(piece.name == tied for piece in row):
-            edges = strip_edges(*swept(Strip(length=opening.tie, height=2.0 * _TIE)))
-            fold = np.array([[0.0, _TIE], [opening.tie, _TIE]])
-            grain = np.array([[0.2, 0.5], [0.8, 0.5]]) * [opening.tie, _TIE]
+            edges = strip_edges(*swept(Strip(length=opening.tie, height=2.0 * TIE_WIDTH)))
+            fold = np.array([[0.0, TIE_WIDTH], [opening.tie, TIE_WIDTH]])
+            grain = np.array([[0.2, 0.5], [0.8, 0.5]]) * [opening.tie, TIE_WIDTH]
             made.append(
                 Piece(
                     name=tied, size=size, fabric=row[0].fabric, quantity=2, role="tie", paired=False, grain=grain,

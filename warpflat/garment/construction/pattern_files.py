@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from warpflat.garment.construction.garment import Garment
     from warpflat.pattern.drafting.drafted import DraftedGarment
     from warpflat.pattern.drafting.marker import Cloth
-    from warpflat.pattern.drafting.pieces import FoundSeam, Pattern
+    from warpflat.pattern.drafting.piece_parts import FoundSeam
+    from warpflat.pattern.drafting.pieces import Pattern
     from warpflat.pattern.drafting.walked import WalkedSeam
 
 __all__ = [
@@ -324,7 +325,8 @@ def _write_pattern(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
 ) -> WrittenPattern:
     """Make, draft and write a pattern; what cannot be drawn or written of it is left out (:func:`warpflat.core.output.optional_step`)."""
-    from warpflat.core.output import LeftOut, file_in, listening_to_left_out, optional_step, output_folder
+    from warpflat.core.left_out import LeftOut, listening_to_left_out
+    from warpflat.core.output import file_in, optional_step, output_folder
     from warpflat.pattern.drafting.curves import TOLERANCE
     from warpflat.pattern.drafting.cut_list import cut_list
     from warpflat.pattern.drafting.draft import draft_garment

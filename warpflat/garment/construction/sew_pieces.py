@@ -29,7 +29,6 @@ from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.sewing import sew
 from warpflat.garment.construction.sewn import Sewn, Stitching
 from warpflat.pattern.drafting.corners import find_corners
-from warpflat.pattern.drafting.from_mesh import CORNER
 
 __all__ = ["Bands", "meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
 
@@ -174,7 +173,7 @@ def _between_corners(pair: Stitching, flat: Mapping[str, Flattening]) -> list[St
     corners = set(range(1, len(first) - 1))
     for name, row in zip(pair.pieces, pair.vertices, strict=True):
         loop = border_loops(flat[name].network.surface.faces)[0]
-        own = loop[sorted(find_corners(flat[name].positions[loop], CORNER))]
+        own = loop[sorted(find_corners(flat[name].positions[loop]))]
         corners &= set(np.flatnonzero(np.isin(row, own)).tolist())
     ends = pairwise([0, *sorted(corners), len(first) - 1])
     return [replace(pair, vertices=(first[a : b + 1], second[a : b + 1])) for a, b in ends]

@@ -116,8 +116,9 @@ def pattern_of_garment(
     """
     rules, sample = rules or EdgeRules(), next(iter(garments.values()))
     if not isinstance(sample, FormGarment):
+        worn = {own for pair in sample.stitching if pair.pieces[0] != pair.pieces[1] for own in pair.pieces}
         pattern, notes = pattern_of_surface(
-            list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams
+            list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, worn=worn
         )
         lacking = _lacking_seams(sample, pattern)
         if lacking:
@@ -127,7 +128,7 @@ def pattern_of_garment(
                 for each, along in zip(pair.pieces, pair.vertices, strict=True):
                     ends.setdefault(each, set()).update(along[[run[0], run[-1] + 1]].tolist())
             pattern, notes = pattern_of_surface(
-                list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, ends=ends
+                list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, ends=ends, worn=worn
             )
             lacking = _lacking_seams(sample, pattern)
         for pair, run in lacking:
@@ -264,7 +265,7 @@ def pattern_of_garment(
         pattern, equal = draw_equal_pieces_once(pattern, called="godet")
         notes += equal
     with optional_step(_NO_DRAWING, is_needed=False):
-        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises))
+        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises, pattern.pieces[pattern.sample]))
     return pattern, notes
 
 
@@ -516,6 +517,7 @@ def pattern_of_surface(
     size: str = "",
     seams: Sequence[BorderSeam] = (),
     ends: Mapping[str, Collection[int]] | None = None,
+    worn: Collection[str] = (),
 ) -> tuple[Pattern, tuple[str, ...]]:
     """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
 
@@ -530,6 +532,7 @@ def pattern_of_surface(
         size: for the label.
         seams: of the border, by the lines that are sewn to each other.
         ends: by piece the vertices at which its border is parted into edges, beside its corners and the ends of lines.
+        worn: pieces that are sewn to others in space, where a crack that gapes is a vent and no dart.
 
     Returns:
         The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
@@ -544,7 +547,8 @@ def pattern_of_surface(
     drawn = dict[str, Piece]()
     for result in results:
         with optional_step(f"{result.surface.name} was left out of the pattern") if len(results) > 1 else nullcontext():
-            drawn[result.surface.name] = _mesh_piece(result, size, ends.get(result.surface.name, ()))
+            own = result.surface.name
+            drawn[own] = _mesh_piece(result, size, ends.get(own, ()), is_worn=own in worn)
     if not drawn:
         raise InputError("none of the pieces can be drawn")
     results, pieces = [result for result in results if result.surface.name in drawn], list(drawn.values())
@@ -584,7 +588,7 @@ def pattern_of_surface(
     return Pattern(name=name, pieces={size: ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
 
 
-def _mesh_piece(result: Flattening, size: str, ends: Collection[int] = ()) -> Piece:
+def _mesh_piece(result: Flattening, size: str, ends: Collection[int] = (), *, is_worn: bool = False) -> Piece:
     """Return one piece with its cuts as darts, and its grain."""
     darts: dict[str, tuple[int, int, int]] = {}
     fisheyes: dict[str, Crack] = {}
@@ -611,6 +615,7 @@ def _mesh_piece(result: Flattening, size: str, ends: Collection[int] = ()) -> Pi
             darts=darts,
             fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in fisheyes.items()},
             ends=ends,
+            worn=result.surface.vertices[result.vertex_origin] if is_worn else None,
         ),
         size=size,
         fabric=result.fabric.name,

@@ -12,8 +12,10 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld
 
-__all__ = ["continue_pieces", "hood_beside_head"]
+__all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]
 
+# What falls from an edge hangs upright where the cloth above leads downwards by this share.
+_HANGS = -0.8
 # What is drafted follows so many of the nearest vertices of its seams.
 _NEXT = 4
 
@@ -92,6 +94,55 @@ def continue_pieces(
         weight /= weight.sum(axis=1, keepdims=True)
         off = flat[:, None] - flat[own[near]]
         found[name] = np.einsum("pk,pka->pa", weight, place[near] + np.einsum("pkab,pkb->pka", way[near], off))
+    return found
+
+
+def hang_from_edges(
+    placed: Mapping[str, FloatArray],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    falling: Mapping[str, float],
+) -> dict[str, FloatArray]:
+    """Place flounces and ruffles as a smooth skirt that falls from the edges to which they are sewn, without their folds.
+
+    Args:
+        placed: by piece the points (#P by 3 [m]) of those that lie.
+        meshes: all pieces.
+        welds: for each seam the vertices that it joins.
+        falling: the pieces that are placed, with the share of its length by which each stands out.
+
+    Returns:
+        By piece its points, #P by 3 [m].
+    """
+    rows: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in falling}
+    for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+        if name in falling and other in placed:
+            out = -_border_frames(meshes[other], its)[:, :, 1:]
+            down = (_slopes(meshes[other], placed[other])[its] @ out)[:, :, 0]
+            rows[name].append((own, placed[other][its], down))
+    found, sewn = {}, {name: seams for name, seams in rows.items() if seams}
+    middle = np.concatenate([place for seams in sewn.values() for _, place, _ in seams] or [np.zeros((1, 3))]).mean(
+        axis=0
+    )
+    for name, seams in sewn.items():
+        flat, best = meshes[name].points, np.full(len(meshes[name].points), np.inf)
+        found[name] = np.empty((len(flat), 3))
+        for own, place, down in seams:
+            a, b = flat[own[:-1]], flat[own[1:]]
+            share = np.einsum("psk,sk->ps", flat[:, None] - a, b - a) / np.maximum(((b - a) ** 2).sum(axis=1), 1e-12)
+            share = np.clip(share, 0.0, 1.0)
+            off = np.linalg.norm(flat[:, None] - a - share[..., None] * (b - a), axis=2)
+            nearest_side = off.argmin(axis=1)
+            points, here = np.arange(len(flat)), off.min(axis=1) < best
+            at, t = nearest_side[here], share[points, nearest_side][here, None]
+            start, way = ((1.0 - t) * row[at] + t * row[at + 1] for row in (place, down))
+            # On the trunk it hangs, on an arm it runs on.
+            way = np.where((way[:, 1] < _HANGS * np.linalg.norm(way, axis=1))[:, None], [0.0, -1.0, 0.0], way)
+            out = (start - middle) * [1.0, 0.0, 1.0]
+            way = way + falling[name] * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+            way /= np.linalg.norm(way, axis=1, keepdims=True)
+            best = np.minimum(best, off.min(axis=1))
+            found[name][here] = start + best[here, None] * way
     return found
 
 

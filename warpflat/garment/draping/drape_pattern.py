@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import shapely
 import warp as wp
 from numpy.typing import NDArray
+from scipy.spatial import Delaunay
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
 from warpflat.flat.fabric.fabric import Fabric
+from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.mirror import mirror_plane
+from warpflat.flat.surface.normals import vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
-from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
+from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head
 from warpflat.garment.draping.drape_garment import held_vertices, hip_level, thread_elastics
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
@@ -34,10 +38,11 @@ from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.garment.mannequin.head import head_of
 from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.sewing_tasks import is_flounce
 from warpflat.pattern.drafting.whole_pieces import MIRRORED, whole_pieces
 
-__all__ = ["Placement", "drape_pattern", "lay_pieces"]
+__all__ = ["Placement", "drape_pattern", "lay_pieces", "place_drafted"]
 
 # Where a file's units stand.
 _UNITS = (
@@ -56,6 +61,10 @@ _LOOKS = {
     "front": np.array([0.0, 0.0, 1.0]), "back": np.array([0.0, 0.0, -1.0]),
     "left arm": np.array([1.0, 0.0, 0.0]), "right arm": np.array([-1.0, 0.0, 0.0]),
 }  # fmt: skip
+# What is sewn to less than this share of its length is gathered or pleated. A patch lies this far over its piece [m].
+_FULL, _ON_TOP = 0.85, 0.0015
+# A flounce stands out by this share of its length, and what is gathered or pleated by this one.
+_FLOUNCE_FLARES, _GATHERS_FLARE = 0.4, 0.1
 # The halves of a hood start this far beside the head [m].
 _BESIDE_HEAD = 0.01
 
@@ -163,10 +172,7 @@ def drape_pattern(
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if solid is None else solid
     if not lifted or drafted:
-        stays = np.zeros(len(cloth.designed), dtype=bool)
-        for name in set(meshes) - set(drafted) if lifted else ():
-            stays[cloth.welded[cloth.piece_vertices[name]]] = True
-        cloth = replace(cloth, designed=sew_around(cloth, cloth.designed, solid, fixed=stays))
+        cloth = _sewn_to(cloth, set(meshes) - set(drafted) if lifted else (), solid)
     threaded = sorted({elastic.edge for elastic in pattern.elastics})
     cloth, gripped = thread_elastics(cloth, threaded, solid)
     if gripped:
@@ -191,6 +197,98 @@ def drape_pattern(
         hangs_below=hip_level(body),
         threaded=gripped,
     ), notes
+
+
+def place_drafted(
+    pattern: Pattern, lifts: Mapping[str, Lift], body: Mannequin, fabric: Fabric
+) -> dict[str, list[Surface]]:
+    """Return what of a pattern has no designed surface, such as collars and flounces, where it is worn: sewn to the rest, not draped.
+
+    Args:
+        pattern: its sample size is placed.
+        lifts: by piece the map to its designed surface, of those that have one.
+        body: on which that lies.
+        fabric: of all pieces.
+
+    Returns:
+        By piece its copies; none of what lies within the garment, such as a facing.
+
+    Raises:
+        InputError: a piece cannot be meshed, or hangs together with none that has a designed surface.
+    """
+    given = pattern.pieces[pattern.sample]
+    pieces, seams, _ = whole_pieces(given, pattern.seams)
+    pieces, seams, _ = in_one_layer(pieces, seams, lifts)
+    pieces, seams, turned = right_side_out(pieces, seams, lifts)
+    whole, found = whole_lifts(given, lifts), dict[str, list[Surface]]()
+    for name, piece in pieces.items():
+        # Patches and welts, on what they are sewn to.
+        titles = [f"{name.removesuffix(MIRRORED)}_pocket{kind}" for kind in ("", "_welt")]
+        title = next((each.name for each in given if each.name in titles), "")
+        outlines = [line for line_name, line in piece.internal_lines.items() if line_name.startswith("pocket")]
+        for ring in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(outlines))) if title else ():
+            points, triangles = _filled(np.asarray(ring.coords))
+            at = whole[name](points)
+            at = at + _ON_TOP * vertex_normals(at, triangles)
+            found.setdefault(title, []).append(_surface(f"{title} {len(found.get(title, ())) + 1}", at, triangles))
+    drafted = [name for name in pieces if name not in whole]
+    if not drafted:
+        return found
+    meshes, welds = mesh_pieces(pieces, seams, _COARSE, closures(pieces))
+    start_warp()
+    hooded = any(piece.role == "hood" for piece in pieces.values())
+    solid = _worn_body(body, head=hooded, device=wp.get_device("cpu"))
+    placed = _mirrored_in_place(
+        {name: whole[name](mesh.points) for name, mesh in meshes.items() if name in whole}, welds
+    )
+    falling = {name: _FLOUNCE_FLARES for name in drafted if is_flounce(pieces[name])}
+    falling |= {
+        side.piece: _GATHERS_FLARE
+        for seam in seams
+        for long, short in (seam.sides, seam.sides[::-1])
+        for side in long
+        if side.piece in drafted and _length(pieces, short) < _FULL * _length(pieces, long)
+    }
+    placed |= hang_from_edges(placed, meshes, welds, falling)
+    placed = _continued(placed, pieces, meshes, welds, body)
+    cloth = _cloth(pieces, meshes, welds, placed, fabric, turned)
+    cloth = _sewn_to(cloth, {*meshes} - {*drafted} | {*falling}, solid)
+    for name in drafted:
+        title = next(each.name for each in given if name == each.name or name.startswith(each.name + " "))
+        points = cloth.designed[cloth.welded[cloth.piece_vertices[name]]]
+        found.setdefault(title, []).append(_surface(name, points, meshes[name].triangles))
+    return found
+
+
+def _length(pieces: Mapping[str, Piece], row: Sequence[SeamSide]) -> float:
+    return sum(pieces[side.piece].edge(side.edge).length for side in row)
+
+
+def _filled(outline: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return a mesh of the inside of a convex outline: points (#P by 2 [m]) and triangles (#T by 3)."""
+    polygon = shapely.Polygon(outline)
+    low, high = polygon.bounds[:2], polygon.bounds[2:]
+    grid = np.stack(np.meshgrid(*(np.arange(a, b, _COARSE) for a, b in zip(low, high, strict=True))), axis=-1).reshape(
+        -1, 2
+    )
+    points = np.concatenate([shapely.get_coordinates(polygon.exterior.segmentize(_COARSE))[:-1], grid])
+    points = points[shapely.intersects_xy(polygon.buffer(1e-6), *points.T)]
+    return points, Delaunay(points).simplices.astype(np.int32)
+
+
+def _surface(name: str, points: FloatArray, triangles: IntArray) -> Surface:
+    return Surface(
+        vertices=points, faces=np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32), name=name,
+        input_vertices=points, input_index=np.arange(len(points), dtype=np.int32),
+    )  # fmt: skip
+
+
+def _sewn_to(cloth: SewnCloth, stay: Collection[str], body: Body) -> SewnCloth:
+    """Return cloth drawn together around a body; the pieces that are named stay where they are."""
+    stays = np.zeros(len(cloth.designed), dtype=bool)
+    for name in stay:
+        stays[cloth.welded[cloth.piece_vertices[name]]] = True
+    return replace(cloth, designed=sew_around(cloth, cloth.designed, body, fixed=stays))
 
 
 def _worn_body(body: Mannequin, *, head: bool, device: wp.Device) -> Body:

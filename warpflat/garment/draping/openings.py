@@ -71,7 +71,8 @@ def find_openings(
         pieces = frozenset(name for _, name in on)
         turn = float((np.pi - angle[loop]).sum())
         found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces, turn=turn))
-    return sorted(found, key=lambda each: -each.length)
+    # Of two that are equally long, as armholes, the first is that of the first vertex, however their lengths are rounded.
+    return sorted(found, key=lambda each: (-round(each.length, 6), int(each.vertices.min())))
 
 
 def _between_buttons(

@@ -397,10 +397,12 @@ def _move_legs(
         fork = grid[1 : layout.leg_row["leg_thigh"]]
         out[fork] = body[fork] + move[fork]
         straight = [pair for pair in ruled if set(pair) & set(LEG_LEVELS)]
+        wished = convex_girth(out[grid[row_of["leg_thigh"]]])
         for pair in straight:
             rule_rows(out, grid, row_of, pair, body[grid[1:].reshape(-1)])
         if straight:
             _hang_fork(out, layout, grid)
+            _take_in_thigh(out, body, grid, row_of["leg_thigh"], wished)
 
 
 def _hang_fork(out: FloatArray, layout: Layout, grid: IntArray) -> None:
@@ -422,6 +424,33 @@ def _hang_fork(out: FloatArray, layout: Layout, grid: IntArray) -> None:
     ramp = np.interp(np.arange(knee + 1), [0, 0.5 * thigh, 0.5 * (thigh + knee), knee], [0.0, 1.0, 1.0, 0.0])
     weight = (ramp * ramp * (3.0 - 2.0 * ramp))[:, None, None]
     out[grid[1:knee]] += (weight * (smooth - rows))[1:knee]
+
+
+def _take_in_thigh(out: FloatArray, body: FloatArray, grid: IntArray, thigh: int, wished: float) -> None:
+    """Draw a leg that hangs towards the body at the thigh until its girth there is as wished; it stays straight down to its end.
+
+    Args:
+        out: #V by 3 [m], changed in place.
+        body: #V by 3 [m].
+        grid: of the leg, from the crotch curve down.
+        thigh: the thigh's row.
+        wished: girth there [m].
+    """
+    from scipy.optimize import brentq
+
+    skin, off = body[grid[thigh]], out[grid[thigh]] - body[grid[thigh]]
+
+    def too_wide(share: float) -> float:
+        return convex_girth(skin + share * off) - wished
+
+    if too_wide(1.0) <= 0.0 or too_wide(0.0) >= 0.0:
+        return
+    apart = np.linalg.norm(np.diff(out[grid].mean(axis=1), axis=0), axis=1)
+    below = np.cumsum(apart[thigh:])
+    up = np.arange(thigh + 1) / thigh
+    near = np.concatenate([np.sin(0.5 * np.pi * up), 1.0 - below / below[-1]])
+    taken = (1.0 - brentq(too_wide, 0.0, 1.0, xtol=1e-4)) * near
+    out[grid[1:]] -= (taken[:, None, None] * off)[1:]
 
 
 def _hang(out: FloatArray, layout: Layout, grid: IntArray, near: FloatArray | None = None) -> None:

@@ -191,7 +191,10 @@ def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.
     cells = np.where(turn[:, None] < 0.0, cells[:, ::-1], cells)[np.abs(turn) > 1e-12 * step * step]
     if not len(cells):
         return None
-    return middle + grid @ axes, cells.astype(np.int64)
+    # A place whose triangles all lie outside, as where the rim crosses itself, belongs to no patch.
+    is_rim = np.arange(len(every)) < len(flat)
+    kept = is_rim | (np.bincount(cells.ravel(), minlength=len(every)) > 0)
+    return middle + grid[kept[len(flat) :]] @ axes, (np.cumsum(kept) - 1)[cells].astype(np.int64)
 
 
 def _inside(points: FloatArray, polygon: FloatArray) -> BoolArray:

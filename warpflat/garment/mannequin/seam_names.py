@@ -8,6 +8,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.text import find_unused_name
+from warpflat.garment.mannequin.layout import RING_LEVELS
 
 __all__ = ["name_seams"]
 
@@ -29,6 +30,11 @@ def name_seams(
         pieces: names of its two pieces.
         points: of each seam in space, #P by 3 [m]; None leaves positions out.
     """
+    # A yoke's seam across the body is called after it, not after the level.
+    lines = [
+        "yoke" if line in RING_LEVELS and any("yoke" in name.split("_") for name in both) else line
+        for line, both in zip(lines, pieces, strict=True)
+    ]
     names = list(lines)
     for line in dict.fromkeys(lines):
         group = [number for number, name in enumerate(lines) if name == line]

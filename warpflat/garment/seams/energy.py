@@ -19,11 +19,10 @@ from warpflat.core.beside import two_at_a_time
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name
-from warpflat.flat.cutting.ledger import coarse_options
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.solver.options import RelaxOptions
+from warpflat.flat.solver.options import RelaxOptions, coarse_options
 from warpflat.flat.surface.as_rigid import as_rigid_layout
 from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.flat.surface.injective import is_injective

@@ -32,7 +32,7 @@ from warpflat.garment.seams.solid import is_panel, part_solids
 from warpflat.garment.seams.symmetric import averaged, mirrored
 from warpflat.garment.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves
 from warpflat.garment.seams.thickness import without_thickness
-from warpflat.pattern.drafting.pieces import FoundSeam
+from warpflat.pattern.drafting.piece_parts import FoundSeam
 
 __all__ = ["GRAIN", "FoundSeams", "find_seams", "seam_words"]
 

@@ -24,11 +24,12 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.flat.surface.half_edges import half_edges
 from warpflat.flat.surface.tubes import inner_borders, tube_borders
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
 from warpflat.garment.seams.cloth import Cloth, PieceMesh, section
@@ -224,9 +225,68 @@ def part_solids(
             done.add((rank, key))
         else:
             cloth, number = made, number + 1
+    notes = list[str]()
+    for mesh in list(cloth.pieces()):
+        edges = _around_handles(mesh)
+        if len(edges):
+            cloth, number = cloth.with_seam(f"{SOLID} {number}", mesh.vertex_of[edges]), number + 1
+            x, y, z = (100.0 * mesh.vertices[edges].mean(axis=(0, 1))).tolist()
+            notes.append(
+                f"a piece has handles, as where a lace lies on it: slit open there, about ({x:.0f}, {y:.0f}, {z:.0f}) cm"
+            )
     left = sum(not is_open(mesh) for mesh in cloth.pieces())
-    notes = [f"{left} of its pieces have a handle or several holes that no cut has opened"] if left else []
+    notes += [f"{left} of its pieces have several holes that no cut has opened"] if left else []
     return cloth, notes
+
+
+def _around_handles(mesh: PieceMesh) -> Ids:
+    """Return the edges (#E by 2) along which a piece with a border is slit, so that it has no handle: shortest ways around them.
+
+    Of all edges that neither a tree of shortest ways to the border nor a tree of faces uses, two for each handle are left. Each closes
+    a way around it with those of its ends (Erickson and Whittlesey, "Greedy optimal homotopy and homology generators", 2005).
+    """
+    faces, count = mesh.faces.astype(np.int32), len(mesh.vertices)
+    loops = border_loops(faces, mesh.vertices)
+    none = np.empty((0, 2), np.int64)
+    if not loops or euler_characteristic(faces) == 2 - len(loops):
+        return none
+    he = half_edges(faces)
+    a, b = he.edges.T.astype(np.int64)
+    length = np.maximum(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1), 1e-12)
+    graph = coo_array((length, (a, b)), shape=(count, count)).tocsr()
+    far, before, _ = dijkstra(graph, directed=False, indices=loops[0], min_only=True, return_predecessors=True)
+    inner = np.flatnonzero(before >= 0)
+    key = a * count + b
+    ways = np.minimum(inner, before[inner]) * count + np.maximum(inner, before[inner])
+    around = far[a] + far[b] + length
+    # Beside each edge lie two faces, or a face and a hole; the border to which the ways lead has none beside it.
+    hole = np.full(count, -1)
+    for number, loop in enumerate(loops):
+        hole[loop] = number
+    beside = np.full((len(a), 2), -1)
+    order = np.argsort(he.edge, kind="stable")
+    first = np.searchsorted(he.edge[order], np.arange(len(a)))
+    beside[:, 0] = he.face[order][first]
+    double = he.count == 2
+    beside[double, 1] = he.face[order][first[double] + 1]
+    beside[~double, 1] = np.where(hole[a[~double]] > 0, len(faces) + hole[a[~double]], -1)
+    free = np.flatnonzero((beside[:, 1] >= 0) & ~np.isin(key, ways))
+    # Of several edges between the same two the one with the longest way.
+    free = free[np.argsort(-around[free], kind="stable")]
+    pairs = np.sort(beside[free], axis=1)
+    _, chosen = np.unique(pairs, axis=0, return_index=True)
+    weight = 1.0 + around.max() - around[free[chosen]]
+    size = len(faces) + len(loops)
+    spanning = minimum_spanning_tree(coo_array((weight, tuple(pairs[chosen].T)), shape=(size, size)).tocsr()).tocoo()
+    used = np.isin(pairs[chosen] @ [size, 1], spanning.row.astype(np.int64) * size + spanning.col)
+    left = np.setdiff1d(free, free[chosen[used]])
+    found = {(int(a[edge]), int(b[edge])) for edge in left}
+    for vertex in np.unique(he.edges[left]).tolist():
+        while before[vertex] >= 0:
+            found.add((min(vertex, int(before[vertex])), max(vertex, int(before[vertex]))))
+            vertex = int(before[vertex])
+    border = set(zip(a[~double].tolist(), b[~double].tolist(), strict=True))
+    return np.array(sorted(found - border), np.int64).reshape(-1, 2)
 
 
 def _image(mesh: PieceMesh, other: PieceMesh, mirror: Anatomy) -> Ids | None:

@@ -9,6 +9,8 @@ from warpflat.core.arrays import FloatArray, IndexArray
 __all__ = ["find_corners", "find_cracks"]
 
 
+#: A border vertex that turns by more than this [rad] is a corner.
+CORNER = np.radians(35.0)
 #: A corner is measured over this much border [m] on either side: single steps of a ragged border turn anywhere.
 WINDOW = 0.012
 #: Over a narrow end, from one corner to another within the window, the border turns by more than this [rad].
@@ -62,13 +64,13 @@ class _Border:
         return min(between, self.length - between)
 
 
-def find_corners(ring: FloatArray, angle: float) -> set[int]:
-    """Return vertices where the border turns by more than `angle` [rad], and most within the window around them."""
+def find_corners(ring: FloatArray) -> set[int]:
+    """Return vertices where the border turns by more than :data:`CORNER`, and most within the window around them."""
     border = _Border(ring)
     turns = np.abs(border.turning_at_vertices())
     # The corners at the ends of straps, ties and bindings lie within one window of each other, and the border turns back
     # between them by more than `END`. A tooth of a ragged border turns back too, but the border turns the other way beside
-    # it. Each corner turns by more than `angle` over a quarter of the distance to the other one, as no rounded end does.
+    # it. Each corner turns by more than `CORNER` over a quarter of the distance to the other one, as no rounded end does.
     found: list[tuple[float, float, int, int]] = []
     for steps in range(1, border.count // 2):
         one, other = border.places, border.places + steps
@@ -84,7 +86,7 @@ def find_corners(ring: FloatArray, angle: float) -> set[int]:
         turned = np.stack([border.turning(*triple) for triple in triples])
         total = turned[0] + turned[1]
         sharp = (np.sign(total) * turned).min(axis=0)
-        for k in np.flatnonzero((sharp > angle) & (np.abs(total) > END)).tolist():
+        for k in np.flatnonzero((sharp > CORNER) & (np.abs(total) > END)).tolist():
             found.append(
                 (-float(sharp[k]), float(distance_between[k]), int(one[k]) % border.count, int(other[k]) % border.count)
             )
@@ -94,7 +96,7 @@ def find_corners(ring: FloatArray, angle: float) -> set[int]:
             corners += [i for i in pair if i not in corners]
     taken = np.zeros(border.count, dtype=bool)
     taken[corners] = True
-    for i in sorted(np.flatnonzero(turns > angle).tolist(), key=lambda i: (-turns[i], i)):
+    for i in sorted(np.flatnonzero(turns > CORNER).tolist(), key=lambda i: (-turns[i], i)):
         # The window of a corner shows in its neighbours' turns too; the next vertex of a coarse border does not.
         between = np.abs(border.along[: border.count][taken] - border.along[i])
         taken[i] |= bool((np.minimum(between, border.length - between) > border.window).all())

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths
@@ -121,8 +122,14 @@ def _fair_lines(
     bend = np.diff(basis, n=3, axis=0)
     weighed = basis.T * weight
     near, bent, wanted = weighed @ basis, bend.T @ bend, weighed @ even
+    # A free point meets only those near it in the row: the equations have a band.
+    row, column = np.nonzero((near != 0.0) | (bent != 0.0))
+    width = int(np.abs(row - column).max())
+    banded = np.zeros((2, 2 * width + 1, len(near)))
+    banded[:, width + row - column, column] = near[row, column], bent[row, column]
     for wave in waves:
-        solved = np.linalg.solve(near + (wave / (2 * np.pi * places[1])) ** 6 * bent, wanted)
+        stiffness = (wave / (2 * np.pi * places[1])) ** 6
+        solved = solve_banded((width, width), banded[0] + stiffness * banded[1], wanted)
         smooth = (basis @ solved)[first : first + len(places)]
         # Points keep their shares of the length.
         placed = points_at_lengths(smooth, np.interp(arc, places, arc_lengths(smooth)))

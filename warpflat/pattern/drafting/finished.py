@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.sewing_tasks import is_flounce
 from warpflat.pattern.drafting.words import translate, translate_name
 
 __all__ = ["finished_lengths"]
 
+# What is sewn on so near to the end of a line lengthens it [m].
+_AT_END = 0.02
 #: Lines along the body and what they measure; a garment has those that its pieces have.
 _LINES = {
     "centre back": "length at the centre back",
@@ -19,11 +27,12 @@ _LINES = {
 
 
 def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
-    """Return by what it is, in words, each length of the finished garment [m]; a cuff belongs to its sleeve.
+    """Return by what it is, in words, each length of the finished garment [m].
 
-    A length that ends at a band or a flounce is not told: they lengthen it.
+    What is sewn to its end belongs to it: a cuff, a band, a flounce. What of two fronts lies over each other counts once around a hem.
     """
-    pieces = [piece for piece in garment.pieces[size] if piece.piece.role == "shell"]
+    drafted = {piece.name: piece for piece in garment.pieces[size]}
+    pieces = [piece for piece in drafted.values() if piece.piece.role == "shell" and not is_flounce(piece.piece)]
     legs = any(_called(seam.name) == "inseam" for seam in garment.seams)
     found: dict[str, float] = {}
     for line, words in _LINES.items():
@@ -36,30 +45,24 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
             if stretches:
                 sums = [polyline_length(points) for points in stretches]
                 key = without_side(piece.name) if line == "centre back" else line
-                lengths[key] = max(sum(sums) if line == "centre back" else max(sums), lengths.get(key, 0.0))
-                ends = ends or any(edge.kind == "hem" for edge in piece.edges) or line == "overarm"
+                length = sum(sums) if line == "centre back" else max(sums)
+                more = _goes_on(garment, drafted, piece, np.concatenate(stretches))
+                lengths[key] = max(length + more, lengths.get(key, 0.0))
+                ends = ends or more > 0.0 or any(edge.kind == "hem" for edge in piece.edges)
         for seam in garment.seams:
             if seam.size == size and _called(seam.name) == line != "centre back":
                 lengths[line] = max(1e-3 * max(seam.length_mm), lengths.get(line, 0.0))
         if lengths and (ends or line in ("outseam", "inseam")) and not (legs and line == "centre back"):
             found[translate(words)] = sum(lengths.values())
-    cuffs = [piece for piece in garment.pieces[size] if piece.piece.role == "cuff"]
-    sleeve = translate("sleeve")
-    if cuffs and sleeve in found:
-        found[sleeve] += 0.5 * cuffs[0].edge("left end").length
-    elif sleeve in found and not any(
-        edge.kind == "hem" and "overarm" in _lines_of(piece) for piece in pieces for edge in piece.edges
-    ):
-        del found[sleeve]
     hems: dict[str, float] = {}
-    for piece in pieces:
+    for piece in (piece for piece in drafted.values() if piece.piece.role == "shell"):
         count = piece.piece.quantity * (2 if piece.piece.on_fold else 1)
         for edge in piece.edges:
             name = _called(edge.name)
             if edge.kind == "hem" and not set(name.split(" ")) & {"facing", "vent", "slit", "edge"}:
                 # Around one sleeve or leg where there are two.
                 both = 2 if without_side(edge.name) != edge.name and count > 1 else 1
-                hems[name] = hems.get(name, 0.0) + edge.length * count / both
+                hems[name] = hems.get(name, 0.0) + (edge.length - _laps(piece, edge.line)) * count / both
     for name, hem in hems.items():
         # A flounce's hem is called nothing else.
         called = translate_name(name)
@@ -67,9 +70,39 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
     return found
 
 
+def _goes_on(
+    garment: DraftedGarment, drafted: Mapping[str, DraftedPiece], piece: DraftedPiece, line: FloatArray
+) -> float:
+    """Return by how much a cuff, a band or a flounce lengthens a piece at the lower end of a line on it (#P by 2) [m]."""
+    import shapely
+
+    end = shapely.Point(line[line[:, 1].argmin()])
+    for seam in garment.garment.seams:
+        for own, other in (seam.sides, seam.sides[::-1]):
+            below = drafted[other[0].piece].piece
+            if below.role not in ("strip", "cuff") and not is_flounce(below):
+                continue
+            edges = [piece.edge(side.edge) for side in own if side.piece == piece.name]
+            if any(shapely.LineString(edge.line).distance(end) < _AT_END for edge in edges):
+                sewn = below.edge(other[0].edge).points
+                far = [points for name, points in below.internal_lines.items() if name.startswith("fold line")]
+                far += [edge.points for edge in below.edges if edge.kind == "hem"]
+                return float(shapely.LineString(sewn).distance(shapely.LineString(far[0]))) if far else 0.0
+    return 0.0
+
+
+def _laps(piece: DraftedPiece, hem: FloatArray) -> float:
+    """Return what of a hem (#P by 2 [m]) of one half of a front lies beyond its centre line, over or under the other half [m]."""
+    import shapely.ops
+
+    centre = [line for name, line in piece.internal_lines.items() if _called(name) == "centre front"]
+    if len(centre) != 1 or not piece.piece.is_pair:
+        return 0.0
+    way = (centre[0][-1] - centre[0][0]) / np.linalg.norm(centre[0][-1] - centre[0][0])
+    parts = shapely.ops.split(shapely.LineString(hem), shapely.LineString([centre[0][0] - way, centre[0][-1] + way]))
+    # The narrower part lies beyond it.
+    return float(min(part.length for part in parts.geoms)) if len(parts.geoms) == 2 else 0.0
+
+
 def _called(name: str) -> str:
     return without_side(name).rstrip(" 0123456789")
-
-
-def _lines_of(piece: DraftedPiece) -> set[str]:
-    return {_called(name) for name in (*piece.internal_lines, *(edge.name for edge in piece.edges))}

@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.output import optional_step
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.overlap import parted
+from warpflat.flat.surface.repair.meet import MEET
 from warpflat.pattern.drafting.corners import find_corners, find_cracks
 from warpflat.pattern.drafting.piece_parts import LEFT_OUT, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, check_hole
@@ -21,9 +22,6 @@ from warpflat.pattern.drafting.placement import default_grain
 
 __all__ = ["MeshFeatures", "inner_stretches", "line_labels", "piece_from_mesh"]
 
-
-#: A border vertex that turns by more than this [rad] is a corner.
-CORNER = np.radians(35.0)
 
 #: Places in a border of a dart's left mouth, tip and right mouth, in counter-clockwise order.
 DartPlaces = tuple[int, int, int]
@@ -42,6 +40,8 @@ class MeshFeatures:
         fisheyes: by name, the vertices on both sides of a crack inside: a fish-eye dart. Other border loops inside are
             cutouts.
         ends: vertices of the border at which edges end, beside its corners.
+        worn: #V by 3 [m], where the piece lies in space, sewn to others: a crack that gapes there is a vent, no dart. None
+            elsewhere, as of a flat panel, whose darts gape.
         grain_line: the feature line whose direction, from its first vertex to its last, is the grain; None takes y.
     """
 
@@ -51,6 +51,7 @@ class MeshFeatures:
     darts: Mapping[str, DartPlaces] = field(default_factory=dict)
     fisheyes: Mapping[str, ArrayLike] = field(default_factory=dict)
     ends: Collection[int] = ()
+    worn: FloatArray | None = None
     grain_line: str | None = None
 
 
@@ -100,7 +101,7 @@ def piece_from_mesh(
     flat = flat.copy()
     flat[outer] = parted(flat[outer])
     labels = line_labels(outer, lines)
-    corners = find_corners(flat[outer], CORNER)
+    corners = find_corners(flat[outer])
     # The places in the loop of each dart's left mouth, tip and right mouth; cracks that are found are darts, too.
     where = {vertex: place for place, vertex in enumerate(outer.tolist())}
     darts = {}
@@ -116,6 +117,10 @@ def piece_from_mesh(
         darts[key] = (left, tip, right)
     corners = corners | {place for places in darts.values() for place in places}
     found = find_cracks(flat[outer], corners, {places[1] for places in darts.values()})
+    if features.worn is not None:
+        mouths = features.worn[outer[[[left, right] for left, _, right in found]]] if found else np.empty((0, 2, 3))
+        gap = np.linalg.norm(mouths[:, 1] - mouths[:, 0], axis=1)
+        found = [places for places, wide in zip(found, gap.tolist(), strict=True) if wide <= MEET]
     darts |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
     grain = None
     if (datum := features.grain_line) is not None:

@@ -70,6 +70,9 @@ def is_symmetric(piece: DraftedPiece) -> bool:
     images = tips * mirror + [2 * axis, 0]
     if any(np.linalg.norm(tips - tip, axis=1).min() > INNER for tip in images):
         return False
+    if (np.abs(tips[:, 0] - axis) <= INNER).any():
+        # One leg of a dart in the middle would be lost on the fold.
+        return False
     # A strip is sewn to pieces that are not its mirror images: its notches must be so themselves.
     notched = np.array([base for notch in piece.notches for base in notch.base]).reshape(-1, 2)
     if piece.piece.role in ("strip", "waistband", "cuff", "collar", "hood") and any(

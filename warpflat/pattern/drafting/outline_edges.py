@@ -12,7 +12,6 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import FARTHEST
 from warpflat.pattern.drafting.corners import find_corners
-from warpflat.pattern.drafting.from_mesh import CORNER
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, MOST_ALLOWANCE, Dart, Edge
 
 __all__ = ["boundary_edges", "chain_edges", "find_darts", "inset", "split_outline", "with_drawn_allowances"]
@@ -86,7 +85,7 @@ def split_outline(ring: FloatArray, corners: FloatArray | None = None, fold: Flo
     if corners is not None and len(corners) > 1:
         places = {int(np.linalg.norm(ring - corner, axis=1).argmin()) for corner in corners}
     else:
-        places = find_corners(ring, CORNER)
+        places = find_corners(ring)
     along = None if fold is None else _along_fold(ring, fold)
     if along is not None:
         # What lies between the ends of the fold is no corner.

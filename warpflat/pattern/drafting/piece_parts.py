@@ -22,6 +22,7 @@ __all__ = [
     "SAME_POINT",
     "Dart",
     "Edge",
+    "FoundSeam",
     "Hole",
     "check_points",
 ]
@@ -164,3 +165,24 @@ def check_points(points: ArrayLike, where: str, *, at_least: int) -> FloatArray:
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise InputError(f"{where}: point {row} is not finite; all coordinates are metres")
     return array
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundSeam:
+    """A seam that was found on a whole garment, and its price.
+
+    Attributes:
+        name: as "side left"; where pieces are named by what they cover, their seams in the pattern may be parts of it.
+        length: [m].
+        released: strain energy that it releases, by trial [J]; None where nothing was tried.
+        needed: why the cloth cannot lie flat without it: "opens a tube"; "" where it can.
+    """
+
+    name: str
+    length: float
+    released: float | None = None
+    needed: str = ""
+
+    def as_dict(self) -> dict[str, object]:
+        """Return plain data."""
+        return {"name": self.name, "length_m": self.length, "released_j": self.released, "needed": self.needed}

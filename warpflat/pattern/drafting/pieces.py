@@ -16,7 +16,7 @@ from warpflat.core.short_repr import short_repr
 from warpflat.core.text import size_words, without_side
 from warpflat.flat.surface.overlap import OVERLAP, overlap_width, overlapping
 from warpflat.pattern.drafting.measures import UNITS
-from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, Hole, check_points
+from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, FoundSeam, Hole, check_points
 from warpflat.pattern.drafting.seam_difference import eased_length
 from warpflat.pattern.drafting.words import translate_name
 from warpflat.pattern.drafting.worn import Worn
@@ -24,7 +24,7 @@ from warpflat.pattern.drafting.worn import Worn
 if TYPE_CHECKING:
     pass
 
-__all__ = ["Elastic", "FoundSeam", "Pattern", "Piece", "Seam", "SeamSide", "check_hole", "unknown_size"]
+__all__ = ["Elastic", "Pattern", "Piece", "Seam", "SeamSide", "check_hole", "unknown_size"]
 
 
 #: Kinds of :class:`SeamOpening`.
@@ -251,27 +251,6 @@ class Elastic:
     width: float
     lengths: Mapping[str, float]
     count: int = 1
-
-
-@dataclass(frozen=True, kw_only=True)
-class FoundSeam:
-    """A seam that was found on a whole garment, and its price.
-
-    Attributes:
-        name: as "side left"; where pieces are named by what they cover, their seams in the pattern may be parts of it.
-        length: [m].
-        released: strain energy that it releases, by trial [J]; None where nothing was tried.
-        needed: why the cloth cannot lie flat without it: "opens a tube"; "" where it can.
-    """
-
-    name: str
-    length: float
-    released: float | None = None
-    needed: str = ""
-
-    def as_dict(self) -> dict[str, object]:
-        """Return plain data."""
-        return {"name": self.name, "length_m": self.length, "released_j": self.released, "needed": self.needed}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

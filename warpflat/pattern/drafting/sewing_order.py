@@ -133,7 +133,11 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         places = [place for _, seams in batch for seam in seams for place in seam.places]
         for piece, edge in (*places, *(place for task in tasks for place in (*task.places, *task.uses))):
             sewn.setdefault(piece, set()).add(edge)
-        values: dict[str, Any] = {"below": "", "where": ""}
+        # A lining covers the edges of facings that are sewn to it.
+        free = {piece for task in tasks if task.technique == "facing" for piece, _ in task.sewn} - workshop.lined
+        faced = any(workshop.pieces[piece].role == "facing" for piece in free)
+        neaten = translate("Neaten the inner edges of the facings.") if faced else ""
+        values: dict[str, Any] = {"below": "", "where": "", "neaten": neaten}
         for task in tasks:
             values |= task.values
         values |= {
@@ -186,6 +190,7 @@ class _Workshop(SewingTasks):
         batches: what is sewn in one step: tasks, each with its seams as the maker meets them.
         techniques: of each batch.
         letters: by name of a seam.
+        lined: pieces that are sewn to a lining.
     """
 
     def __init__(self, garment: DraftedGarment, size: str) -> None:
@@ -193,6 +198,7 @@ class _Workshop(SewingTasks):
         self._need()
         ordered = self._sorted()
         self.techniques = [technique for technique, _ in ordered]
+        self.lined = {piece for task in self.tasks if task.technique == "lined_edge" for piece, _ in task.sewn}
         self.letters: dict[str, str] = {}
         self.batches = [[(task, self._sewn(task)) for task in batch] for _, batch in ordered]
 

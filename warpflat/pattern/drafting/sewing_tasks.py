@@ -17,7 +17,7 @@ from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.drafting.words import listed, translate, translate_name
 
-__all__ = ["BANDS", "GATHERED", "Place", "SewingTasks", "Task", "piece_titles", "pieces_of", "techniques"]
+__all__ = ["BANDS", "GATHERED", "Place", "SewingTasks", "Task", "is_flounce", "piece_titles", "pieces_of", "techniques"]
 
 #: A piece and an edge of it, by their names.
 Place = tuple[str, str]
@@ -151,12 +151,18 @@ class SewingTasks:
         return ", ".join(dict.fromkeys(self.titles[name] for name in names))
 
     def edges_called(self, places: Sequence[Place], technique: str) -> str:
-        """Return edges in words: hems by their width, others by their names, raw ones with their lengths."""
+        """Return edges in words: hems by their width, and by their names where one piece has several; raw ones with their lengths."""
         rows: dict[str, list[Place]] = {}
+        widths = {place: length_words(self.pieces[place[0]].edge(place[1]).width, self.units) for place in places}
+        several = {piece for piece, _ in places if len({widths[each] for each in places if each[0] == piece}) > 1}
+        alike = {width for place, width in widths.items() if place[0] in several}
         for piece, edge in places:
-            width = length_words(self.pieces[piece].edge(edge).width, self.units)
-            name = translate_name(without_side(edge).rstrip(" 0123456789"))
-            rows.setdefault(width if technique == "hem" else name, []).append((piece, edge))
+            row, name = widths[piece, edge], translate_name(without_side(edge).rstrip(" 0123456789"))
+            if technique != "hem":
+                row = name
+            elif row in alike:
+                row += f" {name}"
+            rows.setdefault(row, []).append((piece, edge))
         if technique == "bind_raw":
             counts = {row: sum(self._length(place) for place in places) for row, places in rows.items()}
             return ", ".join(f"{row} {length_words(length, self.units)}" for row, length in counts.items())
@@ -419,7 +425,7 @@ class SewingTasks:
                     **values,
                 )
             )
-        add("hang", [name for name, piece in self.pieces.items() if role[name] == "shell" and _is_flounce(piece)])
+        add("hang", [name for name, piece in self.pieces.items() if role[name] == "shell" and is_flounce(piece)])
         for technique, kind in (("hem", "hem"), ("bind_raw", "seam"), ("raw", "cut")):
             add(technique, [], of(role, (kind,)))
         self._close(drafted)
@@ -485,7 +491,7 @@ class SewingTasks:
             task.uses.append(place)
 
 
-def _is_flounce(piece: Piece) -> bool:
+def is_flounce(piece: Piece) -> bool:
     """Return whether a piece is a panel of a flounce."""
     return "flounce" in re.split("[ _]", piece.name)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -51,7 +52,7 @@ class DrawnLine:
         points: #P by 2 [m]; the first of a closed line is not repeated.
         closed: whether it closes.
         name: that the drawing gives it; "" for none.
-        group: the name of the group in which it lies, for an outline of several lines.
+        group: the name of the group in which it lies.
         by_hand: whether a person has named it, so that it is a piece wherever it lies.
     """
 
@@ -221,8 +222,14 @@ def find_outlines(
     check_closed([chain.points for chain in found.chains], list(polygons[taken]), where)
     if found.chains:
         notes.append(left_out([chain.name for chain in found.chains], "open line"))
+    groups = Counter(ring.group for ring, kept in zip(rings, taken.tolist(), strict=True) if kept)
+    # The only piece of a group has its name, whether its outline is one line or several.
     pieces = [
-        DrawnLine(points=points, closed=True, name=ring.name)
+        DrawnLine(
+            points=points,
+            closed=True,
+            name=ring.group if ring.group and groups[ring.group] == 1 and not ring.by_hand else ring.name,
+        )
         for ring, points, kept in zip(rings, whole, taken.tolist(), strict=True)
         if kept
     ]

@@ -37,8 +37,8 @@ from warpflat.pattern.drafting.drafted import (
     SeamReport,
 )
 from warpflat.pattern.drafting.label import Label
-from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.drafting.pieces import Elastic, FoundSeam, Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.drafting.piece_parts import Dart, Edge, FoundSeam, Hole
+from warpflat.pattern.drafting.pieces import Elastic, Pattern, Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
 
 __all__ = [
@@ -330,7 +330,7 @@ class WornEntry(Entry):
 
 
 class FoundSeamEntry(Entry):
-    """A seam that was found on a whole garment (see `warpflat.pattern.drafting.pieces.FoundSeam`)."""
+    """A seam that was found on a whole garment (see `warpflat.pattern.drafting.piece_parts.FoundSeam`)."""
 
     name: Name
     length_m: Length

@@ -15,7 +15,7 @@ from warpflat.pattern.drafting.finished import finished_lengths
 from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
 from warpflat.pattern.drafting.marker import WIDTHS, cloth_needed
 from warpflat.pattern.drafting.measures import cloth_words, length_words
-from warpflat.pattern.drafting.pieces import FoundSeam
+from warpflat.pattern.drafting.piece_parts import FoundSeam
 from warpflat.pattern.drafting.sewing_order import SewingStep, notions, sewing_steps, sewn_seams, tools
 from warpflat.pattern.drafting.sewing_tasks import piece_titles, techniques
 from warpflat.pattern.drafting.words import listed, translate, translate_name

@@ -19,7 +19,7 @@ from warpflat.pattern.export.colours import SMALLEST_SCALE, energy_colours, ener
 from warpflat.pattern.export.figure import DPI, GREY, MARGIN, PAGE_WIDTH, POINT, Pen, Pixels, new_figure, write_figure
 from warpflat.pattern.export.geometry import polylines_of
 from warpflat.pattern.export.letters import all_letters, is_drawn, titles
-from warpflat.pattern.export.picture_drafted import DraftedOutline, DraftedRows
+from warpflat.pattern.export.picture_drafted import DraftedOutline, DraftedRows, worn_words
 from warpflat.pattern.export.picture_garment import Body, GarmentViews
 from warpflat.pattern.export.picture_page import CAPTIONS_ALONE, STRIP, Cell, draw_cell, draw_scale_bar, lay_out
 from warpflat.pattern.export.picture_views import make_facets, pattern_view, surface_view
@@ -82,7 +82,7 @@ def write_picture(
         body: on which all pieces are shown together first, from the front, the side and the back. If not given, each piece is
             shown in space beside its pattern.
         scale: upper end of the colours [J/m2]; if not given, 98 % of the area of all pieces lies below it.
-        drafted: pieces without a surface, as collars and waistbands: their outlines stand below the others.
+        drafted: pieces without a surface, as collars and waistbands: grey on the body, and their outlines below the others.
 
     Raises:
         InputError: the file cannot be written.
@@ -127,7 +127,13 @@ def draw_figure(
             break
     worn = None
     if body is not None:
-        worn = GarmentViews(body, [piece.surface for piece in pieces], [cell.density for cell in cells])
+        worn = GarmentViews(
+            body,
+            [piece.surface for piece in pieces],
+            [cell.density for cell in cells],
+            [surface for each in drafted for surface in each.worn],
+            worn_words(drafted),
+        )
     left = MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR)
     words = pen.measure(_bar_words(scale, density, quantity), _WORDS_SIZE)[0]
     narrowest = left + (
@@ -144,7 +150,7 @@ def draw_figure(
     _draw_colour_bar(pen, scale, density, areas, quantity, left=left, top=height)
     top = height - STRIP
     if worn is not None:
-        worn.draw(pen, MARGIN, top, scale, without=[each.name.partition(", ")[0] for each in drafted])
+        worn.draw(pen, MARGIN, top, scale)
     for cell in cells:
         draw_cell(pen, cell, top, scale, page_scale)
     if rows is not None:

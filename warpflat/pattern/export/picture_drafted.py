@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.patches import Polygon
 
 from warpflat.core.arrays import FloatArray
+from warpflat.flat.surface.mesh import Surface
 from warpflat.pattern.export.figure import GREY, INK, Pen
 from warpflat.pattern.export.picture_page import draw_scale_bar, pack_rows
 
-__all__ = ["DraftedOutline", "DraftedRows"]
+__all__ = ["DraftedOutline", "DraftedRows", "worn_words"]
 
 _CLOTH = (0.95, 0.94, 0.91)
 # Heading, room for a name above each outline, and gaps between outlines [in].
@@ -27,10 +28,19 @@ class DraftedOutline:
     Attributes:
         name: that is written above it.
         points: #P by 2 [m], its sewing line, closed, the first point not repeated.
+        worn: its copies where they are worn; none of what lies within the garment.
     """
 
     name: str
     points: FloatArray
+    worn: Sequence[Surface] = ()
+
+
+def worn_words(pieces: Sequence[DraftedOutline]) -> str:
+    """Return what the body shows of drafted pieces, in words, and which lie within the garment."""
+    within = dict.fromkeys(each.name.partition(", ")[0] for each in pieces if not each.worn)
+    shown = ["grey: drafted for its edges, laid by its seams"] if any(each.worn for each in pieces) else []
+    return "; ".join([*shown, *([f"not shown on the body: {', '.join(within)}"] if within else [])])
 
 
 class DraftedRows:

@@ -26,7 +26,9 @@ _AROUND = 0.06
 _SCRAP = 0.1
 # The garment lies on the mannequin: it is drawn this much nearer to the eye [m].
 _NEARER = 0.012
-_SKIN = (0.88, 0.86, 0.83)
+# Drafted pieces, such as patches, are drawn over it, this much nearer [m].
+_OVER = 0.004
+_SKIN, _DRAFTED = (0.88, 0.86, 0.83), (0.62, 0.64, 0.68)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,14 +47,26 @@ class Body:
 class GarmentViews:
     """A garment on its mannequin, seen from three sides, as a band across the page."""
 
-    def __init__(self, body: Body, surfaces: Sequence[Surface], densities: Sequence[FloatArray]) -> None:
+    def __init__(
+        self,
+        body: Body,
+        surfaces: Sequence[Surface],
+        densities: Sequence[FloatArray],
+        drafted: Sequence[Surface] = (),
+        words: str = "",
+    ) -> None:
         """
         Args:
             body: under it.
             surfaces: the pieces in space.
             densities: #F [J/m2] for each piece.
+            drafted: pieces that were not flattened, as collars and flounces.
+            words: in a line below.
         """
         self._density = np.concatenate(densities)
+        self._words = words
+        self._drafted_faces = sum(len(surface.faces) for surface in drafted)
+        surfaces = [*surfaces, *drafted]
         worn = np.concatenate([surface.vertices for surface in surfaces])
         near, skin_points = crop_body(body, worn)
         counts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
@@ -71,6 +85,7 @@ class GarmentViews:
         self._views = [(title, view_from_side(points, facets, degrees)) for title, degrees in SIDES]
         for _, view in self._views:
             view.points[: len(worn), 2] += _NEARER
+            view.points[len(worn) - sum(len(surface.vertices) for surface in drafted) : len(worn), 2] += _OVER
         self._width = sum(float(view.size[0]) for _, view in self._views)
         self._tallest = max(float(view.size[1]) for _, view in self._views)
         self._area = sum(Silhouette(view).area for _, view in self._views)
@@ -93,17 +108,11 @@ class GarmentViews:
     def _scale_at(self, share: float, room: float) -> float:
         return share * min((room - len(SIDES) * _LEAST_GAP) / self._width, _HEIGHT / self._tallest)
 
-    def draw(self, pen: Pen, left: float, top: float, scale: float, *, without: Sequence[str] = ()) -> None:
-        """Draw the band whose upper left corner is at (`left`, `top`) [in], colours up to `scale` [J/m2].
-
-        Args:
-            pen, left, top, scale: where and how.
-            without: pieces of the garment that the views do not show, as collars; a line below says so.
-        """
-        if without:
-            words = f"not shown on the body: {', '.join(without)}"
-            pen.write(left, top - _HEAD - self._tallest * self._scale - 0.16, words, 8, color=GREY)
-        colours = np.concatenate([energy_colours(self._density, scale), np.tile(_SKIN, (self._skin_faces, 1))])
+    def draw(self, pen: Pen, left: float, top: float, scale: float) -> None:
+        """Draw the band whose upper left corner is at (`left`, `top`) [in], colours up to `scale` [J/m2]."""
+        pen.write(left, top - _HEAD - self._tallest * self._scale - 0.16, self._words, 8, color=GREY)
+        plain = [np.tile(_DRAFTED, (self._drafted_faces, 1)), np.tile(_SKIN, (self._skin_faces, 1))]
+        colours = np.concatenate([energy_colours(self._density, scale), *plain])
         for title, view in self._views:
             width, height = view.size[:2] * self._scale
             left += 0.5 * self._gap

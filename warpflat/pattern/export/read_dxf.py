@@ -19,7 +19,6 @@ from warpflat.core.file_names import plain_label
 from warpflat.core.input_files import FARTHEST, Place, reading
 from warpflat.core.text import find_unused_name, quote_value
 from warpflat.pattern.drafting.corners import find_corners
-from warpflat.pattern.drafting.from_mesh import CORNER
 from warpflat.pattern.drafting.outline_edges import (
     boundary_edges,
     chain_edges,
@@ -408,7 +407,7 @@ def _edges_without_names(
         sewn = max(inner, key=lambda points: shapely.Polygon(points).area)
         # Its lines meet at corners, if they are curves.
         ends = [line.points[[0, -1]] for line in sewing if not line.closed and len(line.points) > 2]
-        corners = np.concatenate([sewn[sorted(find_corners(sewn, CORNER))], *ends])
+        corners = np.concatenate([sewn[sorted(find_corners(sewn))], *ends])
         return with_drawn_allowances(split_outline(sewn, corners, fold), [np.concatenate([ring, ring[:1]])])
     if joined.chains:
         notes.append(

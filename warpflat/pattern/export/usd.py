@@ -39,6 +39,7 @@ from warpflat.pattern.export.usd_prims import (
     bounding_box,
     define_energy_mesh,
     define_group,
+    define_mesh,
     last_values_as_defaults,
     part_path,
     require_usd,
@@ -49,7 +50,10 @@ from warpflat.pattern.export.usd_prims import (
     valid_name,
 )
 
-__all__ = ["FrameWriter", "film_scale"]
+__all__ = ["DRAFTED", "FrameWriter", "film_scale"]
+
+#: Where pieces stand that have no frames.
+DRAFTED = "/World/drafted"
 
 
 @dataclass(kw_only=True)
@@ -130,6 +134,7 @@ class FramePiece:
 
 _LINE_COLOUR = (0.03, 0.05, 0.10)
 _CUT_COLOUR = (0.02, 0.20, 0.75)
+_DRAFTED_COLOUR = (0.34, 0.37, 0.42)
 # The working file is saved when so many frames, of so many vertices together, are in memory; those take some 50 MB.
 _FRAMES, _VERTICES = 16, 2_000_000
 # USD's type of a measure; a bool is an int, too.
@@ -183,7 +188,7 @@ class FrameWriter:
         self._save_after = _VERTICES if save_every is None else 0
         self._scale = float(scale)
         self._pieces: dict[str, FramePiece] = {}
-        self._used_names = {"Looks", "cameras", "light"}
+        self._used_names = {"Looks", "cameras", "light", "drafted"}
         self._bodies: list[FloatArray] = []
         self._unsaved = self._unsaved_vertices = 0
         self._stage: Any = None
@@ -312,6 +317,19 @@ class FrameWriter:
         set_points(shown, points)
         self._bodies.append(np.asarray(points, dtype=np.float64))
         UsdGeom.Imageable(self._stage.OverridePrim(f"{path}/lines")).CreatePurposeAttr(UsdGeom.Tokens.guide)
+
+    def show_drafted(self, surfaces: Sequence[Surface]) -> None:
+        """Show pieces that have no frames, such as collars, where they are worn: meshes of one colour below `/World/drafted`."""
+        from pxr import Gf, Kind, UsdGeom
+
+        taken = set[str]()
+        define_group(self._stage, DRAFTED, kind=Kind.Tokens.component)
+        for surface in surfaces:
+            mesh = define_mesh(self._stage, f"{DRAFTED}/{valid_name(surface.name, taken)}", surface.faces)
+            mesh.GetPrim().SetDisplayName(surface.name)
+            set_points(mesh, surface.vertices)
+            mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*_DRAFTED_COLOUR)])
+            self._bodies.append(surface.vertices)
 
     def write(
         self,

@@ -14,7 +14,7 @@
     const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
   };
-  const ofBody = film.body ? await unpacked(film.body.data) : null;
+  for (const still of film.still) still.bytes = await unpacked(still.data);
   let data = await unpacked(film.data), at = 0;
   const planes = (count, width) => {  // numbers of `width` bytes, lowest bytes first
     const values = width === 4 ? new Uint32Array(count) : new Uint16Array(count);
@@ -56,14 +56,13 @@
       piece.layouts.push({ number, shape, colours, points: placed(piece, steps) });
     }
   }
-  if (film.body) {
-    [data, at] = [ofBody, 0];
-    const body = film.body;
-    body.index = interleaved(planes(3 * body.triangles, 4), 3);
-    const steps = interleaved(planes(3 * body.vertices, 2), 3);
-    body.surface = Float32Array.from(steps, (s, i) => body.space[i % 3] + (s / 65535) * body.space[3]);
-    body.normals = normalsOf(body);
-    body.shades = new Uint8Array(body.vertices);
+  for (const still of film.still) {  // the body, and drafted pieces
+    [data, at] = [still.bytes, 0];
+    still.index = interleaved(planes(3 * still.triangles, 4), 3);
+    const steps = interleaved(planes(3 * still.vertices, 2), 3);
+    still.surface = Float32Array.from(steps, (s, i) => still.space[i % 3] + (s / 65535) * still.space[3]);
+    still.normals = normalsOf(still);
+    still.shades = new Uint8Array(still.vertices);
   }
   function placed(piece, steps) {
     const count = steps.length / 2, points = new Float32Array(3 * count), [x, y, size] = piece.box;
@@ -107,7 +106,7 @@
       for (const p of all) for (let i = k; i < p.length; i += 3) { low = Math.min(low, p[i]); high = Math.max(high, p[i]); }
       return low + high;
     });
-    for (const shape of [...film.pieces.flatMap((piece) => piece.topologies), ...(film.body ? [film.body] : [])]) {
+    for (const shape of [...film.pieces.flatMap((piece) => piece.topologies), ...film.still]) {
       shape.turned = shape.surface.map((value, i) => (i % 3 === 1 ? value : twice[(i % 3) / 2] - value));
       shape.turnedNormals = shape.normals.map((value, i) => (i % 3 === 1 ? value : -value));
     }
@@ -127,14 +126,14 @@
     uniform mat4 view; uniform float pull; out vec3 n; out float s;
     void main() { gl_Position = view * vec4(position, 1.0); gl_Position.z -= pull * gl_Position.w; n = normal; s = share; }`);
   shader(gl.FRAGMENT_SHADER, `
-    in vec3 n; in float s; uniform sampler2D table; uniform vec4 ink; uniform vec3 eye; uniform float fade; uniform float two; uniform float skin; out vec4 colour;
+    in vec3 n; in float s; uniform sampler2D table; uniform vec4 ink; uniform vec3 eye; uniform float fade; uniform float two; uniform vec4 plain; out vec4 colour;
     void main() {
       if (ink.a > 0.0) { colour = vec4(mix(ink.rgb, vec3(0.6), fade), 1.0); return; }
       vec3 base = texture(table, vec2(s * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
       // Shorter is blue, longer is red, no strain is white.
       if (two > 0.0) { float d = 2.0 * s - 1.0; base = d < 0.0 ? mix(vec3(0.97), vec3(0.13, 0.40, 0.67), -d) : mix(vec3(0.97), vec3(0.70, 0.09, 0.17), d); }
       base = mix(base, vec3(0.6), 0.75 * fade);
-      if (skin > 0.0) base = vec3(0.80, 0.77, 0.73);
+      if (plain.a > 0.0) base = plain.rgb;
       float lit = dot(normalize(n), normalize(eye + vec3(-0.3, 0.5, 0.2)));
       if (dot(n, eye) < 0.0) { base = mix(base, vec3(0.55), 0.6); lit = -lit; }
       colour = vec4(base * (0.62 + 0.40 * max(lit, 0.0)), 1.0);
@@ -142,7 +141,7 @@
   gl.linkProgram(program);
   gl.useProgram(program);
   const place = (name) => gl.getUniformLocation(program, name);
-  const [viewAt, pullAt, inkAt, eyeAt, fadeAt, twoAt, skinAt] = ["view", "pull", "ink", "eye", "fade", "two", "skin"].map(place);
+  const [viewAt, pullAt, inkAt, eyeAt, fadeAt, twoAt, plainAt] = ["view", "pull", "ink", "eye", "fade", "two", "plain"].map(place);
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, 256, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, bytesOf(film.colours));
   for (const key of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, key, gl.LINEAR);
@@ -160,10 +159,10 @@
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, values, gl.STATIC_DRAW);
     }
   }
-  if (film.body) {
-    film.body.indexBuffer = buffer();
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, film.body.indexBuffer);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, film.body.index, gl.STATIC_DRAW);
+  for (const still of film.still) {
+    still.indexBuffer = buffer();
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, still.indexBuffer);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, still.index, gl.STATIC_DRAW);
   }
   const attribute = (slot, target, values, size, type, normalised) => {
     gl.bindBuffer(gl.ARRAY_BUFFER, target);
@@ -171,18 +170,18 @@
     gl.enableVertexAttribArray(slot);
     gl.vertexAttribPointer(slot, size, type, normalised, 0, 0);
   };
-  function drawBody(eye) {
-    const body = film.body;
-    const turned = camera.which === "all" && body.turned;
-    attribute(0, points, turned || body.surface, 3, gl.FLOAT, false);
-    attribute(1, normals, turned ? body.turnedNormals : body.normals, 3, gl.FLOAT, false);
-    attribute(2, shares, body.shades, 1, gl.UNSIGNED_BYTE, true);
+  function drawStill(still, eye) {
+    const turned = camera.which === "all" && still.turned;
+    attribute(0, points, turned || still.surface, 3, gl.FLOAT, false);
+    attribute(1, normals, turned ? still.turnedNormals : still.normals, 3, gl.FLOAT, false);
+    attribute(2, shares, still.shades, 1, gl.UNSIGNED_BYTE, true);
     gl.uniform3fv(eyeAt, eye);
-    for (const [place, value] of [[pullAt, 0], [fadeAt, 0], [twoAt, 0], [skinAt, 1]]) gl.uniform1f(place, value);
+    for (const place of [pullAt, fadeAt, twoAt]) gl.uniform1f(place, 0);
     gl.uniform4f(inkAt, 0, 0, 0, 0);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, body.indexBuffer);
-    gl.drawElements(gl.TRIANGLES, body.index.length, gl.UNSIGNED_INT, 0);
-    gl.uniform1f(skinAt, 0);
+    gl.uniform4f(plainAt, ...still.colour, 1);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, still.indexBuffer);
+    gl.drawElements(gl.TRIANGLES, still.index.length, gl.UNSIGNED_INT, 0);
+    gl.uniform4f(plainAt, 0, 0, 0, 0);
   }
   function drawMesh(shape, position, normal, colours, eye) {
     attribute(0, points, position, 3, gl.FLOAT, false);
@@ -281,7 +280,7 @@
   function boxOf(which) {
     const low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
     const grow = (p) => { for (let i = 0; i < p.length; i++) { low[i % 3] = Math.min(low[i % 3], p[i]); high[i % 3] = Math.max(high[i % 3], p[i]); } };
-    if (film.body && which !== "pattern") grow(film.body.surface);
+    if (which !== "pattern") for (const still of film.still) grow(still.surface);
     for (const piece of film.pieces) {
       if (which !== "pattern") grow(piece.topologies[0].surface);
       if (which !== "surface") for (const k of [0, -1]) grow(piece.layouts.at(k).points);
@@ -321,7 +320,9 @@
     gl.uniformMatrix4fv(viewAt, false, matrix());
     const { back } = axes();
     const bodyBox = document.getElementById("body");
-    if (film.body && camera.which !== "pattern" && bodyBox && bodyBox.checked) drawBody(back);
+    for (const still of camera.which === "pattern" ? [] : film.still) {
+      if (still.kind !== "body" || (bodyBox && bodyBox.checked)) drawStill(still, back);
+    }
     for (const piece of film.pieces) {
       const state = stateAt(piece, now);
       const shape = state.shape, turned = camera.which === "all" && shape.turned;

@@ -124,6 +124,10 @@ def _on_border(surface: Surface) -> set[int]:
     return set(border_of(surface).tolist())
 
 
+# Faces around a vertex lie on each other if their normals, by angles, add up to less than this share of these.
+_FOLDED = 1e-6
+
+
 def _ahead(surface: Surface, path: list[int]) -> list[int]:
     """Return the vertices from the end of a path straight on to the border, or none."""
     import potpourri3d
@@ -135,10 +139,18 @@ def _ahead(surface: Surface, path: list[int]) -> list[int]:
     direction = points[-1] - points[min(back, len(path) - 2)]
     size = float(np.linalg.norm(direction))
     reach = 2 * float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
-    if size == 0:
+    triangles = _short_triangles(surface, distinct=True)
+    rows, at = np.nonzero(triangles == path[-1])
+    one, two = (surface.vertices[triangles[rows, (at + k) % 3]] - points[-1] for k in (1, 2))
+    normal = cross(one.T, two.T)
+    sine = norm(normal)
+    angle = np.arctan2(sine, dot(one.T, two.T))
+    facing = norm((normal * (angle / np.maximum(sine, np.finfo(float).tiny))).sum(axis=1))
+    # Where cloth is folded flat the vertex has no tangent plane, in which the path is straight; the library crashes there.
+    if size == 0 or facing <= _FOLDED * angle.sum():
         return []
     try:
-        tracer = potpourri3d.GeodesicTracer(surface.vertices, _short_triangles(surface, distinct=True))
+        tracer = potpourri3d.GeodesicTracer(surface.vertices, triangles)
         trace = np.asarray(tracer.trace_geodesic_from_vertex(path[-1], direction / size * reach))
     except RuntimeError:  # of the library: the triangles are no manifold
         return []

@@ -367,19 +367,18 @@ class _Patch:
     def _all_face_alike(self, new: Sequence[tuple[int, ...]], chain: tuple[int, ...], c: int) -> bool:
         """Return whether the triangles from c that replace the face `chain` have an area and face to its side.
 
-        Where that face is narrow itself or almost, they may be narrow too, if the edge that is given up, from the
-        first to the last of `chain`, is longer than the new ones. So the process ends, at a face that is not narrow.
+        Some may be narrow, too, if the edge that is given up, from the first to the last of `chain`, is longer than the
+        new ones. So the process ends, at a face that is not narrow.
         """
-        thin = self.is_narrow(chain, _SHORT)
-        if thin:
-            p = self.vertices[[c, *chain]]
-            if (np.linalg.norm(p[2:-1] - p[0], axis=1) >= np.linalg.norm(p[-1] - p[1])).any():
-                return False
-            around = [self.normal(self.corners(f)) for v in (c, *chain) for f in self.around(v)]
-            facing = np.sum(around, axis=0)
-        else:
-            facing = self.normal(chain)
-        return all(thin if self.is_narrow(t) else float(self.normal(t) @ facing) > 0 for t in new)
+        narrow = [self.is_narrow(t) for t in new]
+        p = self.vertices[[c, *chain]]
+        if any(narrow) and (np.linalg.norm(p[2:-1] - p[0], axis=1) >= np.linalg.norm(p[-1] - p[1])).any():
+            return False
+        facing = self.normal(chain)
+        if self.is_narrow(chain, _SHORT):
+            # Such a face does not tell the side.
+            facing = np.sum([self.normal(self.corners(f)) for v in (c, *chain) for f in self.around(v)], axis=0)
+        return all(thin or float(self.normal(t) @ facing) > 0 for t, thin in zip(new, narrow, strict=True))
 
     def _across(self, face: int, p: int, q: int) -> int | None:
         """Return the face beside `face` at its side p-q."""
