@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,13 +14,13 @@ from devices import DEVICE
 import warpflat
 from warpflat.app.scene.outside_pattern import OutsideJob
 from warpflat.core.errors import InputError
+from warpflat.garment.draping.continue_pieces import continue_pieces
 from warpflat.garment.draping.correct_pattern import relieve_pattern
 from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
 from warpflat.garment.draping.lift import read_lift, whole_lifts
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
 from warpflat.garment.draping.moved_pattern import moved_outlines
 from warpflat.garment.draping.options import DrapeOptions
-from warpflat.garment.draping.wrap_pieces import continue_pieces, wrap_pieces
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
@@ -267,56 +266,6 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
 
 
-def test_a_side_that_a_corner_parts_leaves_a_symmetric_start():
-    """A flared skirt whose right side is sewn in two seams, the left one in one: both are the same mirrored."""
-    low, high = (0.1, 0.0), (0.7, 0.0)
-    front = polygon("front", [low, high, (0.62, 0.2), (0.59, 0.5), (0.21, 0.5), (0.18, 0.2)])
-    ring = np.array([low, high, (0.62, 0.2), (0.59, 0.5), (0.21, 0.5), (0.18, 0.2), low])
-    back = Piece(
-        name="back",
-        edges=[
-            *(Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(4)), Edge(name="e5", points=ring[4:7]),
-        ],
-    )  # fmt: skip
-    one = Piece(
-        name="front",
-        edges=[front.edges[0], Edge(name="e2", points=ring[1:4]), *front.edges[3:]],
-    )
-    seams = [
-        seam("side left", "front.e2", "back.e5"), seam("lower right", "back.e2", "front.e6"),
-        seam("upper right", "back.e3", "front.e5"),
-    ]  # fmt: skip
-    pieces = {"front": one, "back": back}
-    meshes, welds = mesh_pieces(pieces, seams, 0.02)
-    placed = wrap_pieces(meshes, welds, body_of_size(30.0))
-    for name, points in placed.items():
-        flat = meshes[name].points
-        order = np.lexsort((flat[:, 0], flat[:, 1]))
-        assert abs(points[order, 0].mean()) < 2e-3, name
-        assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=2e-3), name
-
-
-def test_pieces_that_hang_elsewhere_in_their_file_go_around_the_body():
-    """A garment that stands 6 cm to the side and 30 cm behind: each side of it starts as far from the body's middle."""
-    pieces, seams, _ = whole_pieces(tube(0.475, 0.25).pieces[""], tube(0.475, 0.25).seams)
-    meshes, welds = mesh_pieces(pieces, seams, 0.03)
-    body = body_of_size(30.0)
-    starts = []
-    for aside in ([0.0, 0.0, 0.0], [0.06, 0.3, -0.3]):
-        hung = {
-            name: np.column_stack(
-                [sign * (mesh.points[:, 0] - 0.2375), mesh.points[:, 1] + 0.9, np.full(len(mesh.points), 0.2 * sign)]
-            )
-            + aside
-            for (name, mesh), sign in zip(meshes.items(), (1.0, -1.0), strict=True)
-        }
-        starts.append(wrap_pieces(meshes, welds, body, hung=hung, top="waist"))
-    for name, points in starts[1].items():
-        assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=2e-3)
-        np.testing.assert_allclose(points[:, :2], starts[0][name][:, :2], atol=2e-3)
-    assert starts[1]["front"][:, 2].mean() > 0.1 > -0.1 > starts[1]["back"][:, 2].mean()
-
-
 @pytest.mark.parametrize("lower", [0.0, 0.45])
 def test_a_designed_surface_beside_the_body_is_no_start(lower: float):
     """As that of a garment in the axes of its own file, whose shoulders lie at this body's knees."""
@@ -343,63 +292,6 @@ def test_a_designed_surface_beside_the_body_is_no_start(lower: float):
     assert len(notes) == (lower > 0.0)
     # Placed by its seams it starts at the waist.
     assert worn.positions[:, 1].max() > hip
-
-
-def test_a_gathered_skirt_goes_around_the_body_by_its_own_width():
-    """Front and back lie before and behind the body, above each other, though the skirt is 1.6 times as wide as its top."""
-    body = body_of_size(30.0)
-    top, skirt = tube(0.45, 0.2), tube(0.72, 0.5)
-    names = {"front": "front skirt", "back": "back skirt"}
-    lower = [replace(piece, name=names[piece.name]) for piece in skirt.pieces[""]]
-    sides = [
-        seam(f"skirt {a}", f"{b} skirt.e2", f"{c} skirt.e4")
-        for a, b, c in (("left", "front", "back"), ("right", "back", "front"))
-    ]
-    waists = [seam(f"waist {name}", f"{name}.e1", f"{name} skirt.e3", ease=0.45 / 0.72 - 1.0) for name in names]
-    pieces, seams, _ = whole_pieces([*top.pieces[""], *lower], [*top.seams, *sides, *waists])
-    meshes, welds = mesh_pieces(pieces, seams, 0.03)
-    placed = wrap_pieces(meshes, welds, body)
-    for name, points in placed.items():
-        assert np.sign(points[:, 2].mean()) == (1.0 if name.startswith("front") else -1.0)
-        assert abs(points[:, 0].mean()) < 0.01
-    widths = {name: np.ptp(points[:, 0]) for name, points in placed.items()}
-    assert widths["back skirt"] == pytest.approx(1.6 * widths["back"], rel=0.02)
-    assert placed["front skirt"][:, 1].max() == pytest.approx(placed["front"][:, 1].min(), abs=1e-6)
-
-
-def test_trousers_hang_from_the_waist_with_each_leg_on_its_side():
-    """The inside of a leg is no seam behind the body, and the waistband's seam none over a shoulder."""
-    front = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.9), (0.0, 0.9), (-0.05, 0.63)]
-    back = [(0.0, 0.0), (0.2, 0.0), (0.25, 0.63), (0.2, 0.9), (0.0, 0.9)]
-    band = polygon("band", [(0.0, 0.0), (0.8, 0.0), (0.8, 0.05), (0.0, 0.05)])
-    legs = [polygon("front", front, quantity=2), polygon("back", back, quantity=2)]
-
-    def side(piece: str, edge: str, *, mirrored: bool = False, reversed: bool = False) -> SeamSide:
-        return SeamSide(piece=piece, edge=edge, mirrored=mirrored, reversed=reversed)
-
-    seams = [
-        Seam(name=f"{name} {k}", sides=((side("front", a, mirrored=k),), (side("back", b, mirrored=k, reversed=True),)))
-        for name, a, b in (("outside", "e2", "e5"), ("inside", "e5", "e2"))
-        for k in (False, True)
-    ]
-    seams += [
-        Seam(name=f"crotch {piece}", sides=((side(piece, edge, mirrored=True),), (side(piece, edge),)))
-        for piece, edge in (("front", "e4"), ("back", "e3"))
-    ]
-    waist = [("front", "e3", False), ("back", "e4", False), ("back", "e4", True), ("front", "e3", True)]
-    # From the front's middle over the left side: with the mirrored edges, against the others.
-    chain = tuple(side(piece, edge, mirrored=k, reversed=not k) for piece, edge, k in waist)
-    seams.append(Seam(name="waist", sides=((side("band", "e1"),), chain)))
-    body = body_of_size(30.0)
-    pieces, seams, _ = whole_pieces([*legs, band], seams)
-    meshes, welds = mesh_pieces(pieces, seams, 0.03)
-    placed = wrap_pieces(meshes, welds, body)
-    for name in ("front", "back", "front mirrored", "back mirrored"):
-        x, _, z = placed[name].mean(axis=0)
-        assert np.sign(x) == (-1.0 if "mirrored" in name else 1.0)
-        assert np.sign(z) == (1.0 if name.startswith("front") else -1.0)
-    assert placed["band"][:, 1].max() == pytest.approx(body.levels()["waist"].height, abs=1e-6)
-    assert np.ptp(placed["band"][:, 0]) == pytest.approx(np.ptp(np.concatenate(list(placed.values()))[:, 0]), rel=0.1)
 
 
 def test_a_tube_that_nothing_holds_falls_off():

@@ -19,6 +19,7 @@ from warpflat.garment.construction.finishing import Finishing
 from warpflat.garment.construction.form_garment import FormGarment, flatten_form
 from warpflat.garment.construction.pockets import Pocket
 from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
 from warpflat.garment.draping.drape_pattern import Placement, drape_pattern, place_drafted
 from warpflat.garment.draping.lift import surface_lift
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
@@ -27,7 +28,6 @@ from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.garment.draping.wrap_pieces import continue_pieces, hood_beside_head
 from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.garment.mannequin.head import head_of
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
@@ -508,6 +508,8 @@ def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
         return np.column_stack([-radius * np.sin(angle), height, -radius * np.cos(angle)])
 
     monkeypatch.setattr("warpflat.garment.draping.drape_pattern.sew_around", kept)
+    # The shell, a bare cylinder, is worn where it is.
+    monkeypatch.setattr("warpflat.garment.draping.drape_pattern._elsewhere", lambda *_: "")
     for role in ("hood", "collar"):
         pattern = replace(pattern, pieces={"": [shell, replace(hood, role=role)]})
         worn, _ = drape_pattern(

@@ -44,10 +44,12 @@ class Body:
         )
 
     def move(self, vertices: FloatArray) -> None:
-        """Move the surface that is searched to #V by 3 places [m]; `vertices` stay what they were."""
+        """Move the surface that is searched to #V by 3 places [m]; `vertices` and normals stay what they were.
+
+        A body that is drawn in far folds in places, where its own normals would look inwards.
+        """
         self.mesh.points.assign(vertices.astype(np.float32))
         self.mesh.refit()
-        self.normals.assign(vertex_normals(vertices, self.triangles).astype(np.float32))
 
     def nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the nearest place of the surface (#P by 3 [m]) and its interpolated unit normal there, for #P by 3 points [m]."""

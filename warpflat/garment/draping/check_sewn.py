@@ -21,7 +21,7 @@ __all__ = ["check_sewn", "pierced_edges"]
 
 # Cloth is tangled if more than this share of its edges pierce it elsewhere, or more than this share of it is stretched by so much.
 _PIERCED, _TORN = 0.1, (0.05, 0.5)
-_REMEDY = 'say in [[pieces]] where it is, as at = "left arm", and in top how high it hangs, or draw it where it is worn'
+_REMEDY = 'say in [[pieces]] where it is, as at = "front", and in top how high it hangs, or draw it where it is worn'
 
 
 def pierced_edges(cloth: SewnCloth, positions: FloatArray) -> tuple[BoolArray, IntArray]:

@@ -13,7 +13,8 @@ from scipy.spatial import Delaunay
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.compile import start_warp
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.surface.mesh import Surface
@@ -21,11 +22,13 @@ from warpflat.flat.surface.mirror import mirror_plane
 from warpflat.flat.surface.normals import vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
+from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head
 from warpflat.garment.draping.drape_garment import held_vertices, hip_level, thread_elastics
+from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
-from warpflat.garment.draping.limbs import around_legs, inside_arms, limb_lines, on_arm
+from warpflat.garment.draping.limbs import limb_lines, on_arm
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces, sewn_places, welded_vertices
-from warpflat.garment.draping.openings import find_openings, limbs_of
+from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
@@ -33,30 +36,31 @@ from warpflat.garment.draping.sew_around import sew_around
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
-from warpflat.garment.draping.wrap_pieces import (
-    UNITS,
-    continue_pieces,
-    find_roles,
-    hang_from_edges,
-    hood_beside_head,
-    wrap_pieces,
-)
 from warpflat.garment.mannequin.head import head_of
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.drafting.sewing_tasks import is_flounce
 from warpflat.pattern.drafting.whole_pieces import MIRRORED, whole_pieces
 
-__all__ = ["Placement", "drape_pattern", "place_drafted", "place_pieces"]
+__all__ = ["Placement", "drape_pattern", "lay_pieces", "place_drafted"]
 
+# Where a file's units stand.
+_UNITS = (
+    "are its units right (in DXF the text UNITS or $INSUNITS, in SVG width and viewBox, in GarmentCode units_in_meter)?"
+)
 # The largest piece of a garment is between so short and so long [m].
 _SIZES = (0.05, 10.0)
 # A designed surface does not belong to a body where more than this share of it lies so deep [m] within.
 _WITHIN, _DEEP = 0.05, 0.01
 # Nor where its top, from this share of its vertices on, lies so far [m] off, or less than this share of it looks as the skin does.
 _TOP, _OFF, _ALIKE = 0.9, 0.05, 0.75
-# Pieces are sewn on a mesh of this spacing at least [m]. Cloth that starts so far above the neck's base [m] is worn around a head.
-_COARSE, _OVER_NECK = 0.02, 0.1
+# Pieces are sewn on a mesh of this spacing at least [m]. Cloth around less than this share of the body's waist is no garment for it.
+_COARSE, _LEAST_GIRTH = 0.02, 0.5
+# Where a piece lies that is said, or named, to be there.
+_LOOKS = {
+    "front": np.array([0.0, 0.0, 1.0]), "back": np.array([0.0, 0.0, -1.0]),
+    "left arm": np.array([1.0, 0.0, 0.0]), "right arm": np.array([-1.0, 0.0, 0.0]),
+}  # fmt: skip
 # What is sewn to less than this share of its length is gathered or pleated. A patch lies this far over its piece [m].
 _FULL, _ON_TOP = 0.85, 0.0015
 # A flounce stands out by this share of its length, and what is gathered or pleated by this one.
@@ -136,7 +140,7 @@ def drape_pattern(
     if not _SIZES[0] <= max(wide, high) <= _SIZES[1]:
         raise InputError(
             f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
-            f"and {1e3 * _SIZES[1]:.0f} mm long: {UNITS}"
+            f"and {1e3 * _SIZES[1]:.0f} mm long: {_UNITS}"
         )
     meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
     start_warp()
@@ -317,35 +321,28 @@ def _sew(
         meshes, welds = mesh_pieces(pieces, seams, spacing, closures(pieces))
     except InputError:
         meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
-    openings = find_openings(meshes, welds)
-    sleeves, hood = find_roles(meshes, welds, {name: piece.at for name, piece in pieces.items()}, openings)
-    # A hood hangs where its file says, or is worn up.
-    if any(piece.placement is None for piece in pieces.values()) and head_of(body) is not None:
-        pieces = {name: replace(piece, role="hood") if name in hood else piece for name, piece in pieces.items()}
-        laid = {name: mesh for name, mesh in meshes.items() if name not in hood}
-    else:
-        laid = meshes
-    placed = place_pieces(pieces, laid, welds, body, top=placement.top)
-    placed = _continued(placed, pieces, meshes, welds, body)
-    cloth, lines = _cloth(pieces, meshes, welds, placed, fabric, turned), limb_lines(body)
-    start = cloth.designed
-    high = max(float(points[:, 1].max()) for points in placed.values())
-    hooded = high > body.line("collar")[:, 1].max() + _OVER_NECK or any(each.role == "hood" for each in pieces.values())
-    solid = _worn_body(body, head=hooded, device=device)
-    # The trunk starts inside the arms, and what begins below them passes through.
-    on_arms = set[str]().union(*sleeves)
+    buttons, lines = closures(pieces), limb_lines(body)
+    openings = find_openings(meshes, welds, welds[-1] if buttons else ())
+    girth, around = (
+        polyline_length(body.line("waist"), closed=True),
+        max((each.length for each in openings), default=np.inf),
+    )
+    if around < _LEAST_GIRTH * girth:
+        raise InputError(
+            f"the pattern goes {1e3 * around:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {_UNITS} Is a piece missing?"
+        )
+    cloth, laid = lay_pieces(pieces, meshes, welds, openings, body, fabric=fabric, turned=turned, top=placement.top)
+    start, limbs = laid.positions, laid.limbs
+    is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
+    solid = _worn_body(body, head=is_hooded, device=device)
+    # What begins below the arms passes through.
     armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
-    sleeved, below = np.zeros(len(start), dtype=bool), np.zeros(len(start), dtype=bool)
-    for name, rows in cloth.piece_vertices.items():
-        sleeved[cloth.welded[rows]] |= name in on_arms
-        below[cloth.welded[rows]] |= placed[name][:, 1].max() < armpit
-    limbs = limbs_of(openings, start, on_arms)
-    hems = [each.vertices for each, limb in zip(openings, limbs, strict=True) if limb.endswith("leg")]
-    start = around_legs(start, cloth.faces, hems, lines) if len(hems) == 2 else start
-    start = np.where(sleeved[:, None], start, inside_arms(start, lines))
+    below = np.zeros(len(start), dtype=bool)
+    for rows in cloth.piece_vertices.values():
+        below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
     thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
-    sewn = sew_around(cloth, start, thin)
-    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(closures(pieces)))
+    sewn = sew_around(cloth, start, thin, level=laid.level)
+    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(buttons))
     lifts = {
         name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
         for name, mesh in meshes.items()
@@ -454,28 +451,57 @@ def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh],
     return ""
 
 
-def place_pieces(
+def lay_pieces(
     pieces: Mapping[str, Piece],
     meshes: Mapping[str, FlatMesh],
     welds: Sequence[Sequence[Weld]],
+    openings: Sequence[Opening],
     body: Mannequin,
     *,
+    fabric: Fabric,
+    turned: frozenset[str] = frozenset(),
     top: str | float | None = None,
-) -> dict[str, FloatArray]:
-    """Return where the points of pieces start around a body (#P by 3 [m] each): see `wrap_pieces`.
+) -> tuple[SewnCloth, Laid]:
+    """Return the sewn cloth of pieces, and how it is laid around a body: see `lay_around`.
+
+    What lies in front and high is told by the places of a file, else by `at`, names, and how pieces are drawn.
 
     Raises:
-        InputError: as there.
+        InputError: as there, or the level `top` is unknown.
     """
+    heights = {name: level.height for name, level in body.levels().items()}
+    if isinstance(top, str) and top not in heights:
+        raise InputError(f"top: level {top!r} is unknown: {nearest(top, heights)}")
     hung = {
         name: np.column_stack([mesh.points, np.ones(len(mesh.points))]) @ place.T
         for name, mesh in meshes.items()
         if (place := pieces[name].placement) is not None
     }
-    levels = {
-        name: (level, float(np.mean([points[meshes[name].edges[edge], 1].mean() for edge in pieces[name].levels])))
-        for name, points in hung.items()
-        for level in pieces[name].levels.values()
-    }
-    at = {name: piece.at for name, piece in pieces.items() if piece.at}
-    return wrap_pieces(meshes, welds, body, at=at, hung=hung, levels=levels, top=top)
+    is_hung = len(hung) == len(meshes)
+    everything = np.concatenate([*hung.values(), np.zeros((0, 3))]) if is_hung else np.zeros((1, 3))
+    middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
+    cloth = _cloth(
+        pieces, meshes, welds, {name: np.zeros((len(m.points), 3)) for name, m in meshes.items()}, fabric, turned
+    )
+    up, hints = np.zeros(len(cloth.designed)), np.zeros((len(cloth.designed), 3))
+    for name, rows in cloth.piece_vertices.items():
+        own, flat = cloth.welded[rows], meshes[name].points
+        told = pieces[name].at or next((side for side in ("front", "back") if side in name.lower()), "")
+        up[own] = hung[name][:, 1] if is_hung else flat[:, 1] - flat[:, 1].mean()
+        hints[own] = np.sign(hung[name] - middle) * [1.0, 0.0, 1.0] if is_hung else _LOOKS.get(told, np.zeros(3))
+    # A file's own levels, where it has some.
+    off = [
+        heights[level] - float(hung[name][meshes[name].edges[edge], 1].mean())
+        for name in hung
+        for edge, level in pieces[name].levels.items()
+    ]
+    shoulder = max(float(body.line(f"shoulder {side}")[:, 1].max()) for side in ("left", "right"))
+
+    def hangs_at(high: float) -> float:
+        if top is not None:
+            return heights[top] if isinstance(top, str) else float(top)
+        if is_hung and off:
+            return high + float(np.mean(off))
+        return high if is_hung and heights["hip"] < high < shoulder else heights["waist"]
+
+    return cloth, lay_around(cloth, openings, body, limb_lines(body), up=up, hints=hints, top=hangs_at)

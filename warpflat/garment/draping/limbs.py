@@ -1,26 +1,19 @@
-"""The limbs of a body as lines: cloth starts around them, and the openings of a sewn garment must be linked with them."""
+"""The limbs of a body as lines: cloth is laid around them, and the openings of a sewn garment must be linked with them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["around_legs", "inside_arms", "limb_lines", "links", "on_arm"]
+__all__ = ["limb_lines", "links", "on_arm"]
 
 # A limb goes on by so much [m] beyond its end, the face is so far above the neck, and an arm is nowhere thicker than this [m].
 _BEYOND, _FACE, _ARM = 3.0, 0.15, 0.09
-# Cloth of the trunk starts so far inside the line of an arm, and beside the middle, at least [m].
-_INSIDE, _LEAST = 0.04, 0.1
-# Steps down from the crotch to where two legs part, way from there to where a leg's line counts fully, and distance of cloth from the
-# middle at least [m].
-_STEP, _RAMP, _OFF = 0.02, 0.10, 0.005
 
 
 def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
@@ -75,51 +68,3 @@ def on_arm(points: FloatArray, lines: Mapping[str, FloatArray]) -> BoolArray:
         along = (points - armhole) @ way
         found |= (along > 0.0) & (np.linalg.norm(points - armhole - along[:, None] * way, axis=1) < _ARM)
     return found
-
-
-def inside_arms(points: FloatArray, lines: Mapping[str, FloatArray]) -> FloatArray:
-    """Return cloth of the trunk (#P by 3 [m]) moved sideways, so that what is below the armholes is inside both arms."""
-    x, y, z = points.T
-    for limb in ("left arm", "right arm"):
-        _, armhole, wrist, _ = lines[limb]
-        side, along = np.sign(armhole[0]), (armhole[1] - y) / (armhole[1] - wrist[1])
-        most = np.maximum(side * (armhole[0] + along * (wrist[0] - armhole[0])) - _INSIDE, _LEAST)
-        x = np.where((along > 0.0) & (side * x > most), side * most, x)
-    return np.column_stack([x, y, z])
-
-
-def around_legs(
-    points: FloatArray, faces: IntArray, hems: Sequence[IntArray], lines: Mapping[str, FloatArray]
-) -> FloatArray:
-    """Return sewn cloth (#V by 3 [m]) with its two legs moved sideways around the legs of a body, from the crotch down.
-
-    Cloth of a leg is what hangs together with its hem below the height from which on both hang together. It is narrowed where it reaches
-    over the middle.
-
-    Args:
-        points: #V by 3 [m].
-        faces: #F by 4, of the sewn cloth.
-        hems: the vertices of the openings of both legs.
-        lines: the body's limbs.
-    """
-    top = min(lines["left leg"][1, 1], lines["right leg"][1, 1])
-    i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
-    high = np.maximum(points[i, 1], points[j, 1])
-    for cut in np.arange(top, points[np.concatenate(list(hems)), 1].max(), -_STEP):
-        below = high < cut
-        graph = coo_array((np.ones(below.sum()), (i[below], j[below])), shape=(len(points),) * 2)
-        part = connected_components(graph, directed=False)[1]
-        if part[hems[0][0]] != part[hems[1][0]]:
-            break
-    else:
-        return points
-    x, y = points[:, 0].copy(), points[:, 1]
-    for hem in hems:
-        side = "left" if x[hem].mean() > 0.0 else "right"
-        rows = np.flatnonzero((part == part[hem[0]]) & (y < cut))
-        line = lines[f"{side} leg"][:0:-1]
-        axis, middle = np.interp(y[rows], line[:, 1], line[:, 0]), 0.5 * (x[hem].min() + x[hem].max())
-        narrowed = np.minimum(1.0, (abs(axis) - _OFF) / max(0.5 * float(np.ptp(x[hem])), 1e-6))
-        goes = axis + (x[rows] - middle) * narrowed
-        x[rows] += (goes - x[rows]) * np.clip((cut - y[rows]) / _RAMP, 0.0, 1.0)
-    return np.column_stack([x, points[:, 1:]])

@@ -1,21 +1,18 @@
-"""The openings of a sewn garment, and around which limb each goes."""
+"""The openings of a sewn garment."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops, orient
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, welded_vertices
 
-__all__ = ["Opening", "find_openings", "limbs_of"]
-
-# An opening whose middle lies this far aside, as a share of its width, is that of a limb.
-_ASIDE = 0.3
+__all__ = ["Opening", "find_openings"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,8 +32,18 @@ class Opening:
     turn: float
 
 
-def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> list[Opening]:
-    """Return the openings of pieces that are sewn together, the longest first; none where their seams make no surface."""
+def find_openings(
+    meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], buttons: Sequence[Weld] = ()
+) -> list[Opening]:
+    """Return the openings of pieces that are sewn together, the longest first; none where their seams make no surface.
+
+    A border that runs along both fronts of a buttoned garment is two: one beyond the first button, one beyond the last.
+
+    Args:
+        meshes: the pieces.
+        welds: for each seam the vertices that it joins.
+        buttons: those of them that join points inside two pieces.
+    """
     welded, begins = welded_vertices(meshes, welds)
     faces = np.concatenate([welded[mesh.triangles + begins[name]] for name, mesh in meshes.items()])
     try:
@@ -58,8 +65,9 @@ def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]
         pairs = np.sort(welded[edges + begins[name]], axis=1).tolist()
         lengths |= {(a, b): (length, name) for (a, b), length in zip(pairs, along, strict=True)}
     found = []
-    for loop in loops:
-        on = [lengths[a, b] for a, b in np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()]
+    for loop in [part for whole in loops for part in _between_buttons(whole, meshes, welded, begins, buttons)]:
+        sides = np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()
+        on = [lengths[a, b] for a, b in sides if (a, b) in lengths]
         pieces = frozenset(name for _, name in on)
         turn = float((np.pi - angle[loop]).sum())
         found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces, turn=turn))
@@ -67,25 +75,26 @@ def find_openings(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]
     return sorted(found, key=lambda each: (-round(each.length, 6), int(each.vertices.min())))
 
 
-def limbs_of(openings: Sequence[Opening], positions: FloatArray, on_arms: Collection[str]) -> list[str]:
-    """Return around which limb each opening goes, such as "left arm"; "" for the trunk and the neck.
-
-    Args:
-        openings: of the garment.
-        positions: #V by 3, where the sewn garment starts [m].
-        on_arms: pieces of sleeves.
-    """
-    middles = [positions[each.vertices, :2].mean(axis=0) for each in openings]
-    widths = [np.ptp(positions[each.vertices, 0]) for each in openings]
-    aside = [abs(middle[0]) > _ASIDE * width for middle, width in zip(middles, widths, strict=True)]
-    sleeved = [bool(each.pieces & set(on_arms)) for each in openings]
-    # Without sleeves arms are above the lowest opening of the trunk, or above the legs.
-    free = [middle[1] for middle, is_aside in zip(middles, aside, strict=True) if is_aside]
-    centred = [middle[1] for middle, is_aside in zip(middles, aside, strict=True) if not is_aside]
-    least = float(np.mean(free)) if len(free) > 2 else min(centred, default=0.0)
-    limbs = []
-    for middle, is_aside, is_sleeve in zip(middles, aside, sleeved, strict=True):
-        side = "left" if middle[0] > 0.0 else "right"
-        is_arm = is_sleeve or (middle[1] > least and not any(sleeved))
-        limbs.append(f"{side} {'arm' if is_arm else 'leg'}" if is_aside or is_sleeve else "")
-    return limbs
+def _between_buttons(
+    loop: IntArray,
+    meshes: Mapping[str, FlatMesh],
+    welded: IntArray,
+    begins: Mapping[str, int],
+    buttons: Sequence[Weld],
+) -> list[IntArray]:
+    """Return the parts of a border that lie beyond the first and the last of the buttons that join it to itself."""
+    parts, ends = [loop], list[tuple[int, ...]]()
+    for layers in buttons:
+        nearest = []
+        for name, vertex in layers:
+            own = welded[begins[name] : begins[name] + len(meshes[name].points)]
+            far = np.linalg.norm(meshes[name].points - meshes[name].points[vertex], axis=1)
+            nearest.append(int(own[np.where(np.isin(own, loop), far, np.inf).argmin()]))
+        for k, part in enumerate(parts):
+            if len({name for name, _ in layers}) == 2 and nearest[0] != nearest[1] and np.isin(nearest, part).all():
+                first, last = sorted(int(np.flatnonzero(part == end)[0]) for end in nearest)
+                parts[k : k + 1] = [part[first : last + 1], np.concatenate([part[last:], part[: first + 1]])]
+                ends.append(tuple(nearest))
+                break
+    # What lies between two buttons is sewn to neither.
+    return [part for part in parts if sum(bool(np.isin(pair, part).all()) for pair in ends) < 2]

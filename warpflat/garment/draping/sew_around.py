@@ -16,7 +16,7 @@ from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.draping.thin_body import ThinBody
 
-__all__ = ["sew_around", "stretches"]
+__all__ = ["AsRigid", "sew_around", "stretches"]
 
 # Rounds around the thin body, while it grows, and around the whole one. The factor is renewed after so many, or where contact comes to
 # more than this share of the vertices.
@@ -25,12 +25,17 @@ _GATHER, _GROW, _SETTLE, _RENEWED, _NEW_CONTACT = 60, 60, 30, 5, 0.02
 _OFF, _REACH = 0.002, 0.12
 # Stiffness over the cloth's: of inertia, of contact, of what stays, and of bending.
 _INERTIA, _HOLD, _STAY, _BEND = 0.02, 1.0, 1e3, 0.02
-# Heights go back to those of the start by this share, until the body has grown. What hangs free falls by so much in a round [m].
+# What hangs from no shoulder goes back to its height by this share until the body has grown. What hangs free falls by so much [m] a round.
 _KEEP, _FALL = 0.1, 0.003
 
 
 def sew_around(
-    cloth: SewnCloth, start: FloatArray, body: Body | ThinBody, *, fixed: BoolArray | None = None
+    cloth: SewnCloth,
+    start: FloatArray,
+    body: Body | ThinBody,
+    *,
+    fixed: BoolArray | None = None,
+    level: BoolArray | None = None,
 ) -> FloatArray:
     """Draw sewn cloth together around a body, nearly without strain.
 
@@ -39,40 +44,61 @@ def sew_around(
         start: #V by 3, where its vertices are [m].
         body: what it stays outside of; a thin one grows.
         fixed: #V, the vertices that stay there.
+        level: #V, those that keep their height until the body has grown.
 
     Returns:
         #V by 3 [m].
     """
-    derivative, stiffness = _derivative(cloth)
-    membrane = derivative.T @ diags_array(stiffness) @ derivative
-    hold = membrane.diagonal().mean()
-    # Bending is the squared Laplacian at inner vertices, scaled by the mesh so that it weighs as the membrane does.
-    laplacian, of_vertex = cloth.laplacian()
-    area = cloth.vertex_areas()
-    inner = np.where(of_vertex > 0.0, area.mean() / np.maximum(area, 0.2 * area.mean()), 0.0)
-    whole = membrane + _BEND * (laplacian.T @ diags_array(inner) @ laplacian)
+    rigid = AsRigid(cloth)
     gather, grow = (_GATHER, _GROW) if isinstance(body, ThinBody) else (0, 0)
-    stays = np.zeros(len(start), bool) if fixed is None else fixed
-    x, touching, solve = start.copy(), np.zeros(len(start), bool), None
+    stays, kept = (np.zeros(len(start), bool) if given is None else given for given in (fixed, level))
+    x, touching = start.copy(), np.zeros(len(start), bool)
     for number in range(gather + grow + _SETTLE):
         if isinstance(body, ThinBody) and number <= gather + grow:
             body.grow(float(np.clip((number - gather) / grow, 0.0, 1.0)))
         centre, normal = body.nearest(x)
         depth = np.einsum("ij,ij->i", x - centre, normal)
         near = (depth < _OFF) & (np.linalg.norm(x - centre, axis=1) < _REACH)
-        if solve is None or number % _RENEWED == 0 or (near & ~touching).sum() > _NEW_CONTACT * len(x):
+        if number % _RENEWED == 0 or (near & ~touching).sum() > _NEW_CONTACT * len(x):
             touching = near
-            pull = hold * (_INERTIA + _HOLD * touching + _STAY * stays)
-            solve = factor_symmetric(whole + diags_array(pull))
+            rigid.hold(_INERTIA + _HOLD * touching + _STAY * stays)
         target = np.where((near & touching)[:, None], x + (_OFF - depth)[:, None] * normal, x)
         if grow:
+            grown = number >= gather + grow
             target[:, 1] += (
-                _KEEP * (start[:, 1] - x[:, 1]) * (number < gather + grow) - _FALL * (number >= gather // 2) * ~near
+                _KEEP * (start[:, 1] - x[:, 1]) * (kept & (not grown)) - _FALL * (number >= gather // 2) * ~near
             )
         target[stays] = start[stays]
-        turned = _nearest_isometries((derivative @ x).reshape(-1, 2, 3))
-        x = solve(derivative.T @ (stiffness[:, None] * turned.reshape(-1, 3)) + pull[:, None] * target)
+        x = rigid.step(x, target)
     return x
+
+
+class AsRigid:
+    """Cloth that is drawn to targets as rigidly as possible.
+
+    Attributes:
+        membrane: #V by #V, the Dirichlet form of the flat cloth.
+    """
+
+    def __init__(self, cloth: SewnCloth) -> None:
+        self._derivative, self._stiffness = _derivative(cloth)
+        self.membrane = (self._derivative.T @ diags_array(self._stiffness) @ self._derivative).tocsr()
+        # Bending is the squared Laplacian at inner vertices, scaled by the mesh so that it weighs as the membrane does.
+        laplacian, of_vertex = cloth.laplacian()
+        area = cloth.vertex_areas()
+        inner = np.where(of_vertex > 0.0, area.mean() / np.maximum(area, 0.2 * area.mean()), 0.0)
+        self._whole = self.membrane + _BEND * (laplacian.T @ diags_array(inner) @ laplacian)
+
+    def hold(self, weight: FloatArray) -> None:
+        """Hold vertices at their targets, by #V weights over the mean stiffness of the cloth."""
+        self._pull = self.membrane.diagonal().mean() * weight
+        self._solve = factor_symmetric(self._whole + diags_array(self._pull))
+
+    def step(self, x: FloatArray, target: FloatArray) -> FloatArray:
+        """Return the places after a step from x to targets, #V by 3 each [m]."""
+        turned = _nearest_isometries((self._derivative @ x).reshape(-1, 2, 3)).reshape(-1, 3)
+        right = self._derivative.T @ (self._stiffness[:, None] * turned) + self._pull[:, None] * target
+        return np.asarray(self._solve(right))
 
 
 def stretches(cloth: SewnCloth, positions: FloatArray) -> FloatArray:

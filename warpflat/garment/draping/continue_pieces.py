@@ -1,0 +1,208 @@
+"""Pieces that were drafted flat go on from what they are sewn to: bands, collars, cuffs, pockets, hoods."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld
+
+__all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]
+
+# What falls from an edge hangs upright where the cloth above leads downwards by this share.
+_HANGS = -0.8
+# What is drafted follows so many of the nearest vertices of its seams.
+_NEXT = 4
+
+
+@dataclass(frozen=True)
+class _Join:
+    """Two pieces and the vertices of each that a seam joins."""
+
+    pieces: tuple[str, str]
+    vertices: tuple[IntArray, IntArray]
+
+
+def _joins(welds: Sequence[Sequence[Weld]], names: Sequence[str]) -> list[_Join]:
+    """Return what each seam joins of the named pieces, a piece to itself too."""
+    joins = []
+    for seam in welds:
+        pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
+        for (piece, vertex), *others in seam:
+            for other, its in others:
+                if piece in names and other in names:
+                    pairs.setdefault((piece, other), []).append((vertex, its))
+        for both, rows in pairs.items():
+            if len(rows) > 1:
+                first, second = np.array(rows, dtype=np.int32).T
+                joins.append(_Join(both, (first, second)))
+    return joins
+
+
+def _both_ways(joins: Sequence[_Join]) -> list[tuple[tuple[str, str], tuple[IntArray, IntArray]]]:
+    """Return pieces and vertices of each join, either first."""
+    return [pair for join in joins for pair in ((join.pieces, join.vertices), (join.pieces[::-1], join.vertices[::-1]))]
+
+
+def continue_pieces(
+    placed: Mapping[str, FloatArray],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    turned_down: Collection[str] = (),
+) -> dict[str, FloatArray]:
+    """Place bands, collars, pockets and whatever else was drafted flat: as if the cloth that they are sewn to ran on beyond the seam.
+
+    The piece with the longest seams to those that lie comes first.
+
+    Args:
+        placed: by piece the points (#P by 3 [m]) of those that lie.
+        meshes: all pieces.
+        welds: for each seam the vertices that it joins.
+        turned_down: pieces that lie back on what they are sewn to, as the fall of a collar on its stand.
+
+    Raises:
+        InputError: a piece hangs together with none that lies.
+    """
+    found = dict(placed)
+    while lost := [name for name in meshes if name not in found]:
+        # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
+        sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
+        for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+            if name in lost and other in found:
+                across = _border_frames(meshes[name], own).transpose(0, 2, 1)
+                # Into this piece is out of the other one, or back into it.
+                flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
+                sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
+        lengths = {
+            name: sum(
+                float(np.linalg.norm(np.diff(meshes[name].points[own], axis=0), axis=1).sum()) for own, _, _ in rows
+            )
+            for name, rows in sewn.items()
+        }
+        name = max(lost, key=lambda each: lengths[each])
+        if not sewn[name]:
+            raise InputError(f"piece {name!r} is sewn to no piece that has a designed surface")
+        own, place, way = (np.concatenate(column) for column in zip(*sewn[name], strict=True))
+        flat = meshes[name].points
+        far, near = cKDTree(flat[own]).query(flat, k=min(_NEXT, len(own)))
+        weight = 1.0 / np.maximum(far, 1e-6) ** 2
+        weight /= weight.sum(axis=1, keepdims=True)
+        off = flat[:, None] - flat[own[near]]
+        found[name] = np.einsum("pk,pka->pa", weight, place[near] + np.einsum("pkab,pkb->pka", way[near], off))
+    return found
+
+
+def hang_from_edges(
+    placed: Mapping[str, FloatArray],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    falling: Mapping[str, float],
+) -> dict[str, FloatArray]:
+    """Place flounces and ruffles as a smooth skirt that falls from the edges to which they are sewn, without their folds.
+
+    Args:
+        placed: by piece the points (#P by 3 [m]) of those that lie.
+        meshes: all pieces.
+        welds: for each seam the vertices that it joins.
+        falling: the pieces that are placed, with the share of its length by which each stands out.
+
+    Returns:
+        By piece its points, #P by 3 [m].
+    """
+    rows: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in falling}
+    for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+        if name in falling and other in placed:
+            out = -_border_frames(meshes[other], its)[:, :, 1:]
+            down = (_slopes(meshes[other], placed[other])[its] @ out)[:, :, 0]
+            rows[name].append((own, placed[other][its], down))
+    found, sewn = {}, {name: seams for name, seams in rows.items() if seams}
+    middle = np.concatenate([place for seams in sewn.values() for _, place, _ in seams] or [np.zeros((1, 3))]).mean(
+        axis=0
+    )
+    for name, seams in sewn.items():
+        flat, best = meshes[name].points, np.full(len(meshes[name].points), np.inf)
+        found[name] = np.empty((len(flat), 3))
+        for own, place, down in seams:
+            a, b = flat[own[:-1]], flat[own[1:]]
+            share = np.einsum("psk,sk->ps", flat[:, None] - a, b - a) / np.maximum(((b - a) ** 2).sum(axis=1), 1e-12)
+            share = np.clip(share, 0.0, 1.0)
+            off = np.linalg.norm(flat[:, None] - a - share[..., None] * (b - a), axis=2)
+            nearest_side = off.argmin(axis=1)
+            points, here = np.arange(len(flat)), off.min(axis=1) < best
+            at, t = nearest_side[here], share[points, nearest_side][here, None]
+            start, way = ((1.0 - t) * row[at] + t * row[at + 1] for row in (place, down))
+            # On the trunk it hangs, on an arm it runs on.
+            way = np.where((way[:, 1] < _HANGS * np.linalg.norm(way, axis=1))[:, None], [0.0, -1.0, 0.0], way)
+            out = (start - middle) * [1.0, 0.0, 1.0]
+            way = way + falling[name] * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+            way /= np.linalg.norm(way, axis=1, keepdims=True)
+            best = np.minimum(best, off.min(axis=1))
+            found[name][here] = start + best[here, None] * way
+    return found
+
+
+def hood_beside_head(
+    placed: Mapping[str, FloatArray],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    hood: Collection[str],
+    beside: float,
+) -> dict[str, FloatArray]:
+    """Place the halves of a hood flat beside a head, upright as they are drawn, with the middles of their seams at the neckline's.
+
+    Args:
+        placed: by piece the points (#P by 3 [m]) of those that lie.
+        meshes: all pieces.
+        welds: for each seam the vertices that it joins.
+        hood: the pieces of the hood; what is sewn to both sides of the neckline, such as a strip over the crown, is no half.
+        beside: how far from the middle the halves lie [m].
+
+    Returns:
+        By half its points, #P by 3 [m].
+    """
+    rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
+    for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+        if name in hood and other in placed and other not in hood:
+            rows[name].append((own, placed[other][its]))
+    found = {}
+    for name, seams in rows.items():
+        if not seams:
+            continue
+        own, neckline = (np.concatenate(column) for column in zip(*seams, strict=True))
+        side = float(np.sign(neckline[:, 0]).mean())
+        if abs(side) > 0.5:
+            off = meshes[name].points - meshes[name].points[own].mean(axis=0)
+            seen = neckline - neckline.mean(axis=0)
+            # Drawn upright, it faces one way or the other.
+            forwards = np.sign(off[own, 0] @ seen[:, 2])
+            x, y = np.sign(side) * beside, neckline[:, 1].mean() + off[:, 1]
+            found[name] = np.column_stack([np.full(len(y), x), y, neckline[:, 2].mean() + forwards * off[:, 0]])
+    return found
+
+
+def _border_frames(mesh: FlatMesh, row: IntArray) -> FloatArray:
+    """Return the directions along a row of border vertices (#R) and into the piece as columns, #R by 2 by 2."""
+    points = mesh.points
+    along = np.gradient(points[row], axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    inwards = np.column_stack([-along[:, 1], along[:, 0]])
+    middle = points[mesh.triangles[np.isin(mesh.triangles, row).sum(axis=1) == 2]].mean(axis=1)
+    place = cKDTree(points[row]).query(middle)[1]
+    left = np.einsum("ta,ta->t", middle - points[row[place]], inwards[place])
+    return np.stack([along, inwards * (1.0 if np.median(left) > 0.0 else -1.0)], axis=-1)
+
+
+def _slopes(mesh: FlatMesh, points: FloatArray) -> FloatArray:
+    """Return where a piece's x and y lead in space at its vertices, #P by 3 by 2, for places #P by 3."""
+    flat, space = mesh.points[mesh.triangles], points[mesh.triangles]
+    sides, edges = ((each[:, 1:] - each[:, :1]).transpose(0, 2, 1) for each in (flat, space))
+    area = np.linalg.det(sides)
+    of_triangles = (edges @ np.linalg.inv(sides)).reshape(-1, 6) * area[:, None]
+    corner, count = mesh.triangles.ravel(), len(points)
+    total = np.stack([np.bincount(corner, np.repeat(column, 3), count) for column in of_triangles.T], axis=1)
+    return np.asarray((total / np.bincount(corner, np.repeat(area, 3), count)[:, None]).reshape(-1, 3, 2))
