@@ -8,11 +8,10 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 from pxr import Usd, UsdGeom
 
 from warpflat.flat.surface.normals import vertex_normals
@@ -20,10 +19,16 @@ from warpflat.flat.surface.triangles import triangulate
 from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.export.figure import new_figure, write_figure
 from warpflat.pattern.export.pattern_json import read_pattern_json
+from warpflat.pattern.export.raster import Lighting, rasterise, shade
 
-SKIN, CLOTH, LIGHT = (0.86, 0.78, 0.71), (0.36, 0.52, 0.68), np.array([-0.35, 0.45, 0.82])
-# The cloth is drawn this much nearer, and the body below it [m].
+SKIN, CLOTH, LIGHT = (0.86, 0.78, 0.71), (0.36, 0.52, 0.68), (-0.35, 0.45, 0.82)
+# The cloth is drawn this much nearer than the body below it [m].
 NEARER = 0.01
+# A pixel [m], and samples of it along either side.
+PIXEL, SAMPLES = 0.0018, 3
+
+#: A mesh: vertices, triangles and colour.
+Part = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 
 
 def make(folder: Path) -> None:
@@ -34,7 +39,7 @@ def make(folder: Path) -> None:
     subprocess.run([*program, "drape", str(folder / "shirt"), "--out", str(folder / "worn")], check=True)
 
 
-def meshes(film: Path) -> Iterator[tuple[np.ndarray, np.ndarray, tuple[float, float, float]]]:
+def meshes(film: Path) -> Iterator[Part]:
     """Yield body and cloth of a drape: vertices, triangles and colour."""
     stage = Usd.Stage.Open(str(film))
     for name, colour in (("body", SKIN), ("cloth", CLOTH)):
@@ -47,30 +52,32 @@ def meshes(film: Path) -> Iterator[tuple[np.ndarray, np.ndarray, tuple[float, fl
         yield np.array(mesh.GetPointsAttr().Get(stage.GetEndTimeCode()), dtype=float), triangulate(faces)[0], colour
 
 
+def seen(shown: Sequence[Part], low: np.ndarray, high: np.ndarray, sign: float) -> np.ndarray:
+    """Return a picture of body and cloth between two corners [m], RGBA, from the front (sign 1) or the back (-1)."""
+    size = np.ceil((high - low)[:2] / PIXEL).astype(int) * SAMPLES
+    places, rows, normals, colours = [], [], [], []
+    for points, triangles, colour in shown:
+        middle = 0.5 * (low + high)
+        turned = (points - middle) * [sign, 1.0, sign]
+        normals.append(vertex_normals(turned, triangles))
+        turned[:, 2] += NEARER if colour == CLOTH else 0.0
+        rows.append(triangles + sum(len(each) for each in places))
+        places.append(turned * [1.0, -1.0, 1.0] / PIXEL * SAMPLES + [*(0.5 * size), 0.0])
+        colours.append(np.tile(colour, (len(triangles), 1)))
+    corners, faces, colour = np.concatenate(places), np.concatenate(rows), np.concatenate(colours)
+    samples = rasterise(corners, faces, (int(size[1]), int(size[0])))
+    light = Lighting(normals=np.concatenate(normals), direction=LIGHT, back=CLOTH)
+    return shade(samples, SAMPLES, corners, faces, colour, face=np.arange(len(faces)), lighting=light)
+
+
 def main(file: str, folder: Path) -> None:
     """Write the figure to `file`, of a shirt that lies in a folder."""
     figure = new_figure(11.0, 3.5, dpi=110)
     shown = list(meshes(folder / "worn" / "frames.usdc"))
-    low, high = shown[1][0].min(axis=0) - 0.03, shown[1][0].max(axis=0) + 0.06
+    low, high = shown[1][0].min(axis=0) - [0.06, 0.05, 0.3], shown[1][0].max(axis=0) + [0.06, 0.22, 0.3]
     for number, sign in enumerate((1.0, -1.0)):
         axes = figure.add_axes((0.35 * number, 0.01, 0.34, 0.98))
-        corners, shades = [], []
-        for points, triangles, colour in shown:
-            turned = points * [sign, 1.0, sign]
-            normal = vertex_normals(turned, triangles)[triangles].mean(axis=1)
-            near = (points[triangles] > low).all(axis=(1, 2)) & (points[triangles] < high).all(axis=(1, 2))
-            kept = near & ((normal[:, 2] > -0.05) | (colour == CLOTH))
-            light = 0.5 + 0.5 * np.abs(normal[kept] @ LIGHT) / np.maximum(np.linalg.norm(normal[kept], axis=1), 1e-9)
-            corners.append(turned[triangles[kept]] + [0.0, 0.0, NEARER if colour == CLOTH else 0.0])
-            shades.append(np.clip(np.array(colour) * light[:, None], 0.0, 1.0))
-        corner, shade = np.concatenate(corners), np.concatenate(shades)
-        order = np.argsort(corner[:, :, 2].mean(axis=1))
-        axes.add_collection(
-            PolyCollection(corner[order][:, :, :2], facecolors=shade[order], edgecolors=shade[order], linewidths=0.3)
-        )
-        axes.set_xlim(*(sorted((sign * low[0], sign * high[0]))))
-        axes.set_ylim(low[1], high[1])
-        axes.set_aspect("equal")
+        axes.imshow(seen(shown, low, high, sign))
         axes.axis("off")
     axes = figure.add_axes((0.71, 0.02, 0.28, 0.96))
     sheet = lay_out(nests(read_pattern_json(folder / "shirt" / "pattern.json")), width=1.25)
