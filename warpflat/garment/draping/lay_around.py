@@ -145,7 +145,7 @@ def lay_around(
         laid[part == own] = places[part == own]
         level |= (part == own) & ("neck" not in kinds)
         rings += found
-        tops.append((part == own, found[0]))
+        tops += [] if "neck" in kinds else [(part == own, found[0])]
         hooded |= hood
         for k, name in zip(rows, named, strict=True):
             limbs[k] = name if name.endswith(("arm", "leg")) else ""
@@ -171,7 +171,7 @@ def lay_around(
                 )
                 target[below_arm, 1] = np.minimum(target[below_arm, 1], below)
             laid = rigid.step(laid, target)
-    # Ways along a mesh are longer than in the cloth, so that lower rings drew the highest one down.
+    # Ways along a mesh are longer than in the cloth, so that lower rings drew the waist down.
     for hung, ring in tops:
         laid[hung, 1] += ring.centre[1] - laid[ring.vertices, 1].mean()
     return Laid(positions=laid, limbs=limbs, hooded=hooded, level=level)
